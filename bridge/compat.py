@@ -1,0 +1,71 @@
+"""Makes PySC2 4.0.0 importable on today's Python, and leaves no trace behind.
+
+Two things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
+
+* its requirement `s2clientprotocol` ships stubs for a protobuf that is gone. The package
+  `pys2clientprotocol` installs the same import name for the current protobuf (see the overrides in
+  `pyproject.toml`); nothing is left to do here but to check it, which `protobuf_kind` allows;
+* `pysc2.lib.colors` calls `random.shuffle(palette, function)` at import. Python 3.11 removed the second
+  parameter, so it is given back while PySC2 is being imported, and taken away again.
+
+Import this module before anything of `pysc2`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, MutableSequence
+
+
+def _shuffle(x: MutableSequence[object], random_: Callable[[], float] | None = None) -> None:
+    """`random.shuffle` as it was up to Python 3.10: the same draws in the same order."""
+    if random_ is None:
+        _SHUFFLE(x)
+        return
+    for i in reversed(range(1, len(x))):
+        j = int(random_() * (i + 1))
+        x[i], x[j] = x[j], x[i]
+
+
+_SHUFFLE = random.shuffle
+
+
+@contextlib.contextmanager
+def old_shuffle() -> Iterator[None]:
+    """Gives `random.shuffle` its two-parameter form inside the block."""
+    random.shuffle = _shuffle  # type: ignore[assignment]  # a bound method gives way to a function
+    try:
+        yield
+    finally:
+        random.shuffle = _SHUFFLE
+
+
+@contextlib.contextmanager
+def quiet_pygame() -> Iterator[None]:
+    """Keeps pygame, which PySC2 imports for its renderer, from greeting on stdout."""
+    name = "PYGAME_HIDE_SUPPORT_PROMPT"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def protobuf_kind() -> str:
+    """The protobuf implementation in use: `upb` is fast, `python` is about 80 times slower."""
+    from google.protobuf.internal import api_implementation  # noqa: PLC0415  # only the doctor asks
+
+    return api_implementation.Type()
+
+
+with old_shuffle(), quiet_pygame():
+    import pysc2.lib.colors  # noqa: F401  # the only module of PySC2 that needs the old form
