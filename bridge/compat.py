@@ -5,8 +5,9 @@ Two things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
 * its requirement `s2clientprotocol` ships stubs for a protobuf that is gone. The package
   `pys2clientprotocol` installs the same import name for the current protobuf (see the overrides in
   `pyproject.toml`); nothing is left to do here but to check it, which `protobuf_kind` allows;
-* `pysc2.lib.colors` calls `random.shuffle(palette, function)` at import. Python 3.11 removed the second
-  parameter, so it is given back while PySC2 is being imported, and taken away again.
+* `pysc2.lib.features` builds its colour palettes at import, and `pysc2.lib.colors` shuffles them with
+  `random.shuffle(palette, function)`. Python 3.11 removed the second parameter, so it is given back
+  while these two are being imported, and taken away again.
 
 Import this module before anything of `pysc2`.
 """
@@ -68,4 +69,4 @@ def protobuf_kind() -> str:
 
 
 with old_shuffle(), quiet_pygame():
-    import pysc2.lib.colors  # noqa: F401  # the only module of PySC2 that needs the old form
+    import pysc2.lib.features  # noqa: F401  # palettes of the feature layers are the only user of the old form

@@ -1,1 +1,150 @@
-"""Placeholder."""
+"""The bus: bytes under keys, with promises. Two implementations keep the same promises and pass the same tests.
+
+`protocol.bus.memory.MemoryBus` lives in one process and is what tests use; `protocol.bus.zenoh.ZenohBus`
+joins machines. Nothing here knows what the bytes mean (`protocol.codec` does) or how keys are built
+(`protocol.keys` does). Everything runs on one asyncio loop; nothing of a bus may be touched from another thread.
+
+    ┌──────────┬─────────────────────────────────────┬──────────────────────┬──────────────────────────────┐
+    │ Delivery │ used for                            │ a slow receiver      │ a receiver that joins later  │
+    ├──────────┼─────────────────────────────────────┼──────────────────────┼──────────────────────────────┤
+    │ STATE    │ briefing, observation, run, result  │ loses old ones, is   │ gets the newest at once, and │
+    │          │                                     │ told how many; never │ after a lost link the newest │
+    │          │                                     │ slows anybody down   │ it missed                    │
+    │ SPEECH   │ reply, message                      │ the sender waits,    │ gets nothing from before     │
+    │          │                                     │ half a second at most│                              │
+    │ LOG      │ exchange, report                    │ loses, silently      │ gets nothing from before     │
+    └──────────┴─────────────────────────────────────┴──────────────────────┴──────────────────────────────┘
+
+Samples of one publisher arrive in order and at most once; so do the samples of all SPEECH publishers of one
+bus, whatever their keys, which is why a reply may be taken as the end of the messages sent before it. No
+promise covers a link that is down: whoever needs an answer correlates and counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Delivery(Enum):
+    """What a publisher promises; see the table of the module."""
+
+    STATE = "state"
+    SPEECH = "speech"
+    LOG = "log"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Bytes that arrived under a key."""
+
+    key: str
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Liveness:
+    """A liveliness token appeared (`alive`) or went away.
+
+    Attributes:
+        key: the token's key.
+        alive: False when the session that declared it closed, died or was cut off.
+        link_up: False when it is our own link that is down, so that the other side may well be alive.
+    """
+
+    key: str
+    alive: bool
+    link_up: bool = True
+
+
+class Publisher(Protocol):
+    """Puts bytes under one key."""
+
+    @property
+    def key(self) -> str:
+        """The key that it was declared for."""
+        ...
+
+    async def put(self, payload: bytes) -> None:
+        """Sends `payload`; returns when it is on its way, which is no proof of arrival.
+
+        Raises:
+            BusClosed: the bus is closed.
+        """
+        ...
+
+    async def close(self) -> None:
+        """Undeclares the publisher; its cache is forgotten. May be called twice."""
+        ...
+
+
+class Subscription(Protocol[T_co]):
+    """What arrives, as an asynchronous iterator that ends when the subscription or the bus is closed.
+
+    Attributes:
+        dropped: items that arrived and were thrown away here, because nobody took them in time.
+        missed: samples that a STATE publisher sent and that never arrived here, as far as is known.
+    """
+
+    dropped: int
+    missed: int
+
+    def __aiter__(self) -> AsyncIterator[T_co]:
+        """Iterates over what arrives."""
+        ...
+
+    async def __anext__(self) -> T_co:
+        """The next item; waits for it."""
+        ...
+
+    async def close(self) -> None:
+        """Undeclares the subscription and ends the iteration. May be called twice."""
+        ...
+
+
+class Token(Protocol):
+    """A liveliness token: it is seen by watchers as long as it is open and our link is up."""
+
+    async def close(self) -> None:
+        """Takes the token back. May be called twice."""
+        ...
+
+
+class Bus(Protocol):
+    """A session on the bus."""
+
+    async def publisher(self, key: str, delivery: Delivery) -> Publisher:
+        """Declares a publisher for one key.
+
+        Raises:
+            BusClosed: the bus is closed.
+        """
+        ...
+
+    async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
+        """Declares a subscription; samples put after this returns arrive (and see `Delivery`).
+
+        Args:
+            key_expr: a key, or an expression with `*` (one part) and `**` (any number of parts).
+            delivery: as the publishers of these keys declare it.
+            depth: samples that wait here before the oldest is dropped; 1 keeps the newest only.
+        """
+        ...
+
+    async def announce(self, key: str) -> Token:
+        """Declares a liveliness token."""
+        ...
+
+    async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
+        """Reports tokens: those that are there already at first, then every change."""
+        ...
+
+    async def close(self) -> None:
+        """Closes everything that was declared here; returns within two seconds. May be called twice."""
+        ...

@@ -1,0 +1,487 @@
+"""The messages, as frozen pydantic models with a literal `kind` each.
+
+They stand alone: no game, no bus, no model provider is imported here. Positions are in one of two frames,
+x right and y down in both: *screen*, `[0, 24)` cells of one world unit around the centre of a team's
+(virtual) camera, and *minimap*, `[0, 64)`. The world frame never leaves the host.
+
+Lengths are counted in game loops (22.4 a second at the speed called "faster") where a name ends in
+`_loops` or is `game_loop`, in seconds where it ends in `_s`, in world units otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA_VERSION: Literal[1] = 1
+"""Major version of the schema. A peer with another one is refused, not guessed at."""
+
+Point = tuple[float, float]
+Alliance = Literal["own", "ally", "enemy", "neutral"]
+Outcome = Literal["win", "draw", "loss"]
+ClockRule = Literal["frozen", "budget", "token", "realtime"]
+
+RejectionReason = Literal[
+    "malformed",  # looks like a call and is none
+    "unknown_action",  # no action of this name in the agent's catalogue
+    "wrong_arguments",  # number or form of the arguments
+    "unknown_team",  # a team that this agent does not have
+    "unknown_target",  # a tag that names no unit in sight
+    "invalid_target",  # a unit or a point that this action cannot be used on
+    "out_of_bounds",  # a point outside of its frame or of the map
+    "not_available",  # known, but not now: cost, cooldown, requirement
+    "too_many_actions",  # over the number of actions a team may have in one reply
+    "unknown_recipient",  # a message to nobody
+    "refused_by_game",  # PySC2 or the game answered with an error
+]
+
+AgentStatus = Literal[
+    "ok",  # a reply of the policy, in time
+    "fallback",  # the policy failed (see `Reply.detail`) and its default reply was sent
+    "late",  # nothing arrived before the deadline
+    "gone",  # its liveliness token went away while the host was waiting
+    "malformed",  # something arrived that is no valid reply
+]
+
+
+class Frozen(BaseModel):
+    """Base of all parts of messages: immutable, and unknown fields are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class Wire(Frozen):
+    """Base of all messages: what every one of them carries."""
+
+    v: Literal[1] = SCHEMA_VERSION
+    """Major version of the schema."""
+    run: str
+    """Name of the run; the same as in the key."""
+
+
+# --- what an agent may say --------------------------------------------------------------------------
+
+
+class Call(Frozen):
+    """One `<Name(args)>` found in a reply, with its place in the text."""
+
+    name: str
+    args: tuple[str | Point, ...] = ()
+    """Tags as `0x…`, points as `(x, y)` in the frame that the action's catalogue entry says, the rest as text."""
+    team: str | None = None
+    """The team whose heading stands above it, as written there; None if there was no heading."""
+    start: int = Field(ge=0)
+    """Offset of `<` in the reply's text, in characters."""
+    end: int = Field(ge=0)
+    """Offset behind `>`."""
+
+
+class Rejection(Frozen):
+    """A call, or what looked like one, that was not executed. It goes back to the agent with the next observation."""
+
+    reason: RejectionReason
+    message: str
+    """One sentence for the model: what was wrong, and what would be right."""
+    text: str
+    """The words in question."""
+    start: int = Field(ge=0)
+    """Offset of `text` in the reply."""
+    team: str | None = None
+
+
+class ActionSpec(Frozen):
+    """One text action of the catalogue, as an agent is told of it."""
+
+    name: str
+    args: tuple[Literal["tag", "screen", "minimap"], ...] = ()
+    description: str = ""
+
+
+# --- what an agent sees -----------------------------------------------------------------------------
+
+
+class UnitView(Frozen):
+    """One unit in sight of a team, in the team's screen frame."""
+
+    tag: str
+    """Hexadecimal, `0x1002c0001`; the name under which actions speak of the unit."""
+    type: str
+    """Name as in `pysc2.lib.units`, without the race."""
+    alliance: Alliance
+    screen: Point
+    minimap: Point
+    distance: float | None = None
+    """From the mean position of the team's units, in world units; enemies only."""
+    health: float
+    health_max: float
+    shield: float = 0.0
+    shield_max: float = 0.0
+    energy: float = 0.0
+    energy_max: float = 0.0
+    weapon_cooldown_s: float | None = None
+    """Seconds until the weapon is ready; None for units without one, or of others."""
+    build_progress: float = 1.0
+    """0 to 1; 1 is finished."""
+    flying: bool = False
+    cloaked: bool = False
+    hallucination: bool = False
+    buffs: tuple[str, ...] = ()
+    order: str | None = None
+    """Name of the order it follows; own units only."""
+
+
+class Event(Frozen):
+    """What happened to a unit between the last observation and this one."""
+
+    what: Literal["hurt", "healed", "died", "joined", "appeared", "disappeared"]
+    tag: str
+    type: str
+    alliance: Alliance
+    amount: float | None = None
+    """Health and shield lost (`hurt`) or regained (`healed`)."""
+
+
+class TeamView(Frozen):
+    """One team of an agent: its units, and what they see on their screen."""
+
+    name: str
+    minimap: Point
+    """Centre of the team's camera."""
+    units: tuple[UnitView, ...] = ()
+    allies: tuple[UnitView, ...] = ()
+    enemies: tuple[UnitView, ...] = ()
+    events: tuple[Event, ...] = ()
+    actions: tuple[ActionSpec, ...] = ()
+    """What is valid for this team now."""
+    bounds: tuple[float, float, float, float] = (0.0, 0.0, 24.0, 24.0)
+    """The part of the screen frame that lies on the playable map: x0, y0, x1, y1."""
+
+
+class Resources(Frozen):
+    """The numbers at the top of a player's screen."""
+
+    minerals: int = 0
+    vespene: int = 0
+    supply_used: float = 0.0
+    supply_cap: float = 0.0
+
+
+class View(Frozen):
+    """The structured form of an observation's text."""
+
+    time_s: float
+    """Seconds on the game's clock: game loop / 22.4."""
+    resources: Resources = Resources()
+    upgrades: tuple[str, ...] = ()
+    teams: tuple[TeamView, ...] = ()
+
+
+class ImageRef(Frozen):
+    """A picture that belongs to an observation and travels on a topic of its own."""
+
+    name: str
+    media_type: Literal["image/jpeg", "image/png"]
+    sha256: str
+    title: str = ""
+
+
+class Received(Frozen):
+    """A message as its recipient gets it."""
+
+    sender: str
+    recipient: str
+    """The agent's own name, or the channel it listens to."""
+    text: str
+
+
+class Correspondent(Frozen):
+    """Somebody an agent may write to."""
+
+    name: str
+    role: str = ""
+
+
+class TeamSpec(Frozen):
+    """One team of an agent, as configured."""
+
+    name: str
+    unit_types: tuple[str, ...]
+    task: str = ""
+
+
+class Frames(Frozen):
+    """Sizes of the two frames that positions are given in; x right, y down, from 0 to below the size."""
+
+    screen: float = 24.0
+    minimap: float = 64.0
+
+
+class Clock(Frozen):
+    """How game time and thinking time hang together in this run."""
+
+    rule: ClockRule = "frozen"
+    max_wait_s: float | None = 15.0
+    """Longest time the host waits for the agents of one step; None waits for ever."""
+    step_loops: int = Field(default=8, ge=1)
+    """Game loops that pass between two observations."""
+
+
+class Briefing(Wire):
+    """Host → agent: all that an agent must know besides observations, so that it can join late or restart."""
+
+    kind: Literal["briefing"] = "briefing"
+    agent: str
+    side: str
+    episode: int = Field(ge=0)
+    role: str
+    """Who the agent is and what it has to do."""
+    task: str = ""
+    teams: tuple[TeamSpec, ...] = ()
+    actions: tuple[ActionSpec, ...] = ()
+    """Every action that any of its teams may ever use."""
+    correspondents: tuple[Correspondent, ...] = ()
+    channels: tuple[str, ...] = ()
+    frames: Frames = Frames()
+    clock: Clock = Clock()
+    max_actions: int = Field(default=3, ge=1)
+    """Actions that one team may have in one reply; more are rejected."""
+
+
+class Observation(Wire):
+    """Host → agent: what one agent sees at one step. A pure function of what was recorded before."""
+
+    kind: Literal["observation"] = "observation"
+    agent: str
+    side: str
+    episode: int = Field(ge=0)
+    step: int = Field(ge=0)
+    game_loop: int = Field(ge=0)
+    answer_within_s: float | None
+    """Seconds until the host goes on without this agent, counted from the arrival: clocks differ between machines."""
+    text: str
+    """The observation in words."""
+    view: View
+    """What the words were made from."""
+    images: tuple[ImageRef, ...] = ()
+    accepted: tuple[str, ...] = ()
+    """The agent's calls of the last step that were carried out, as written."""
+    rejections: tuple[Rejection, ...] = ()
+    """Those that were not."""
+    messages: tuple[Received, ...] = ()
+
+
+# --- what an agent sends ----------------------------------------------------------------------------
+
+
+class Usage(Frozen):
+    """What requests to a model took. Sums with `+`."""
+
+    requests: int = 0
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+    cached_tokens: int = 0
+    """The part of `prompt_tokens` that the provider had in its cache."""
+    reasoning_tokens: int = 0
+    """The part of `completion_tokens` that was thought and not said."""
+    cost_usd: float | None = None
+    """None if no price is known for the model."""
+    unknown_requests: int = 0
+    """Requests that were cancelled or failed, whose tokens nobody told us."""
+
+    def __add__(self, other: Usage) -> Usage:
+        costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
+        return Usage(
+            requests=self.requests + other.requests,
+            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
+            completion_tokens=self.completion_tokens + other.completion_tokens,
+            cached_tokens=self.cached_tokens + other.cached_tokens,
+            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
+            cost_usd=sum(costs) if costs else None,
+            unknown_requests=self.unknown_requests + other.unknown_requests,
+        )
+
+
+class Reply(Wire):
+    """Agent → host: the answer to one observation. The first valid one of a step counts."""
+
+    kind: Literal["reply"] = "reply"
+    agent: str
+    side: str
+    episode: int = Field(ge=0)
+    step: int = Field(ge=0)
+    text: str
+    """The reply as the model gave it; the host reads its calls from here."""
+    calls: tuple[Call, ...] = ()
+    """What the agent itself understood of it, for listeners; the host's own reading decides."""
+    status: Literal["ok", "fallback"] = "ok"
+    detail: str = ""
+    """Why it is a fallback: `timeout`, `http 500`, `budget`, …"""
+    latency_s: float = 0.0
+    """From the arrival of the observation to this reply."""
+    attempts: int = Field(default=0, ge=0)
+    usage: Usage = Usage()
+
+
+class Message(Wire):
+    """Agent → host: a `MessageTo`, put into the recipients' next observation by the host's mailbox."""
+
+    kind: Literal["message"] = "message"
+    agent: str
+    """The sender."""
+    side: str
+    episode: int = Field(ge=0)
+    step: int = Field(ge=0)
+    recipient: str
+    """An agent or a channel."""
+    text: str
+
+
+class ChatMessage(Frozen):
+    """One message of a prompt."""
+
+    role: Literal["system", "user", "assistant"]
+    content: str
+
+
+class Exchange(Wire):
+    """Agent → recorder: one request to a model and what came back. Never a key."""
+
+    kind: Literal["exchange"] = "exchange"
+    agent: str
+    side: str
+    episode: int = Field(ge=0)
+    step: int = Field(ge=0)
+    attempt: int = Field(ge=1)
+    model: str
+    endpoint: str
+    """Base URL without credentials or query."""
+    prompt: tuple[ChatMessage, ...]
+    params: dict[str, str | int | float | bool | None] = {}
+    completion: str | None
+    """None if none came."""
+    status: str
+    """`ok`, `timeout`, `cancelled`, `http 429`, `connection`, `malformed`."""
+    started_s: float
+    """Since the observation's arrival."""
+    latency_s: float
+    waited_s: float = 0.0
+    """Time spent before the request in the queue of the shared limits."""
+    usage: Usage = Usage()
+
+
+# --- what the host tells everybody -------------------------------------------------------------------
+
+
+class AgentCard(Frozen):
+    """One agent on the run card."""
+
+    name: str
+    side: str
+    teams: tuple[str, ...]
+    required: bool = True
+
+
+class Run(Wire):
+    """Host → all: the run card, all that one needs to know to repeat a run or to trust its numbers."""
+
+    kind: Literal["run"] = "run"
+    task: str
+    map_name: str
+    map_sha256: str
+    seed: int
+    episodes: int
+    game: str
+    """Version of the game that plays, `simulator 0.1.0 (data 4.10.0.75689)` or `StarCraft II 4.10.0.75689`."""
+    executor: Literal["raw", "screen"]
+    clock: Clock
+    agents: tuple[AgentCard, ...]
+    catalogue_sha256: str
+    versions: dict[str, str]
+    """Of Khala, Python, PySC2, zenoh."""
+    config: dict[str, object] = {}
+    """The task file as it was resolved."""
+
+
+class AgentReport(Frozen):
+    """What became of one agent's part of a step."""
+
+    agent: str
+    side: str
+    status: AgentStatus
+    detail: str = ""
+    latency_s: float | None = None
+    """From the publication of the observation to the arrival of the reply, on the host's clock."""
+    accepted: tuple[str, ...] = ()
+    rejections: tuple[Rejection, ...] = ()
+    ignored: int = 0
+    """Replies that arrived and were not executed: duplicates, late or foreign ones."""
+    usage: Usage = Usage()
+
+
+class Timings(Frozen):
+    """Where the wall time of a step went, in seconds."""
+
+    observe_s: float = 0.0
+    publish_s: float = 0.0
+    wait_s: float = 0.0
+    act_s: float = 0.0
+    game_s: float = 0.0
+
+
+class Report(Wire):
+    """Host → all: what happened in one step."""
+
+    kind: Literal["report"] = "report"
+    episode: int = Field(ge=0)
+    step: int = Field(ge=0)
+    game_loop: int = Field(ge=0)
+    agents: tuple[AgentReport, ...]
+    functions: tuple[str, ...] = ()
+    """PySC2 functions or raw commands that were executed."""
+    env_steps: int = 0
+    """Calls of `SC2Env.step` that the joint action took."""
+    score: float = 0.0
+    timings: Timings = Timings()
+
+
+class Casualties(Frozen):
+    """Units and their value in minerals + vespene, lost by one side."""
+
+    units: int = 0
+    value: float = 0.0
+
+
+class Result(Wire):
+    """Host → all: how an episode ended."""
+
+    kind: Literal["result"] = "result"
+    episode: int = Field(ge=0)
+    outcome: Outcome
+    cause: str
+    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`."""
+    steps: int
+    game_loop: int
+    game_s: float
+    wall_s: float
+    killed: Casualties
+    lost: Casualties
+    kd: float | None
+    """Value killed / value lost; None if nothing was lost."""
+    score: float = 0.0
+    usage: dict[str, Usage] = {}
+    """By agent."""
+    statuses: dict[str, dict[str, int]] = {}
+    """By agent: how many of its steps ended `ok`, `late`, …"""
+    rejections: dict[str, int] = {}
+    """Rejected calls by reason."""
+    accepted: int = 0
+    latency_p50_s: float | None = None
+    latency_p95_s: float | None = None
+
+
+AnyMessage = Annotated[
+    Run | Briefing | Observation | Reply | Message | Exchange | Report | Result,
+    Field(discriminator="kind"),
+]
+MESSAGE_TYPES: tuple[type[Wire], ...] = (Run, Briefing, Observation, Reply, Message, Exchange, Report, Result)
