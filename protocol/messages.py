@@ -437,6 +437,8 @@ class Report(Wire):
     step: int = Field(ge=0)
     game_loop: int = Field(ge=0)
     agents: tuple[AgentReport, ...]
+    messages: tuple[Received, ...] = ()
+    """What the mailbox put into the observations of the next step."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0

@@ -1,0 +1,60 @@
+# `make demo` and `make test` need Python 3.11 or newer, git and make; they install all else into .venv.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+PYTHON ?= $(firstword $(foreach p,python3.13 python3.12 python3.11 python3 python,$(shell $(p) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(p))))
+# uv from PATH when it is there, else one of our own in .uv
+UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
+RUN := .venv/bin/
+
+.PHONY: help install check format types test test-all demo bench docs picture clean
+
+help: ## What can be made
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+.uv/bin/uv:
+	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
+	$(PYTHON) -m venv .uv
+	.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
+
+.venv/.ready: pyproject.toml uv.lock $(filter .uv/bin/uv,$(UV))
+	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
+	$(UV) sync --quiet --frozen --python $(PYTHON)
+	@touch $@
+
+install: .venv/.ready ## Install everything into .venv
+
+demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
+	$(RUN)khala run 2s3z_pair
+
+test: install check ## What CI runs: lint, types, contracts and every test
+	$(RUN)pytest
+
+check: install ## Lint, format, types and import contracts
+	$(RUN)ruff check .
+	$(RUN)ruff format --check .
+	$(RUN)mypy
+	$(RUN)lint-imports --no-logo
+
+format: install ## Format the code and mend what the linter can
+	$(RUN)ruff format .
+	$(RUN)ruff check --fix .
+
+test-all: .uv/bin/uv ## The tests on every Python that is installed: 3.11, 3.12, 3.13
+	@for v in 3.11 3.12 3.13; do \
+	  p=$$($(UV) python find --no-python-downloads $$v 2>/dev/null) || { echo "no Python $$v here"; continue; }; \
+	  echo "== Python $$v"; \
+	  UV_PROJECT_ENVIRONMENT=.venv-$$v $(UV) sync --quiet --frozen --python $$p && .venv-$$v/bin/pytest -q || exit 1; \
+	done
+
+bench: install ## Measure what the README claims
+	$(RUN)python -m bench
+
+docs: install ## Write the generated pages of docs/reference
+	$(RUN)python -m docs.generate
+
+picture: install ## Play a battle and draw docs/images/2s3z.gif from its recording
+	$(RUN)python -m docs.picture
+
+clean: ## Remove what make made
+	rm -rf .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist

@@ -1,0 +1,219 @@
+"""Asks every agent at once, and waits until all have replied or the deadline has passed.
+
+Below it: publishers of observations, and one inbox of replies and messages. Above it: `orchestrator.match`.
+It knows nothing of games. A reply is taken when it is the first valid one of its agent for the open step;
+all others are counted as ignored and never seen again. A wait for an agent ends early when its liveliness
+token goes, or when what it sent is no reply: it may still answer while the step is open.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol, Self
+
+from orchestrator.roster import Seat
+from protocol.bus import Delivery
+from protocol.codec import decode_as, encode
+from protocol.errors import PeerError, WrongKey
+from protocol.keys import Topic, agent_key, every_agent, parse
+from protocol.messages import AgentStatus, Message, Observation, Reply
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from types import TracebackType
+
+    from orchestrator.roster import Roster
+    from protocol.bus import Bus, Publisher, Sample, Subscription
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of asking one agent.
+
+    Attributes:
+        status: `ok` and `fallback` have a reply, the others none.
+        latency_s: from the publication of the observation to the reply's arrival.
+        ignored: replies of this agent that arrived during the step and were not taken.
+    """
+
+    status: AgentStatus
+    reply: Reply | None = None
+    detail: str = ""
+    latency_s: float | None = None
+    ignored: int = 0
+
+    @property
+    def text(self) -> str | None:
+        """The words of the reply."""
+        return self.reply.text if self.reply else None
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What came of one step: an answer a seat, and the messages that arrived."""
+
+    by_seat: Mapping[Seat, Answer]
+    messages: tuple[Message, ...] = ()
+    publish_s: float = 0.0
+    wait_s: float = 0.0
+
+
+class Asking(Protocol):
+    """What a match needs of a turn; a recording can stand in for live agents."""
+
+    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+        """Puts one observation before each agent and returns what they answered."""
+        ...
+
+
+@dataclass
+class _Step:
+    """The step that is open: who was asked, who is still waited for, what came."""
+
+    episode: int
+    number: int
+    asked_at: dict[Seat, float] = field(default_factory=dict)
+    waiting: set[Seat] = field(default_factory=set)
+    taken: dict[Seat, tuple[Reply, float]] = field(default_factory=dict)
+    faults: dict[Seat, str] = field(default_factory=dict)
+    settled: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def stop_waiting(self, seat: Seat) -> None:
+        self.waiting.discard(seat)
+        if not self.waiting:
+            self.settled.set()
+
+
+class Turn:
+    """`Asking` over a bus. An asynchronous context manager."""
+
+    def __init__(self, bus: Bus, run: str, roster: Roster) -> None:
+        self._bus = bus
+        self._run = run
+        self._roster = roster
+        self._publishers: dict[Seat, Publisher] = {}
+        self._inboxes: list[Subscription[Sample]] = []
+        self._pumps: list[asyncio.Task[None]] = []
+        self._messages: list[Message] = []
+        self._ignored: Counter[Seat] = Counter()
+        self._step: _Step | None = None
+
+    async def __aenter__(self) -> Self:
+        for seat in self._roster.seats:
+            key = agent_key(self._run, seat.side, seat.agent, Topic.OBSERVATION)
+            self._publishers[seat] = await self._bus.publisher(key, Delivery.STATE)
+        for topic, take in ((Topic.MESSAGE, self._take_message), (Topic.REPLY, self._take_reply)):
+            inbox = await self._bus.subscribe(every_agent(self._run, topic), Delivery.SPEECH)
+            self._inboxes.append(inbox)
+            self._pumps.append(asyncio.create_task(_pump(inbox, take), name=f"inbox {topic}"))
+        self._roster.on_gone(self._gone)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for inbox in self._inboxes:
+            await inbox.close()
+        await asyncio.gather(*self._pumps)
+        for publisher in self._publishers.values():
+            await publisher.close()
+
+    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+        """Publishes the observations and waits for the replies, no longer than the observations allow.
+
+        Args:
+            observations: one a seat, all of the same episode and step and with the same `answer_within_s`.
+        """
+        loop = asyncio.get_running_loop()
+        first = next(iter(observations.values()))
+        step = self._step = _Step(first.episode, first.step, waiting=set(observations))
+        began = loop.time()
+        for seat, observation in observations.items():
+            step.asked_at[seat] = loop.time()
+            await self._publishers[seat].put(encode(observation))
+        published = loop.time()
+        for seat in observations:
+            if not self._roster.present(seat):
+                step.stop_waiting(seat)
+        try:
+            async with asyncio.timeout(first.answer_within_s):
+                await step.settled.wait()
+        except TimeoutError:
+            log.info("step %d: no reply in time from %s", step.number, ", ".join(map(str, sorted(step.waiting))))
+        return self._close(step, publish_s=published - began, wait_s=loop.time() - published)
+
+    def _close(self, step: _Step, *, publish_s: float, wait_s: float) -> Answers:
+        self._step = None
+        answers = {seat: self._answer(step, seat) for seat in step.asked_at}
+        messages, self._messages = tuple(self._messages), []
+        self._ignored.clear()
+        return Answers(answers, messages, publish_s, wait_s)
+
+    def _answer(self, step: _Step, seat: Seat) -> Answer:
+        ignored = self._ignored[seat]
+        if seat in step.taken:
+            reply, arrived = step.taken[seat]
+            return Answer(reply.status, reply, reply.detail, arrived - step.asked_at[seat], ignored)
+        if seat in step.faults:
+            return Answer("malformed", detail=step.faults[seat], ignored=ignored)
+        if not self._roster.present(seat):
+            return Answer("gone", detail="its liveliness token went away", ignored=ignored)
+        return Answer("late", detail="no reply before the deadline", ignored=ignored)
+
+    def _gone(self, seat: Seat) -> None:
+        if self._step is not None:
+            self._step.stop_waiting(seat)
+
+    def _take_reply(self, seat: Seat, payload: bytes) -> None:
+        step = self._step
+        try:
+            reply = decode_as(Reply, payload)
+            self._check_sender(seat, reply)
+        except PeerError as error:
+            log.warning("agent %s sent no valid reply: %s", seat, error)
+            self._ignored[seat] += 1
+            if step is not None and seat not in step.taken:
+                step.faults[seat] = str(error)
+                step.stop_waiting(seat)
+            return
+        fits = step is not None and (reply.episode, reply.step) == (step.episode, step.number)
+        if step is None or not fits or seat in step.taken:
+            self._ignored[seat] += 1
+            return
+        step.taken[seat] = (reply, asyncio.get_running_loop().time())
+        step.stop_waiting(seat)
+
+    def _take_message(self, seat: Seat, payload: bytes) -> None:
+        try:
+            message = decode_as(Message, payload)
+            self._check_sender(seat, message)
+        except PeerError as error:
+            log.warning("agent %s sent no valid message: %s", seat, error)
+            return
+        self._messages.append(message)
+
+    def _check_sender(self, seat: Seat, said: Reply | Message) -> None:
+        if (said.run, said.side, said.agent) != (self._run, *seat):
+            raise WrongKey(f"{said.kind} of {said.side}/{said.agent} in run {said.run} stands under the key of {seat}")
+        if seat not in self._publishers:
+            raise WrongKey(f"{seat} is not in this match")
+
+
+class _Take(Protocol):
+    def __call__(self, seat: Seat, payload: bytes) -> None: ...
+
+
+async def _pump(inbox: Subscription[Sample], take: _Take) -> None:
+    async for sample in inbox:
+        try:
+            address = parse(sample.key)
+        except WrongKey as error:
+            log.warning("%s", error)
+            continue
+        assert address.side is not None and address.agent is not None
+        take(Seat(address.side, address.agent), sample.payload)
