@@ -1,0 +1,104 @@
+"""What a user reads when a YAML file is wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from protocol.configfile import load, loads
+from protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class Team(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    name: str
+    size: int = Field(default=1, ge=1)
+
+
+class Match(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    task: str
+    clock: Literal["frozen", "token"] = "frozen"
+    teams: list[Team] = []
+    limits: dict[str, float] = {}
+    best: Team | None = None
+
+    @field_validator("task")
+    @classmethod
+    def known_task(cls, value: str) -> str:
+        if value == "unknown":
+            raise ValueError("there is no task of this name")
+        return value
+
+
+GOOD = """
+task: 2s3z
+teams:
+  - name: A
+  - {name: B, size: 3}
+limits: {usd: 1.5}
+"""
+
+
+def test_a_file_becomes_its_model(tmp_path: Path) -> None:
+    path = tmp_path / "match.yaml"
+    path.write_text(GOOD, encoding="utf-8")
+    assert load(path, Match) == Match(task="2s3z", teams=[Team(name="A"), Team(name="B", size=3)], limits={"usd": 1.5})
+
+
+def test_anchors_and_merges_are_read() -> None:
+    text = "task: x\nbest: &b {name: A, size: 2}\nteams:\n  - *b\n  - <<: *b\n    size: 5\n"
+    assert loads(text, Match, source="m").teams == [Team(name="A", size=2), Team(name="A", size=5)]
+
+
+ERRORS = [
+    ("task: [", "m.yaml:1: this is no YAML: expected the node content, but found '<stream end>'"),
+    ("task: !!python/x y",
+     "m.yaml:1: this is no YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/x'"),
+    ("task: x\n\ttab: 1", "m.yaml:2: this is no YAML: found character '\\t' that cannot start any token"),
+    ("", "m.yaml:1 (task): is required and not given"),
+    ("- a", "m.yaml:1: fields are wanted here, not ['a']"),
+    ("task: x\nteems: []", "m.yaml:2 (teems): no such field, did you mean 'teams'?"),
+    ("task: x\nsk-secret: 1", "m.yaml:2 (sk-secret): no such field; known are best, clock, limits, task, teams"),
+    ("task: x\nclock: fast", "m.yaml:2 (clock): 'fast' is none of 'frozen' or 'token'"),
+    ("task: x\nteams:\n  - name: A\n    size: 0",
+     "m.yaml:4 (teams.0.size): input should be greater than or equal to 1, not 0"),
+    ("task: x\nteams:\n  - size: 2", "m.yaml:3 (teams.0.name): is required and not given"),
+    ("task: x\nbest:\n  name: A\n  sise: 1", "m.yaml:4 (best.sise): no such field"),
+    ("task: x\nlimits:\n  usd: much",
+     "m.yaml:3 (limits.usd): input should be a valid number, unable to parse string as a number, not 'much'"),
+    ("task: unknown", "m.yaml:1 (task): there is no task of this name"),
+    ("task: x\ntask: y", "m.yaml:2 (task): stands here a second time, the first is on line 1"),
+    ("task: 1\nclock: 2", "m.yaml:1 (task): input should be a valid string, not 1 (and 1 more)"),
+    ("task: x\nbest: {name: *a}", "m.yaml:2: this is no YAML: found undefined alias 'a'"),
+    ("task: x\nlimits: &a\n  more: *a", "m.yaml:3: nested too deep"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "expected"), ERRORS)
+def test_an_error_says_file_line_field_and_what_is_wrong(text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads(text, Match, source="m.yaml")
+    assert str(caught.value) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("none.yaml", "there is no such file"),
+        ("folder.yaml", "this is a directory, a YAML file is wanted"),
+        ("latin.yaml", "this is no UTF-8 text"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / "latin.yaml").write_bytes(b"task: \xe9")
+    (tmp_path / "folder.yaml").mkdir()
+    path = tmp_path / name
+    with pytest.raises(ConfigError) as caught:
+        load(path, Match)
+    assert str(caught.value) == f"{path}: {text}"
