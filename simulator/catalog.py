@@ -1,0 +1,198 @@
+"""The game's tables: what a unit, a weapon and an upgrade are in one version of StarCraft II.
+
+Reads ``data/tables/<version>`` into the records of ``records``, once per process. Nothing here is about one
+particular game: which upgrades a player has is applied in ``stats``, where the records become arrays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any, Final
+
+from simulator.records import (
+    Affects,
+    Area,
+    Change,
+    Footprint,
+    Hit,
+    Production,
+    Search,
+    Sweep,
+    UnitType,
+    Upgrade,
+    Weapon,
+)
+
+__all__ = [
+    "DEFAULT_VERSION",
+    "LOOPS_PER_NORMAL_SECOND",
+    "Catalog",
+    "CatalogError",
+    "Footprint",
+    "Hit",
+    "Production",
+    "UnitType",
+    "Upgrade",
+    "Weapon",
+    "load_catalog",
+]
+
+LOOPS_PER_NORMAL_SECOND: Final = 16
+DEFAULT_VERSION: Final = "4.10"
+VERSION_OF_BUILD: Final = {75689: "4.10", 92440: "5.0.13"}
+
+
+class CatalogError(ValueError):
+    """A table version, unit or weapon that is not in the data was asked for."""
+
+
+@dataclass(frozen=True)
+class Catalog:
+    """All tables of one game version, with look-up by id and by name."""
+
+    version: str
+    build: int
+    units: tuple[UnitType, ...]
+    weapons: tuple[Weapon, ...]
+    upgrades: tuple[Upgrade, ...]
+    footprints: dict[str, Footprint]
+    row_of_id: dict[int, int]
+    row_of_name: dict[str, int]
+
+    def unit(self, key: int | str) -> UnitType:
+        """The unit type with this API id or this name; raises ``CatalogError`` when there is none."""
+        row = self.row_of_id.get(key) if isinstance(key, int) else self.row_of_name.get(key)
+        if row is None:
+            raise CatalogError(f"no unit type {key!r} in the tables of version {self.version}")
+        return self.units[row]
+
+    def upgrade(self, key: int | str) -> Upgrade:
+        """The upgrade with this API id or this name; raises ``CatalogError`` when there is none."""
+        for upgrade in self.upgrades:
+            if key in (upgrade.id, upgrade.name):
+                return upgrade
+        raise CatalogError(f"no upgrade {key!r} in the tables of version {self.version}")
+
+
+@lru_cache(maxsize=4)
+def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
+    """The tables of a game version, given as "4.10" or as its build number 75689.
+
+    Raises:
+        CatalogError: no tables for this version are shipped.
+    """
+    name = VERSION_OF_BUILD.get(version) if isinstance(version, int) else version
+    if name is None or name not in VERSION_OF_BUILD.values():
+        known = ", ".join(f"{v} (build {b})" for b, v in VERSION_OF_BUILD.items())
+        raise CatalogError(f"no tables for game version {version!r}; shipped are {known}")
+    weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
+    weapon_of_id = {w.id: w for w in weapons}
+    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_rows(name, "units")))
+    return Catalog(
+        version=name,
+        build=next(b for b, v in VERSION_OF_BUILD.items() if v == name),
+        units=units,
+        weapons=weapons,
+        upgrades=tuple(_upgrade(raw) for raw in _rows(name, "upgrades")),
+        footprints={raw["id"]: _footprint(raw) for raw in _rows(name, "footprints")},
+        row_of_id={u.id: u.row for u in units},
+        row_of_name={u.name: u.row for u in units},
+    )
+
+
+def _rows(version: str, kind: str) -> list[dict[str, Any]]:
+    path = resources.files("simulator.data") / "tables" / version / f"{kind}.json"
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return rows
+
+
+def _pairs(bonus: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(bonus.items()))
+
+
+def _affects(raw: dict[str, Any]) -> Affects:
+    names = {f.name for f in dataclasses.fields(Affects)}
+    known = {k: v for k, v in raw.items() if k in names}
+    return Affects(**known, excluding=raw.get("except", ""))
+
+
+def _hit(raw: dict[str, Any]) -> Hit:
+    raw = dict(raw)
+    sweep, search = raw.pop("sweep", None), raw.pop("search", None)
+    return Hit(
+        bonus=_pairs(raw.pop("bonus", {})),
+        missile_speed_n=raw.pop("missile_speed", None),
+        missile_acceleration_n=raw.pop("missile_acceleration", None),
+        area=tuple(Area(**ring) for ring in raw.pop("area", ())),
+        area_affects=_affects(raw.pop("area_affects", {})),
+        sweep=sweep and Sweep(sweep["radius"], tuple(map(tuple, sweep["points"])), _affects(sweep)),
+        search=search
+        and Search(
+            search.get("radius", 0.0), _affects(search), search.get("arc_deg", 360.0), search.get("max_count", 0)
+        ),
+        **raw,
+    )
+
+
+def _weapon(row: int, raw: dict[str, Any]) -> Weapon:
+    raw = dict(raw)
+    shown = raw.pop("shown")
+    return Weapon(
+        row=row,
+        hits=tuple(_hit(h) for h in raw.pop("hits", ())),
+        jitter_loops=tuple(raw.pop("jitter_loops", (0.0, 0.0))),
+        backswing_loops=raw.pop("backswing_loops", 0.0),
+        shown_damage=shown["damage"] or 0.0,
+        shown_attacks=shown["attacks"],
+        shown_bonus=_pairs(shown["bonus"]),
+        estimates=tuple(raw.pop("estimates", ())),
+        **raw,
+    )
+
+
+def _production(raw: dict[str, Any]) -> Production:
+    cost = tuple(raw.get("cost", (0, 0)))
+    rest = {k: v for k, v in raw.items() if k not in ("from", "cost")}
+    return Production(producer=raw["from"], cost=cost, **{"ability": 0, **rest})
+
+
+def _unit(row: int, raw: dict[str, Any], weapon_of_id: dict[str, Weapon]) -> UnitType:
+    raw = dict(raw)
+    resource = raw.pop("resource", {})
+    for name in ("attributes", "planes", "collide", "cost"):
+        if name in raw:
+            raw[name] = tuple(raw[name])
+    return UnitType(
+        row=row,
+        made_by=tuple(_production(p) for p in raw.pop("made_by", ())),
+        weapons=tuple(weapon_of_id[w] for w in raw.pop("weapons", ())),
+        resource=resource.get("kind", ""),
+        resource_amount=resource.get("amount", 0),
+        power=tuple((p["radius"], p.get("level", 0)) for p in raw.pop("power", ())),
+        **raw,
+    )
+
+
+def _upgrade(raw: dict[str, Any]) -> Upgrade:
+    raw = dict(raw)
+    return Upgrade(
+        cost=tuple(raw.pop("cost", (0, 0))),
+        at=tuple(raw.pop("at", ())),
+        changes=tuple(Change(*change) for change in raw.pop("changes", ())),
+        **raw,
+    )
+
+
+def _footprint(raw: dict[str, Any]) -> Footprint:
+    x0, y0, x1, y1 = raw["area"]
+    cells = tuple(
+        (x0 + column, y1 - 1 - line)
+        for line, text in enumerate(raw["rows"])
+        for column, mark in enumerate(text)
+        if mark == "x"
+    )
+    return Footprint(id=raw["id"], area=(x0, y0, x1, y1), cells=cells)

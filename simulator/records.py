@@ -1,0 +1,278 @@
+"""What one row of the game's tables is: records of units, weapons, upgrades and footprints.
+
+Data only, with the units of every number said; read from the shipped tables by ``catalog``, applied to a player's
+upgrades by ``stats``. Times whose name ends in ``_loops`` are game loops; a name ending in ``_n`` keeps the catalog's
+own unit, per "normal" second of 16 loops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """One ring of a splash: everything within ``radius`` of the impact takes ``fraction`` of the damage."""
+
+    radius: float
+    fraction: float
+    arc_deg: float = 360.0
+
+
+@dataclass(frozen=True, slots=True)
+class Affects:
+    """Whom a splash, a sweep or a search touches besides the target itself."""
+
+    allies: bool = False
+    plane: str = "any"
+    only: str = ""
+    excluding: str = ""
+    not_self: bool = False
+    not_target: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """A line of small circles drawn through the target, as the Colossus' beams and the Lurker's spines do.
+
+    Each point is ``(delay_loops, across, along)``: the offset is in the frame of the shot, ``across`` to its right,
+    ``along`` backwards from the target to the attacker (the catalog's own axes). A unit is hit once per sweep.
+    """
+
+    radius: float
+    points: tuple[tuple[float, float, float], ...]
+    affects: Affects
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """A second circle (or arc) around the target in which the same damage is dealt again."""
+
+    radius: float
+    affects: Affects
+    arc_deg: float = 360.0
+    max_count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """One damage of one shot.
+
+    ``delay_loops`` counts from the weapon's damage point. A hit with a ``missile_speed_n`` is carried by a missile
+    that leaves then. ``when`` names a branch of the game's own switch (branches exclude each other).
+    """
+
+    effect: str
+    damage: float
+    bonus: tuple[tuple[str, float], ...] = ()
+    delay_loops: float = 0.0
+    ignores_armor: bool = False
+    kind: str = "ranged"
+    kills_self: bool = False
+    when: str = ""
+    missile_speed_n: float | None = None
+    missile_acceleration_n: float | None = None
+    beam_tick_n: float | None = None
+    area: tuple[Area, ...] = ()
+    area_affects: Affects = Affects()
+    sweep: Sweep | None = None
+    search: Search | None = None
+    bounce: bool = False
+    repeat: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Weapon:
+    """A weapon: reach, rhythm and the hits of one shot. ``row`` is its index in ``Catalog.weapons``."""
+
+    row: int
+    id: str
+    targets: str
+    range: float
+    period_loops: float
+    damage_point_loops: float
+    backswing_loops: float
+    jitter_loops: tuple[float, float]
+    hits: tuple[Hit, ...]
+    shown_damage: float
+    shown_attacks: int
+    shown_bonus: tuple[tuple[str, float], ...]
+    min_range: float = 0.0
+    slop: float = 0.0
+    scan: float = 5.0
+    arc_deg: float = 0.0
+    arc_slop_deg: float = 11.25
+    turret_deg_n: float | None = None
+    melee: bool = False
+    hidden: bool = False
+    disabled: bool = False
+    passive: bool = False
+    fires_moving: bool = False
+    strafe: bool = False
+    moves: str = ""
+    estimates: tuple[str, ...] = ()
+
+    def reaches(self, plane: str) -> bool:
+        """Whether it can be aimed at a unit on ``plane`` ("ground" or "air")."""
+        return self.targets in ("any", plane)
+
+
+@dataclass(frozen=True, slots=True)
+class Production:
+    """One way in which a unit type comes about, with what is charged for it."""
+
+    producer: str
+    ability: int
+    kind: str
+    loops: float = 0.0
+    cost: tuple[int, int] = (0, 0)
+    count: int = 1
+    requires: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class UnitType:
+    """A unit type; ``row`` is its index in ``Catalog.units``, ``id`` the number that the API uses.
+
+    ``cost`` is cumulative (a Baneling's includes its Zergling), as the API tells it; what one production charges
+    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports.
+    """
+
+    row: int
+    id: int
+    name: str
+    race: str
+    life: float
+    radius: float
+    attributes: tuple[str, ...] = ()
+    planes: tuple[str, ...] = ()
+    collide: tuple[str, ...] = ()
+    flying: bool = False
+    structure: bool = False
+    life_start: float | None = None
+    life_regen_n: float = 0.0
+    life_regen_delay_n: float = 0.0
+    armor: float = 0.0
+    shields: float = 0.0
+    shields_start: float | None = None
+    shield_armor: float = 0.0
+    shield_regen_n: float = 0.0
+    shield_regen_delay_n: float = 0.0
+    energy: float = 0.0
+    energy_start: float = 0.0
+    energy_regen_n: float = 0.0
+    speed_n: float = 0.0
+    acceleration_n: float = 0.0
+    deceleration_n: float = 0.0
+    turn_deg_n: float = 0.0
+    creep_factor: float = 1.0
+    mover: str = ""
+    push: int = 10
+    radius_api: float | None = None
+    separation: float = 0.0
+    inner: float | None = None
+    height: float = 0.0
+    sight: float = 0.0
+    detect: float = 0.0
+    cargo_size: int = 0
+    cargo_space: int = 0
+    cargo_max_size: int = 0
+    cargo_range: float = 0.0
+    unload_period_n: float = 0.0
+    supply: float = 0.0
+    provides: float = 0.0
+    cost: tuple[int, int] = (0, 0)
+    build_loops: float = 0.0
+    ability: int = 0
+    tech_requirement: int = 0
+    require_attached: bool = False
+    unit_alias: int = 0
+    tech_alias: int = 0
+    made_by: tuple[Production, ...] = ()
+    priority: int = 0
+    defensive: bool = False
+    flees: bool = False
+    weapons: tuple[Weapon, ...] = ()
+    footprint: str = ""
+    placement: str = ""
+    resource: str = ""
+    resource_amount: int = 0
+    power: tuple[tuple[float, int], ...] = ()
+    needs_power: bool = False
+    needs_creep: bool = False
+    makes_creep: bool = False
+    cloaked: bool = False
+    burrowed: bool = False
+    army: bool = False
+    worker: bool = False
+    invulnerable: bool = False
+    untargetable: bool = False
+    unselectable: bool = False
+    uncommandable: bool = False
+    unturnable: bool = False
+    always_threatens: bool = False
+    prevents_defeat: bool = False
+    no_score: bool = False
+    created_visible: bool = False
+    score_make: float = 0.0
+    score_kill: float = 0.0
+    subgroup: int = 0
+    not_in_melee: bool = False
+    id_4_10: int | None = None
+
+    @property
+    def radius_shown(self) -> float:
+        """The radius that the API reports: the footprint's for structures, the body's otherwise."""
+        return self.radius if self.radius_api is None else self.radius_api
+
+    def weapon_against(self, plane: str) -> Weapon | None:
+        """The first weapon that a unit of this type can use by itself against ``plane``, or None."""
+        usable = (w for w in self.weapons if w.reaches(plane) and not w.disabled and not w.hidden)
+        return next(usable, None)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One field that an upgrade changes: ``op`` is ``add``, ``subtract`` or ``set``."""
+
+    catalog: str
+    entry: str
+    field: str
+    op: str
+    value: float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Upgrade:
+    """A research result, its price and what it changes."""
+
+    id: int
+    name: str
+    researchable: bool = False
+    cost: tuple[int, int] = (0, 0)
+    loops: float = 0.0
+    ability: int = 0
+    at: tuple[str, ...] = ()
+    requires: str = ""
+    changes: tuple[Change, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The cells that a structure blocks, relative to its centre.
+
+    ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre; ``area`` is
+    ``(x0, y0, x1, y1)`` of the mask in the same frame.
+    """
+
+    id: str
+    area: tuple[int, int, int, int]
+    cells: tuple[tuple[int, int], ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in cells of the blocked part; a sieged tank's mask blocks nothing."""
+        if not self.cells:
+            return 0, 0
+        xs, ys = zip(*self.cells, strict=True)
+        return max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
