@@ -92,8 +92,15 @@ class Subscription(Protocol[T_co]):
         missed: samples that a STATE publisher sent and that never arrived here, as far as is known.
     """
 
-    dropped: int
-    missed: int
+    @property
+    def dropped(self) -> int:
+        """See the class."""
+        ...
+
+    @property
+    def missed(self) -> int:
+        """See the class."""
+        ...
 
     def __aiter__(self) -> AsyncIterator[T_co]:
         """Iterates over what arrives."""

@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from orchestrator.roster import Seat
+from protocol.bus.memory import MemoryBroker
+from protocol.messages import Observation, View
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RUN = "test"
+ZEALOTS, STALKERS = Seat("p1", "Zealots"), Seat("p1", "Stalkers")
+
+
+@pytest.fixture
+def broker() -> MemoryBroker:
+    return MemoryBroker()
+
+
+@pytest.fixture
+def observe() -> Callable[..., dict[Seat, Observation]]:
+    def make(*seats: Seat, step: int = 0, within_s: float | None = None) -> dict[Seat, Observation]:
+        return {
+            seat: Observation(
+                run=RUN,
+                side=seat.side,
+                agent=seat.agent,
+                episode=0,
+                step=step,
+                game_loop=8 * step,
+                answer_within_s=within_s,
+                text="",
+                view=View(time_s=0.0),
+            )
+            for seat in seats
+        }
+
+    return make

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import pytest
+
+from orchestrator.mailbox import MAX_CHARACTERS, Mailbox
+from orchestrator.roster import Seat
+from protocol.messages import Message
+
+A, B, C, FOE = Seat("p1", "A"), Seat("p1", "B"), Seat("p1", "C"), Seat("p2", "B")
+
+
+def said(sender: Seat, recipient: str, text: str = "hi") -> Message:
+    return Message(run="r", side=sender.side, agent=sender.agent, episode=0, step=0, recipient=recipient, text=text)
+
+
+@pytest.fixture
+def mailbox() -> Mailbox:
+    box = Mailbox([A, B, C, FOE], ["Channel-1"])
+    box.listen(A, "channel-1")
+    box.listen(B, "Channel-1")
+    return box
+
+
+@pytest.mark.parametrize(
+    ("sender", "recipient", "hears"),
+    [
+        (A, "B", [B]),
+        (A, "b", [B]),
+        (A, "Channel-1", [B]),
+        (C, "channel-1", [A, B]),
+        (FOE, "Channel-1", []),
+    ],
+    ids=["by name", "in any case", "not the sender itself", "all listeners", "not the other side"],
+)
+def test_who_hears(mailbox: Mailbox, sender: Seat, recipient: str, hears: list[Seat]) -> None:
+    post = mailbox.deliver([said(sender, recipient)])
+    assert list(post.received) == hears
+    assert not post.rejections
+
+
+def test_messages_of_several_senders_keep_their_order(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(A, "C", "1"), said(B, "C", "2"), said(A, "C", "3")])
+    assert [(m.sender, m.text) for m in post.received[C]] == [("A", "1"), ("B", "2"), ("A", "3")]
+    assert post.all == post.received[C]
+
+
+@pytest.mark.parametrize("recipient", ["Nobody", "A", ""], ids=["unknown", "oneself", "empty"])
+def test_a_message_to_nobody_goes_back_with_the_names_one_can_write_to(mailbox: Mailbox, recipient: str) -> None:
+    post = mailbox.deliver([said(A, recipient)])
+    (rejection,) = post.rejections[A]
+    assert rejection.reason == "unknown_recipient"
+    assert rejection.message == f"Nobody is called {recipient!r}: you can write to B, C, Channel-1."
+
+
+def test_a_long_message_is_cut(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(A, "B", "x" * 10_000)])
+    assert len(post.received[B][0].text) == MAX_CHARACTERS
+
+
+def test_listening_ends_with_the_episode(mailbox: Mailbox) -> None:
+    mailbox.clear()
+    assert not mailbox.deliver([said(C, "Channel-1")]).received
