@@ -1,15 +1,18 @@
 """Makes PySC2 4.0.0 importable on today's Python, and leaves no trace behind.
 
-Two things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
+Three things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
 
 * its requirement `s2clientprotocol` ships stubs for a protobuf that is gone. The package
   `pys2clientprotocol` installs the same import name for the current protobuf (see the overrides in
   `pyproject.toml`); nothing is left to do here but to check it, which `protobuf_kind` allows;
 * `pysc2.lib.features` builds its colour palettes at import, and `pysc2.lib.colors` shuffles them with
   `random.shuffle(palette, function)`. Python 3.11 removed the second parameter, so it is given back
-  while these two are being imported, and taken away again.
+  while these two are being imported, and taken away again;
+* `pysc2.env.sc2_env` imports a renderer, and with it pygame, which greets on stdout, and skvideo, which
+  imports the deprecated `scipy.misc`. The greeting and the warnings are muted for the import only.
 
-Import this module before anything of `pysc2`.
+Import this module before anything of `pysc2`: then all that the bridge needs of it is in place, also where
+warnings are errors. It is no adapter: PySC2 itself stays as it was installed.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -39,7 +43,7 @@ _SHUFFLE = random.shuffle
 @contextlib.contextmanager
 def old_shuffle() -> Iterator[None]:
     """Gives `random.shuffle` its two-parameter form inside the block."""
-    random.shuffle = _shuffle  # type: ignore[assignment]  # a bound method gives way to a function
+    random.shuffle = _shuffle
     try:
         yield
     finally:
@@ -68,5 +72,7 @@ def protobuf_kind() -> str:
     return api_implementation.Type()
 
 
-with old_shuffle(), quiet_pygame():
-    import pysc2.lib.features  # noqa: F401  # palettes of the feature layers are the only user of the old form
+with old_shuffle(), quiet_pygame(), warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import pysc2.env.sc2_env
+    import pysc2.lib.features  # noqa: F401  # palettes of the feature layers are the only user of the old shuffle
