@@ -1,0 +1,84 @@
+"""World coordinates to pixels of the screen and of the minimap, and back.
+
+World: origin bottom-left, y up. Images: origin top-left, y down, pixel (i, j) covers [i, i+1) x [j, j+1). Pixels
+are square in the world. Pure arithmetic; works on numbers and on arrays alike.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Number = TypeVar("Number", float, "NDArray[np.float64]")
+
+
+class Rect(NamedTuple):
+    """A rectangle of the world: [x0, x1) x [y0, y1)."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+    def clamp(self, x: float, y: float) -> tuple[float, float]:
+        """The point of the rectangle that is nearest to (x, y)."""
+        return min(max(x, self.x0), self.x1), min(max(y, self.y0), self.y1)
+
+
+@dataclasses.dataclass(frozen=True)
+class Screen:
+    """The camera's view: `width` world units along the shorter side of the image, whatever its shape."""
+
+    columns: int
+    rows: int
+    width: float
+
+    @property
+    def scale(self) -> float:
+        """World units per pixel."""
+        return self.width / min(self.columns, self.rows)
+
+    def to_pixels(self, x: Number, y: Number, camera: tuple[float, float]) -> tuple[Number, Number]:
+        """Image coordinates of world points; outside of the image they go on."""
+        return (
+            (x - camera[0]) / self.scale + self.columns / 2,
+            (camera[1] - y) / self.scale + self.rows / 2,
+        )
+
+    def to_world(self, column: Number, row: Number, camera: tuple[float, float]) -> tuple[Number, Number]:
+        """World coordinates of the centres of pixels."""
+        return (
+            (column + 0.5 - self.columns / 2) * self.scale + camera[0],
+            camera[1] - (row + 0.5 - self.rows / 2) * self.scale,
+        )
+
+    def view(self, camera: tuple[float, float]) -> Rect:
+        """The part of the world that the camera shows."""
+        half_x, half_y = self.columns * self.scale / 2, self.rows * self.scale / 2
+        return Rect(camera[0] - half_x, camera[1] - half_y, camera[0] + half_x, camera[1] + half_y)
+
+
+@dataclasses.dataclass(frozen=True)
+class Minimap:
+    """The part of the map that the minimap shows, fitted into the image at its top-left corner."""
+
+    columns: int
+    rows: int
+    area: Rect
+
+    @property
+    def scale(self) -> float:
+        """World units per pixel."""
+        return max((self.area.x1 - self.area.x0) / self.columns, (self.area.y1 - self.area.y0) / self.rows)
+
+    def to_pixels(self, x: Number, y: Number) -> tuple[Number, Number]:
+        """Image coordinates of world points."""
+        return (x - self.area.x0) / self.scale, (self.area.y1 - y) / self.scale
+
+    def to_world(self, column: Number, row: Number) -> tuple[Number, Number]:
+        """World coordinates of the centres of pixels."""
+        return self.area.x0 + (column + 0.5) * self.scale, self.area.y1 - (row + 0.5) * self.scale

@@ -1,0 +1,124 @@
+"""Drawing of the feature layers: discs of units, samples of the terrain, images as bytes.
+
+Arrays in, bytes out; nothing here knows what a unit or a player is. Above: `layers.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simulator.api import wire
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+_DTYPES: dict[int, np.dtype[Any]] = {1: np.dtype(np.bool_), 8: np.dtype(np.uint8), 32: np.dtype("<i4")}
+
+
+@dataclasses.dataclass(frozen=True)
+class Discs:
+    """Filled discs on an image, in drawing order: of two entries for one pixel the later one is on top."""
+
+    pixels: NDArray[np.intp]  # [m] index into the flat image
+    rows: NDArray[np.intp]  # [m] which disc
+    density: NDArray[np.uint8]  # [columns * rows] discs that cover a pixel
+    smooth: NDArray[np.uint8]  # [columns * rows] 16 x covered area, discs added up
+
+
+@functools.lru_cache(maxsize=64)
+def _window(reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    span = np.arange(-reach, reach + 1)
+    dy, dx = np.meshgrid(span, span, indexing="ij")
+    return dx.ravel(), dy.ravel()
+
+
+def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Discs:
+    """Draws discs by their centres [n, 2] and radii [n], in pixels; every disc covers at least one pixel.
+
+    A pixel belongs to a disc when its centre does. Discs of similar size are drawn at once.
+    """
+    reach = np.ceil(radius + 0.5).astype(np.intp)
+    parts = [
+        _draw_size(int(size), np.flatnonzero(reach == size), centres, radius, (columns, rows))
+        for size in np.unique(reach)
+    ]
+    if not parts:
+        parts = [_NOTHING]
+    pixels, disc, inside, cover = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if len(parts) > 1:
+        order = np.argsort(disc, kind="stable")
+        pixels, disc, inside, cover = pixels[order], disc[order], inside[order], cover[order]
+    area = columns * rows
+    smooth = np.bincount(pixels, weights=cover, minlength=area)
+    pixels, disc = pixels[inside], disc[inside]
+    density = np.bincount(pixels, minlength=area)
+    return Discs(pixels, disc, _bytes(density), _bytes(smooth * 16))
+
+
+def _bytes(image: NDArray[Any]) -> NDArray[np.uint8]:
+    capped: NDArray[np.uint8] = np.minimum(image, 255).astype(np.uint8)
+    return capped
+
+
+_NOTHING = (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.bool_), np.zeros(0))
+
+
+def _draw_size(
+    reach: int, disc: NDArray[np.intp], centres: Floats, radius: Floats, shape: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_], Floats]:
+    dx, dy = _window(reach)
+    x, y = centres[disc, 0, None], centres[disc, 1, None]
+    column = np.floor(x).astype(np.intp) + dx
+    row = np.floor(y).astype(np.intp) + dy
+    distance = np.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)  # rounds alike everywhere, unlike hypot
+    size = radius[disc, None]
+    cover = np.clip(size - distance + 0.5, 0, 1)
+    centre = (dx == 0) & (dy == 0)
+    inside = (distance <= size) | centre
+    on_image = (column >= 0) & (column < shape[0]) & (row >= 0) & (row < shape[1])
+    drawn = (inside | (cover > 0)) & on_image
+    which = np.broadcast_to(disc[:, None], drawn.shape)
+    return (row * shape[0] + column)[drawn], which[drawn], inside[drawn], cover[drawn]
+
+
+def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
+    """Values of a grid [y, x] of the map in the columns x and rows y of an image; 0 outside of the map."""
+    height, width = grid.shape
+    column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+    image = grid[np.clip(row, 0, height - 1)[:, None], np.clip(column, 0, width - 1)[None, :]]
+    outside = ((row < 0) | (row >= height))[:, None] | ((column < 0) | (column >= width))[None, :]
+    image[outside] = 0
+    return image
+
+
+class Layer:
+    """One feature layer of a fixed size: turns its image into an `ImageData` field, ready to be joined."""
+
+    def __init__(self, field: int, bits_per_pixel: int, columns: int, rows: int) -> None:
+        self.bits_per_pixel = bits_per_pixel
+        self.area = columns * rows
+        size = (self.area * bits_per_pixel + 7) // 8
+        shape = wire.scalar(1, columns) + wire.scalar(2, rows)
+        header = wire.scalar(1, bits_per_pixel) + wire.head(2, len(shape)) + shape + wire.head(3, size)
+        self.head = wire.head(field, len(header) + size) + header
+        self.blank = self.head + bytes(size)
+
+    def encode(self, image: NDArray[Any]) -> bytes:
+        """The field for an image, flat or [y, x]."""
+        if self.bits_per_pixel == 1:
+            return self.head + np.packbits(image, axis=None).tobytes()
+        return self.head + image.astype(_DTYPES[self.bits_per_pixel], copy=False).tobytes()
+
+    def encode_discs(self, discs: Discs, values: NDArray[Any]) -> bytes:
+        """The field for an image in which each disc has its value, and the rest is 0."""
+        if not values.any():
+            return self.blank
+        image = np.zeros(self.area, _DTYPES[self.bits_per_pixel])
+        image[discs.pixels] = values[discs.rows]
+        return self.encode(image)

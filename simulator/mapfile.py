@@ -1,0 +1,91 @@
+"""What stands in the `.SC2Map` files of an install, and which map a client means.
+
+A map of ours is a text file: a first line that marks it, then the name of a shipped map, or a whole scenario in
+the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
+path. An archive of StarCraft II itself is recognised by its file name if that map is shipped here.
+
+Above: `install.py`, `api/lobby.py`. Below: `maps.py`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from simulator.maps import GameMap, MapError, find_map, load_map, map_from, map_names
+from simulator.scenario import ScenarioError, parse_scenario
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps")
+"""Folders below `Maps` that PySC2, SMAC and LLM-PySC2 look into."""
+
+SUFFIX = ".SC2Map"
+_MARK = b"# A map of Khala's simulator\n"
+_ARCHIVE = b"MPQ"
+
+
+class MapDataError(ValueError):
+    """The bytes are no map that can be played here."""
+
+
+def placeholders() -> Iterator[tuple[str, bytes]]:
+    """Path below `Maps` and content of the file of every shipped map."""
+    for name in map_names():
+        yield name + SUFFIX, _MARK + name.encode() + b"\n"
+
+
+def is_placeholder(data: bytes) -> bool:
+    """Whether this is the file of a shipped map, which an update may replace, and nothing that a user wrote."""
+    return data.startswith(_MARK) and b"\n" not in data[len(_MARK) :].strip()
+
+
+def read_map(data: bytes, path: str) -> GameMap:
+    """The map in the bytes of a file; its path tells which map an archive of StarCraft II holds.
+
+    Raises:
+        MapDataError: with a sentence for the client.
+    """
+    if data.startswith(_ARCHIVE):
+        try:
+            return load_map(find_map(path if path.endswith(SUFFIX) else path + SUFFIX))
+        except MapError as error:
+            raise MapDataError(f"{path or 'the map'} is an archive that the simulator cannot read: {error}") from error
+    if not data.startswith(_MARK):
+        raise MapDataError(f"{path or 'the map'} holds neither a map of the simulator nor a StarCraft II archive")
+    return _read_text(data[len(_MARK) :], path)
+
+
+def _read_text(data: bytes, path: str) -> GameMap:
+    try:
+        text = data.decode()
+        if is_placeholder(_MARK + data):
+            return load_map(text.strip())
+        return map_from(parse_scenario(text, path or "the map"), text)
+    except (UnicodeDecodeError, MapError, ScenarioError) as error:
+        raise MapDataError(f"{path or 'the map'}: {error}") from error
+
+
+def find_map_file(path: str, saved: Mapping[str, bytes], data_dir: Path) -> GameMap | None:
+    """The map that a path means: one the client saved, a file of the install, any file, or a shipped map's name.
+
+    Raises:
+        MapDataError: the file is there but holds no map.
+    """
+    if path in saved:
+        return read_map(saved[path], path)
+    for file in _files(path, data_dir):
+        if file.is_file():
+            return read_map(file.read_bytes(), path)
+    try:
+        return load_map(find_map(path))
+    except MapError:
+        return None
+
+
+def _files(path: str, data_dir: Path) -> Iterator[Path]:
+    maps = data_dir / "Maps"
+    yield maps / path
+    yield Path(path)
+    yield from sorted(maps.glob(f"*/{PurePosixPath(path).name}"))

@@ -1,0 +1,99 @@
+"""The directory that clients take for StarCraft II."""
+
+import os
+import re
+import stat
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from simulator.install import InstallError, install, is_installed
+from simulator.mapfile import FOLDERS, read_map
+from simulator.maps import map_names
+
+LAUNCHER = "Versions/Base75689/SC2_x64"
+
+
+def test_an_install_has_what_clients_look_for(tmp_path: Path) -> None:
+    root = install(tmp_path / "game")
+    launcher = root / LAUNCHER
+    assert launcher.is_file()
+    assert launcher.stat().st_mode & stat.S_IXUSR
+    assert sorted(p.name for p in (root / "Versions").iterdir()) == ["Base75689"]
+    assert sorted(p.name for p in (root / "Maps").iterdir()) == sorted(FOLDERS)
+    assert (root / "Replays").is_dir()
+    assert is_installed(root)
+    assert not is_installed(tmp_path)
+
+
+def test_the_launcher_becomes_the_game_and_ignores_the_clients_python(tmp_path: Path) -> None:
+    last = (install(tmp_path) / LAUNCHER).read_text().splitlines()[-1]
+    assert re.match(r"exec '?/[^ ]+'? -I ", last)
+    assert last.endswith('"$@"')
+
+
+def test_the_launcher_starts_without_an_environment(tmp_path: Path) -> None:
+    root = install(tmp_path)
+    trap = tmp_path / "trap"
+    trap.mkdir()
+    (trap / "sitecustomize.py").write_text("raise SystemExit(77)")
+    command = [str(root / LAUNCHER), "-listen", "127.0.0.1", "-port", "99999999"]
+    done = subprocess.run(command, env={"PYTHONPATH": str(trap)}, cwd=trap, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("StarCraft II simulator: cannot listen on 127.0.0.1:99999999")
+
+
+@pytest.mark.parametrize("name", map_names())
+def test_every_shipped_map_is_a_file_that_is_read_back(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+    root = tmp_path_factory.getbasetemp() / "shared_install"
+    path = install(root) / "Maps" / f"{name}.SC2Map"
+    game_map = read_map(path.read_bytes(), str(path))
+    assert f"{game_map.family}/{game_map.name}" == name
+
+
+def test_installing_twice_repairs_and_keeps_what_a_user_added(tmp_path: Path) -> None:
+    root = install(tmp_path)
+    shipped = root / "Maps" / f"{map_names()[0]}.SC2Map"
+    shipped.unlink()
+    own = root / "Maps/Melee/Mine.SC2Map"
+    own.write_bytes(b"MPQ\x1b mine")
+    (root / LAUNCHER).unlink()
+    install(tmp_path)
+    assert shipped.exists()
+    assert own.read_bytes() == b"MPQ\x1b mine"
+    assert is_installed(root)
+
+
+def test_a_map_file_that_a_user_replaced_is_kept(tmp_path: Path) -> None:
+    root = install(tmp_path)
+    replaced = root / "Maps" / f"{map_names()[0]}.SC2Map"
+    replaced.write_bytes(b"MPQ\x1b the real one")
+    install(tmp_path)
+    assert replaced.read_bytes() == b"MPQ\x1b the real one"
+
+
+@pytest.mark.parametrize(
+    "evidence", [".build.info", "SC2Data/x", "Support64/x", "Versions/Base75689/SC2_x64", "Versions/Base88500/SC2_x64"]
+)
+def test_a_real_starcraft_is_never_touched(tmp_path: Path, evidence: str) -> None:
+    file = tmp_path / evidence
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(b"\x7fELF")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InstallError, match=r"holds a real StarCraft II \(.*\); choose another directory"):
+        install(tmp_path)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "game").write_text("")
+    with pytest.raises(InstallError, match=r"game.* is a file, not a directory; choose another place"):
+        install(tmp_path / "game")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_directory_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(InstallError, match=r"cannot be written; choose a directory of yours"):
+        install(tmp_path / "game")
