@@ -1,0 +1,224 @@
+"""What players and the debug interface may ask of the world, already validated.
+
+The way in for orders: the API resolves which ability is meant and for which units; here an order becomes the units'
+current one or waits in their queues. Everything takes effect when the world next advances. Units that can't do what
+is asked are left alone, and the slots that took the order are returned.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.orders import ATTACK, HOLD_POSITION, MOVE, PATROL, SCAN_MOVE, Order, OrderKind
+from simulator.players import GameResult
+from simulator.world import NO_TAG, NOBODY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from simulator.catalog import UnitType
+    from simulator.world import World
+
+QUEUE_LIMIT = 32
+
+Point = tuple[float, float]
+
+
+def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Walk to a point and look at nobody on the way."""
+    order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
+    return _give(world, [s for s in slots if can_move(world.unit_type(s))], order, queue=queue)
+
+
+def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Walk after another unit (a tag)."""
+    takers = [s for s in slots if can_move(world.unit_type(s)) and world.tag_of(s) != target]
+    return _give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
+
+
+def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Walk to a point and fight what is met; a unit without a weapon scan-moves."""
+    taken: list[int] = []
+    for slot in slots:
+        unit = world.unit_type(slot)
+        if can_attack(unit):
+            order = Order(OrderKind.ATTACK_MOVE, ATTACK, point=_inside(world, point))
+        elif can_move(unit):
+            order = Order(OrderKind.SCAN_MOVE, SCAN_MOVE, point=_inside(world, point))
+        else:
+            continue
+        taken += _give(world, [slot], order, queue=queue)
+    return taken
+
+
+def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Attack one unit (a tag) until it is dead; allies too, when told so."""
+    victim = world.slot_of(target)
+    if victim == NOBODY:
+        return []
+    takers = [s for s in slots if s != victim and can_reach(world, s, victim)]
+    return _give(world, takers, Order(OrderKind.ATTACK_UNIT, ATTACK, target=target), queue=queue)
+
+
+def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Go back and forth between here and a point, fighting what is met."""
+    taken: list[int] = []
+    for slot in slots:
+        if can_move(world.unit_type(slot)):
+            x, y = world.pos[slot]
+            order = Order(OrderKind.PATROL, PATROL, point=_inside(world, point), origin=(float(x), float(y)))
+            taken += _give(world, [slot], order, queue=queue)
+    return taken
+
+
+def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Drop all orders; queued, it ends the queue there."""
+    taken = [s for s in slots if _commandable(world.unit_type(s))]
+    if not queue:
+        for slot in taken:
+            world.queue[slot] = []
+            begin(world, slot, None)
+    return taken
+
+
+def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Stay on the spot and fight only what is in reach."""
+    takers = [s for s in slots if can_move(world.unit_type(s))]
+    return _give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
+
+
+def smart(
+    world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
+) -> list[int]:
+    """The right click: attack an enemy, follow a friend or a neutral unit, walk to a point."""
+    victim = world.slot_of(target)
+    if victim == NOBODY:
+        return [] if point is None else move(world, slots, point, queue=queue)
+    slots = list(slots)
+    foes = [s for s in slots if is_enemy(world, int(world.owner[s]), int(world.owner[victim]))]
+    attackers = attack_unit(world, foes, target, queue=queue)
+    rest = [s for s in slots if s not in attackers]
+    return attackers + follow(world, rest, target, queue=queue)
+
+
+def surrender(world: World, player: int) -> None:
+    """Give up: defeat for the player, and victory for the last one who has not given up."""
+    world.players[player].surrendered = True
+    playing = [p for p in world.players[1:] if not p.surrendered]
+    if len(playing) <= 1:
+        results = {p.id: GameResult.DEFEAT if p.surrendered else GameResult.VICTORY for p in world.players[1:]}
+        world.end(results)
+
+
+def debug_kill(world: World, tags: Iterable[int]) -> None:
+    """Kill units; unknown tags are ignored. They die when the world next advances, credited to nobody."""
+    for tag in tags:
+        slot = world.slot_of(tag)
+        if slot != NOBODY:
+            world.life[slot] = 0.0
+
+
+def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:
+    """Create complete units exactly at a point, all on each other; returns their slots."""
+    unit = world.catalog.unit(type_id)
+    return [world.spawn(unit, owner, point) for _ in range(quantity)]
+
+
+def debug_set_value(world: World, tag: int, *, life: float | None = None, shields: float | None = None,
+                    energy: float | None = None) -> None:  # fmt: skip
+    """Set a unit's life, shields or energy, within what its type can have; unknown tags are ignored."""
+    slot = world.slot_of(tag)
+    if slot == NOBODY:
+        return
+    at = (int(world.owner[slot]), int(world.type[slot]))
+    if life is not None:
+        world.life[slot] = min(life, world.stats.life_max[at])
+    if shields is not None:
+        world.shields[slot] = min(shields, world.stats.shields_max[at])
+    if energy is not None:
+        world.energy[slot] = min(energy, world.stats.energy_max[at])
+
+
+def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
+    """Give a player a finished upgrade; its numbers count from now on."""
+    owned = world.players[player].upgrades
+    if upgrade_id not in owned:
+        owned.append(world.catalog.upgrade(upgrade_id).id)
+        owned.sort()
+        world.stats.apply(player, owned)
+
+
+# what a unit can do ---------------------------------------------------------------------------------------------------
+
+
+def can_move(unit: UnitType) -> bool:
+    """Whether units of this type take movement orders."""
+    return unit.speed_n > 0.0 and _commandable(unit)
+
+
+def can_attack(unit: UnitType) -> bool:
+    """Whether units of this type have a weapon that they can aim by themselves."""
+    usable = unit.weapon_against("ground") or unit.weapon_against("air")
+    return usable is not None and _commandable(unit)
+
+
+def can_reach(world: World, slot: int, victim: int) -> bool:
+    """Whether the unit has a weapon for the plane on which ``victim`` is."""
+    unit, other = world.unit_type(slot), world.unit_type(victim)
+    if other.untargetable or not _commandable(unit):
+        return False
+    planes = other.planes or (("air",) if other.flying else ("ground",))
+    return any(unit.weapon_against(plane) is not None for plane in planes)
+
+
+def is_enemy(world: World, player: int, other: int) -> bool:
+    """Whether two owners fight each other; nobody fights the neutral player by himself."""
+    return player != other and 0 not in (player, other) and len(world.players) > max(player, other)
+
+
+def _commandable(unit: UnitType) -> bool:
+    return not unit.uncommandable
+
+
+def _inside(world: World, point: Point) -> Point:
+    x0, y0, x1, y1 = world.map.terrain.playable
+    return min(max(point[0], x0), x1), min(max(point[1], y0), y1)
+
+
+def _give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
+    taken = []
+    for slot in slots:
+        if queue and world.order_kind[slot] != OrderKind.IDLE:
+            if len(world.queue[slot]) >= QUEUE_LIMIT:
+                continue
+            world.queue[slot].append(order)
+        else:
+            world.queue[slot] = []
+            begin(world, slot, order)
+        taken.append(slot)
+    return taken
+
+
+def begin(world: World, slot: int, order: Order | None) -> None:
+    """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
+    order = order or Order(OrderKind.IDLE, 0)
+    target = world.slot_of(order.target)
+    world.order_kind[slot] = order.kind
+    world.order_ability[slot] = order.ability
+    world.order_target[slot] = target
+    world.order_point[slot] = world.pos[slot] if order.point is None else order.point
+    world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
+    keeps = order.kind is OrderKind.ATTACK_UNIT and world.target[slot] == target
+    if not keeps:
+        _interrupt(world, slot)
+    world.target[slot] = target if order.kind is OrderKind.ATTACK_UNIT else NOBODY
+    world.guard[slot] = world.pos[slot]
+    world.backswing[slot] = 0.0
+    world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
+
+
+def _interrupt(world: World, slot: int) -> None:
+    """An attack that is started and then dropped costs no cooldown (estimate, see data/mechanics.yaml)."""
+    if world.windup[slot] >= 0.0:
+        world.windup[slot] = -1.0
+        world.cooldown[slot] = 0.0

@@ -1,0 +1,47 @@
+"""What a unit can be told to do: the kinds of orders and one order as a value.
+
+The current order of every unit lies in the world's arrays, waiting ones are ``Order`` values in its queue.
+``commands`` creates them from what a player says, ``systems.orders`` carries them out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+
+class OrderKind(IntEnum):
+    """How an order is carried out; the API's ability id stands beside it and may be more specific."""
+
+    IDLE = 0
+    MOVE = 1
+    FOLLOW = 2
+    ATTACK_MOVE = 3
+    ATTACK_UNIT = 4
+    HOLD = 5
+    PATROL = 6
+    SCAN_MOVE = 7
+
+
+SMART: Final = 1
+STOP: Final = 4
+MOVE: Final = 16
+PATROL: Final = 17
+HOLD_POSITION: Final = 18
+SCAN_MOVE: Final = 19
+ATTACK: Final = 23
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One order: its kind, the specific ability id the API reports, and its target.
+
+    ``target`` is a unit tag or 0, ``point`` world coordinates or None. ``origin`` is the other end of a patrol.
+    """
+
+    kind: OrderKind
+    ability: int
+    target: int = 0
+    point: tuple[float, float] | None = None
+    origin: tuple[float, float] | None = None

@@ -1,0 +1,88 @@
+"""A player's side of the world: resources, research, result and score counters.
+
+Plain counters, changed by the systems and read by the API; nothing here computes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+NEUTRAL = 0
+
+
+class GameResult(IntEnum):
+    """The API's result numbers."""
+
+    VICTORY = 1
+    DEFEAT = 2
+    TIE = 3
+    UNDECIDED = 4
+
+
+@dataclass(slots=True)
+class Vitals:
+    """Amounts of life, shields and energy."""
+
+    life: float = 0.0
+    shields: float = 0.0
+    energy: float = 0.0
+
+
+@dataclass(slots=True)
+class Spent:
+    """Minerals and vespene by the score's categories: army, economy, technology."""
+
+    army: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    economy: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    technology: list[float] = field(default_factory=lambda: [0.0, 0.0])
+
+
+@dataclass(slots=True)
+class Score:
+    """Counters behind the API's score details. Values are in resources, as ``score_make`` and ``score_kill`` say."""
+
+    killed_value_units: float = 0.0
+    killed_value_structures: float = 0.0
+    killed_units: int = 0
+    killed_structures: int = 0
+    lost_units: int = 0
+    lost_structures: int = 0
+    killed: Spent = field(default_factory=Spent)
+    lost: Spent = field(default_factory=Spent)
+    damage_dealt: Vitals = field(default_factory=Vitals)
+    damage_taken: Vitals = field(default_factory=Vitals)
+    healed: Vitals = field(default_factory=Vitals)
+
+
+@dataclass(slots=True)
+class PlayerSetup:
+    """Who sits in a slot: ``control`` is ``agent`` or ``computer``; ``difficulty`` is the API's number or 0."""
+
+    id: int
+    race: str
+    control: str
+    name: str = ""
+    difficulty: int = 0
+
+
+@dataclass(slots=True)
+class Player:
+    """One player during a game; player 0 is the neutral one (the API says 16)."""
+
+    id: int
+    race: str
+    control: str
+    name: str = ""
+    difficulty: int = 0
+    minerals: float = 0.0
+    vespene: float = 0.0
+    upgrades: list[int] = field(default_factory=list)
+    result: GameResult = GameResult.UNDECIDED
+    surrendered: bool = False
+    score: Score = field(default_factory=Score)
+
+    def counters(self) -> tuple[object, ...]:
+        """Everything as nested tuples, in a fixed order, for the digest of the world."""
+        return dataclasses.astuple(self)

@@ -1,0 +1,75 @@
+"""One game loop, as a table of contents: the laws of the world in the order in which they apply.
+
+Each system is a function of the world and the only place of its law. Above: whoever advances the game. Below: one
+file of ``systems`` per line.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.systems import (
+    acquire,
+    collision,
+    damage,
+    death,
+    missiles,
+    movement,
+    navigation,
+    orders,
+    regeneration,
+    triggers,
+    vision,
+    weapons,
+)
+from simulator.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from simulator.catalog import Catalog
+    from simulator.maps import GameMap
+    from simulator.players import PlayerSetup
+
+SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
+    orders.carry_out,  # finished orders end, queued ones begin
+    acquire.choose_targets,  # whom to fight, without being told
+    navigation.find_ways,  # the next corner on the way to every goal
+    movement.move,  # steps, turning, acceleration
+    collision.separate,  # bodies and walls
+    weapons.fire,  # attacks start, take effect, cool down
+    missiles.fly,
+    damage.deal_pending,  # hits that are due
+    regeneration.regenerate,
+    death.bury,
+    vision.look,
+    triggers.run,  # the map's own script, which may end the game
+)
+
+
+def new_game(
+    game_map: GameMap, players: Sequence[PlayerSetup] = (), *, seed: int = 0, catalog: Catalog | None = None
+) -> World:
+    """A world at loop 0 in which the map's script has run its start.
+
+    Args:
+        game_map: Terrain and scenario.
+        players: Who sits in the slots; by default as the scenario says.
+        seed: Of every random draw of the game.
+        catalog: Tables of a game version; 4.10 by default.
+    """
+    world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog)
+    triggers.start(world)
+    vision.look(world)
+    return world
+
+
+def advance(world: World, loops: int = 1) -> int:
+    """Advance by up to ``loops`` game loops; returns how many, fewer when the game ends on the way."""
+    for done in range(loops):
+        if world.ended:
+            return done
+        world.loop += 1
+        for system in SYSTEMS:
+            system(world)
+    return loops

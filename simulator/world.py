@@ -1,0 +1,313 @@
+"""The world: the whole state of one game as arrays over unit slots.
+
+State and bookkeeping only. What happens in it is in ``systems``, what players ask of it comes through ``commands``,
+``tick`` advances it, and the API reads it. A slot is the index of a unit in every array; slots of dead units are used
+again with another tag, so whoever keeps a unit for longer than a loop keeps its tag.
+
+Everything that decides the future lies in ``COLUMNS``, the queues, the shots under way, the players, the random
+generator and the loop counter; ``digest`` covers exactly these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator import geometry
+from simulator.catalog import load_catalog
+from simulator.orders import Order, OrderKind
+from simulator.pathing import Ground
+from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
+from simulator.shots import Missiles, PendingHits
+from simulator.stats import Stats
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from simulator.catalog import Catalog, UnitType
+    from simulator.geometry import Floats
+    from simulator.maps import GameMap
+
+NOBODY: Final = -1  # no slot
+NO_TAG: Final = 0
+TAG_BASE: Final = 1 << 32
+INDEX_SHIFT: Final = 18
+
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+# name, dtype, width (0 is a plain column), value of an unused slot
+COLUMNS: Final[tuple[tuple[str, type, int, float], ...]] = (
+    ("alive", np.bool_, 0, 0),
+    ("tag", np.int64, 0, 0),
+    ("type", np.int64, 0, 0),
+    ("owner", np.int64, 0, 0),
+    ("pos", np.float64, 2, 0),
+    ("heading", np.float64, 2, 0),
+    ("speed", np.float64, 0, 0),
+    ("life", np.float64, 0, 0),
+    ("shields", np.float64, 0, 0),
+    ("energy", np.float64, 0, 0),
+    ("build_progress", np.float64, 0, 1),
+    ("cloaked", np.bool_, 0, 0),
+    ("burrowed", np.bool_, 0, 0),
+    ("hallucination", np.bool_, 0, 0),
+    ("born_loop", np.int64, 0, 0),
+    ("damaged_loop", np.int64, 0, -(1 << 30)),
+    ("order_kind", np.int64, 0, 0),
+    ("order_ability", np.int64, 0, 0),
+    ("order_target", np.int64, 0, NOBODY),
+    ("order_point", np.float64, 2, 0),
+    ("order_origin", np.float64, 2, 0),
+    ("target", np.int64, 0, NOBODY),
+    ("guard", np.float64, 2, 0),
+    ("weapon", np.int64, 0, -1),
+    ("cooldown", np.float64, 0, 0),
+    ("windup", np.float64, 0, -1),
+    ("backswing", np.float64, 0, 0),
+    ("help_loop", np.int64, 0, -(1 << 30)),
+    ("nav_point", np.float64, 2, 0),
+    ("nav_goal", np.float64, 2, 0),
+    ("nav_loop", np.int64, 0, -1),
+    ("blocked", np.int64, 0, 0),
+    ("detour", np.int64, 0, 0),
+    ("detour_loop", np.int64, 0, 0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Death:
+    """A unit that died: at which loop, which tag and type, whose it was, and whose unit did it (-1 nobody's)."""
+
+    loop: int
+    tag: int
+    type_id: int
+    owner: int
+    killer: int
+
+
+class World:
+    """One running game. Arrays have ``capacity`` rows; ``live`` lists the slots in use, ascending.
+
+    The world grows by itself; keep no reference to a column across ``spawn``.
+    """
+
+    alive: Bools  # (capacity,)
+    tag: Ints  # (capacity,) the API's 64-bit tag, 0 where the slot is free
+    type: Ints  # (capacity,) row in catalog.units
+    owner: Ints  # (capacity,) player id, 0 neutral
+    pos: Floats  # (capacity, 2) world units
+    heading: Floats  # (capacity, 2) unit vector the body faces
+    speed: Floats  # (capacity,) world units per loop, now
+    life: Floats  # (capacity,)
+    shields: Floats  # (capacity,)
+    energy: Floats  # (capacity,)
+    build_progress: Floats  # (capacity,) 0..1, 1 is complete
+    cloaked: Bools  # (capacity,)
+    burrowed: Bools  # (capacity,)
+    hallucination: Bools  # (capacity,)
+    born_loop: Ints  # (capacity,)
+    damaged_loop: Ints  # (capacity,) last loop with damage to it
+    order_kind: Ints  # (capacity,) OrderKind
+    order_ability: Ints  # (capacity,) specific ability id, 0 when idle
+    order_target: Ints  # (capacity,) slot or NOBODY
+    order_point: Floats  # (capacity, 2)
+    order_origin: Floats  # (capacity, 2) the other end of a patrol
+    target: Ints  # (capacity,) slot the weapon is engaged with, or NOBODY
+    guard: Floats  # (capacity, 2) where an idle unit stood when it engaged; an attack-move's leash point
+    weapon: Ints  # (capacity,) row of the weapon in use, or -1
+    cooldown: Floats  # (capacity,) loops until the next attack may start
+    windup: Floats  # (capacity,) loops until the started attack takes effect, -1 when none is started
+    backswing: Floats  # (capacity,) loops the body stays in the finished attack unless ordered away
+    help_loop: Ints  # (capacity,) last loop this unit called for help
+    nav_point: Floats  # (capacity, 2) next corner of the path
+    nav_goal: Floats  # (capacity, 2) goal the path was made for
+    nav_loop: Ints  # (capacity,) loop at which the path is looked over again
+    blocked: Ints  # (capacity,) loops without progress in a row
+    detour: Ints  # (capacity,) side of a detour, -1 right, 1 left, 0 none
+    detour_loop: Ints  # (capacity,) loop at which the detour ends
+
+    def __init__(
+        self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
+    ) -> None:
+        self.map: GameMap = game_map
+        self.catalog: Catalog = catalog or load_catalog()
+        self.seed = seed
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+        self.loop = 0
+        self.players: list[Player] = [Player(NEUTRAL, "neutral", "none")]
+        self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty) for p in players]
+        self.stats = Stats(self.catalog, len(self.players))
+        self.ground = Ground(game_map.terrain)
+        self.fog: bool = game_map.scenario.visibility.fog
+        self.visibility: NDArray[np.uint8]  # (players, h, w): 0 never seen, 1 seen before, 2 visible
+        width, height = game_map.terrain.size
+        never = 0 if game_map.scenario.visibility.black_mask else 1
+        self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
+        self.missiles = Missiles()
+        self.pending = PendingHits()
+        self.deaths: list[Death] = []
+        self.deaths_seen = 0  # how many of the deaths the triggers have been told about
+        self.ended = False
+        self.queue: list[list[Order]] = []
+        self.capacity = 0
+        self.live: Ints = np.zeros(0, dtype=np.int64)
+        self._recycles: Ints = np.zeros(0, dtype=np.int64)
+        self._top = 1  # slot 0 stays unused, as in the game
+        self._grow(64)
+
+    # units --------------------------------------------------------------------------------------------------------
+
+    def spawn(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float = 4.7124) -> int:
+        """Put a complete unit into the world, exactly at ``point``; returns its slot."""
+        slot = self._free_slot()
+        for name, _, _, empty in COLUMNS:
+            getattr(self, name)[slot] = empty
+        self.alive[slot] = True
+        self.tag[slot] = TAG_BASE | slot << INDEX_SHIFT | int(self._recycles[slot])
+        self.type[slot] = unit.row
+        self.owner[slot] = owner
+        self.pos[slot] = self.nav_goal[slot] = self.nav_point[slot] = self.guard[slot] = point
+        self.heading[slot] = geometry.heading(facing)
+        self.life[slot] = self.stats.life_max[owner, unit.row] if unit.life_start is None else unit.life_start
+        self.shields[slot] = self.stats.shields_max[owner, unit.row]
+        self.energy[slot] = self.stats.energy_start[owner, unit.row]
+        self.cloaked[slot], self.burrowed[slot] = unit.cloaked, unit.burrowed
+        self.born_loop[slot] = self.loop
+        self.queue[slot] = []
+        self.live = np.flatnonzero(self.alive)
+        self.ground.block(slot, self.footprint_cells(slot))
+        return slot
+
+    def remove(self, slot: int) -> None:
+        """Take a unit out of the world; every reference to its slot becomes NOBODY."""
+        self.alive[slot] = False
+        self.tag[slot] = NO_TAG
+        self._recycles[slot] += 1
+        self.queue[slot] = []
+        self.live = np.flatnonzero(self.alive)
+        self.target[self.target == slot] = NOBODY
+        self.order_target[self.order_target == slot] = NOBODY
+        self.missiles.forget(slot)
+        self.pending.forget(slot)
+        self.ground.unblock(slot)
+
+    def slot_of(self, tag: int) -> int:
+        """The slot of a living unit with this tag, or NOBODY."""
+        slot = tag >> INDEX_SHIFT & 0x3FFF
+        return slot if slot < self.capacity and tag != NO_TAG and self.tag[slot] == tag else NOBODY
+
+    def tag_of(self, slot: int) -> int:
+        """The tag of the unit in a slot, 0 for NOBODY."""
+        return int(self.tag[slot]) if slot >= 0 else NO_TAG
+
+    def unit_type(self, slot: int) -> UnitType:
+        """The record of the unit's type."""
+        return self.catalog.units[int(self.type[slot])]
+
+    def units_of(self, player: int) -> Ints:
+        """Slots of a player's living units, ascending."""
+        result: Ints = self.live[self.owner[self.live] == player]
+        return result
+
+    def facing(self) -> Floats:
+        """(capacity,) API facing of every slot, radians in [0, 2 pi)."""
+        return geometry.facing(self.heading)
+
+    def heights(self) -> Floats:
+        """(len(live),) z of every living unit: the ground's, and its flying height above it."""
+        above = np.array([self.catalog.units[row].height for row in self.type[self.live]], dtype=np.float64)
+        result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
+        return result
+
+    def footprint_cells(self, slot: int) -> Ints:
+        """(k, 2) cells ``(x, y)`` that a structure blocks; (0, 2) for others."""
+        footprint = self.catalog.footprints.get(self.unit_type(slot).footprint)
+        if footprint is None or not footprint.cells:
+            return np.zeros((0, 2), dtype=np.int64)
+        corner = np.floor(self.pos[slot] + 1e-9).astype(np.int64)
+        cells: Ints = corner + np.array(footprint.cells, dtype=np.int64)
+        return cells
+
+    # orders, as values --------------------------------------------------------------------------------------------
+
+    def orders_of(self, slot: int) -> list[Order]:
+        """The unit's orders, the current one first; empty when it is idle and engages nobody.
+
+        An idle unit that fights by itself shows the attack it makes, as the game does.
+        """
+        kind = OrderKind(int(self.order_kind[slot]))
+        if kind is OrderKind.IDLE:
+            return []
+        x, y = self.order_point[slot]
+        ox, oy = self.order_origin[slot]
+        targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW)
+        current = Order(
+            kind=kind,
+            ability=int(self.order_ability[slot]),
+            target=self.tag_of(int(self.order_target[slot])) if targeted else NO_TAG,
+            point=None if targeted or kind is OrderKind.HOLD else (float(x), float(y)),
+            origin=(float(ox), float(oy)) if kind is OrderKind.PATROL else None,
+        )
+        return [current, *self.queue[slot]]
+
+    # sight --------------------------------------------------------------------------------------------------------
+
+    def is_visible(self, player: int) -> Bools:
+        """(len(live),) whether ``player`` sees each living unit now; cloak and detection are not looked at here."""
+        if not self.fog:
+            return np.ones(len(self.live), dtype=np.bool_)
+        cells = self.pos[self.live].astype(np.int64)
+        width, height = self.map.terrain.size
+        x, y = np.clip(cells[:, 0], 0, width - 1), np.clip(cells[:, 1], 0, height - 1)
+        seen: Bools = (self.visibility[player, y, x] == 2) | (self.owner[self.live] == player)
+        return seen
+
+    # result -------------------------------------------------------------------------------------------------------
+
+    def end(self, results: dict[int, GameResult]) -> None:
+        """End the game with a result per player id; players without one are undecided."""
+        for player in self.players:
+            player.result = results.get(player.id, player.result)
+        self.ended = True
+
+    # bookkeeping --------------------------------------------------------------------------------------------------
+
+    def digest(self) -> str:
+        """SHA-256 over everything that decides the future, the same on every run with the same actions."""
+        sha = hashlib.sha256(self.map.digest.encode())
+        sha.update(repr((self.loop, self.ended, self.rng.bit_generator.state)).encode())
+        for name, _, _, _ in COLUMNS:
+            sha.update(np.ascontiguousarray(getattr(self, name)[: self._top]).tobytes())
+        sha.update(self._recycles[: self._top].tobytes())
+        sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
+        sha.update(repr([player.counters() for player in self.players]).encode())
+        sha.update(self.missiles.content() + self.pending.content())
+        sha.update(self.visibility.tobytes())
+        return sha.hexdigest()
+
+    def _free_slot(self) -> int:
+        free = np.flatnonzero(~self.alive[1 : self._top])
+        if free.size:
+            return int(free[0]) + 1
+        if self._top == self.capacity:
+            self._grow(self.capacity * 2)
+        self._top += 1
+        return self._top - 1
+
+    def _grow(self, capacity: int) -> None:
+        for name, dtype, width, empty in COLUMNS:
+            shape: Any = (capacity, width) if width else capacity
+            column = np.full(shape, empty, dtype=dtype)
+            if self.capacity:
+                column[: self.capacity] = getattr(self, name)
+            setattr(self, name, column)
+        recycles = np.zeros(capacity, dtype=np.int64)
+        recycles[: self.capacity] = self._recycles
+        self._recycles = recycles
+        self.queue += [[] for _ in range(capacity - self.capacity)]
+        self.capacity = capacity
