@@ -1,0 +1,61 @@
+"""How the first implementation asks its agents, as a stand-in to compare with: threads that poll.
+
+It starts a thread per agent; in it, a second thread makes a blocking HTTP request, and its result is looked for
+every 50 ms (the original: every 100 ms). The main loop looks for finished agents every millisecond. No bus, no
+other process: what this costs is what threads and polling cost.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import threading
+import time
+from urllib.parse import urlsplit
+
+POLL_S = 0.05
+HOST_POLL_S = 0.001
+
+
+class _Agent:
+    """One agent of the original: a flag that says whether it waits, and a text that appears some day."""
+
+    def __init__(self, base_url: str, model: str) -> None:
+        self._url = urlsplit(base_url)
+        self._model = model
+        self.waiting = False
+        self.answer: str | None = None
+
+    def query(self, text: str) -> None:
+        response: list[str] = []
+        request = threading.Thread(target=lambda: response.append(self._post(text)))
+        request.start()
+        while not response:
+            time.sleep(POLL_S)
+        self.answer = response[0]
+        self.waiting = False
+
+    def _post(self, text: str) -> str:
+        body = json.dumps({"model": self._model, "messages": [{"role": "user", "content": text}]})
+        connection = http.client.HTTPConnection(self._url.hostname or "127.0.0.1", self._url.port)
+        try:
+            connection.request("POST", self._url.path + "/chat/completions", body, {"Content-Type": "application/json"})
+            content: str = json.loads(connection.getresponse().read())["choices"][0]["message"]["content"]
+            return content
+        finally:
+            connection.close()
+
+
+def step_s(base_url: str, model: str, texts: list[str], steps: int) -> list[float]:
+    """Wall time of each step of `len(texts)` agents, in seconds."""
+    agents = [_Agent(base_url, model) for _ in texts]
+    times = []
+    for _ in range(steps):
+        began = time.perf_counter()
+        for agent, text in zip(agents, texts, strict=True):
+            agent.waiting = True
+            threading.Thread(target=agent.query, args=(text,)).start()
+        while any(agent.waiting for agent in agents):
+            time.sleep(HOST_POLL_S)
+        times.append(time.perf_counter() - began)
+    return times

@@ -1,0 +1,121 @@
+"""Looks at this machine as a match would, and says what to do about what it finds.
+
+Each check is a function that returns a `Finding`; none changes anything or needs a network beyond this machine.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import socket
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+State = Literal["ok", "note", "wrong"]
+
+KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "DEEPSEEK_API_KEY")
+"""Variables that the shipped model files read; each may also be given as a file, `<NAME>_FILE`."""
+PORTS = {7447: "the router of `khala router`"}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What one check found.
+
+    Attributes:
+        state: `wrong` keeps a match from starting; a `note` is worth knowing.
+        advice: what to do, empty if nothing.
+    """
+
+    name: str
+    state: State
+    found: str
+    advice: str = ""
+
+    def as_dict(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+
+def examine() -> Iterator[Finding]:
+    """Runs every check, in the order in which a newcomer would ask."""
+    for check in CHECKS:
+        try:
+            yield from check()
+        except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
+            yield Finding(check.__name__.strip("_"), "wrong", f"{type(error).__name__}: {error}", "report this")
+
+
+def _python() -> Iterator[Finding]:
+    yield Finding("Python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+
+
+def _pysc2() -> Iterator[Finding]:
+    try:
+        from bridge import compat  # noqa: PLC0415  # half a second that only this check needs
+    except ImportError as error:
+        yield Finding("PySC2", "wrong", str(error), "run `make install`, or `uv sync`: it keeps enum34 out")
+        return
+    yield Finding("PySC2", "ok", importlib.metadata.version("pysc2"))
+    kind, version = compat.protobuf_kind(), importlib.metadata.version("protobuf")
+    if kind == "upb":
+        yield Finding("protobuf", "ok", f"{version} ({kind})")
+    else:
+        advice = (
+            "unset PROTOCOL_BUFFERS_PYTHON_IMPLEMENTATION and install a protobuf wheel: this one is 80 times slower"
+        )
+        yield Finding("protobuf", "note", f"{version} ({kind})", advice)
+
+
+def _game() -> Iterator[Finding]:
+    from simulator.install import is_installed  # noqa: PLC0415
+
+    given = os.environ.get("SC2PATH")
+    if given is None:
+        yield Finding(
+            "game", "ok", "the simulator (SC2PATH is not set)", "`khala run --game SC2PATH` plays the real one"
+        )
+        return
+    root = Path(given).expanduser()
+    if not list(root.glob("Versions/Base*/SC2*")):
+        advice = "point SC2PATH to a StarCraft II install, or make one of the simulator with `khala sc2 install DIR`"
+        yield Finding("game", "wrong", f"SC2PATH={given} holds no Versions/Base…/SC2_x64", advice)
+        return
+    what = "the simulator" if is_installed(root) else "StarCraft II"
+    yield Finding("game", "ok", f"{what} in {root}")
+    maps = sum(1 for _ in root.glob("Maps/*/*.SC2Map"))
+    advice = "" if maps else "put the maps below Maps/llm_smac, Maps/mini_games, …"
+    yield Finding("maps", "ok" if maps else "wrong", f"{maps} below {root / 'Maps'}", advice)
+
+
+def _bus() -> Iterator[Finding]:
+    yield Finding("Zenoh", "ok", importlib.metadata.version("eclipse-zenoh"))
+    for port, user in PORTS.items():
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError as error:
+                yield Finding(
+                    f"port {port}", "note", os.strerror(error.errno or 0), f"{user} needs another one: --listen"
+                )
+            else:
+                yield Finding(f"port {port}", "ok", f"free for {user}")
+
+
+def _keys() -> Iterator[Finding]:
+    given = [name for name in KEYS if os.environ.get(name) or os.environ.get(f"{name}_FILE")]
+    if given:
+        yield Finding("model keys", "ok", ", ".join(given) + " set")
+    else:
+        yield Finding(
+            "model keys", "note", "none set", "the scripted model and local servers need none; see docs/models.md"
+        )
+
+
+CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _bus, _keys)
