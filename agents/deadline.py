@@ -1,0 +1,19 @@
+"""How much of the time to answer is for deciding, and how much is kept for sending the answer."""
+
+from __future__ import annotations
+
+MARGIN_FRACTION = 0.05
+MARGIN_MIN_S = 0.05
+MARGIN_MAX_S = 0.5
+"""128 agents of one process send their default replies in about 0.1 s on two cores."""
+
+
+def time_to_decide_s(answer_within_s: float | None) -> float | None:
+    """Seconds a policy may take, from the arrival of an observation; None is as long as it likes.
+
+    At most half of a very short time is kept back.
+    """
+    if answer_within_s is None:
+        return None
+    margin = min(max(MARGIN_FRACTION * answer_within_s, MARGIN_MIN_S), MARGIN_MAX_S, answer_within_s / 2)
+    return max(answer_within_s - margin, 0.0)
