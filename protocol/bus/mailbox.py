@@ -58,6 +58,11 @@ class Mailbox(Generic[T]):
         except RuntimeError:  # the loop is closed: nobody will read this any more
             self._closed = True
 
+    def miss(self, count: int) -> None:
+        """Adds to `missed`, from any thread."""
+        with self._lock:
+            self.missed += count
+
     def shut(self) -> None:
         """Ends the iteration without telling the owner; on the loop's own thread."""
         self._closed = True

@@ -1,0 +1,388 @@
+"""The bus over Zenoh, and the only module that imports it.
+
+What a bus promises is in `protocol.bus`, how one is reached in `protocol.bus.config`.
+
+Every callback of Zenoh runs on one of its own threads and only hands over to a mailbox: a callback that waits stops
+everything that its session receives, and one that publishes deadlocks. Callbacks are direct, as each indirect one has a
+thread that keeps the process from ending. A session does not survive a fork: start other processes with spawn or exec.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import json
+import logging
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import zenoh
+from zenoh import CongestionControl, Priority, SampleKind
+from zenoh.ext import (
+    CacheConfig,
+    HistoryConfig,
+    MissDetectionConfig,
+    RecoveryConfig,
+    RepliesConfig,
+    declare_advanced_publisher,
+    declare_advanced_subscriber,
+)
+from zenoh.handlers import Callback
+
+from protocol.bus import Delivery, Liveness, Sample
+from protocol.bus.config import BusConfig, check, settings
+from protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
+from protocol.bus.keyexpr import check_key, check_key_expr
+from protocol.bus.lane import Lane, OneBatch, Shut, Window
+from protocol.bus.mailbox import Mailbox
+from protocol.bus.sightings import PATIENCE_S, Sightings
+from protocol.errors import BusClosed, BusError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from zenoh.ext import AdvancedPublisher, Miss
+
+    from protocol.bus import Publisher, Subscription, Token
+
+T = TypeVar("T")
+log = logging.getLogger(__name__)
+
+CLOSE_TIMEOUT_S = 1.8
+ANSWER_TIMEOUT_S = 1.0
+STATE_CACHE = 1
+"""Only the newest of a state is worth anything: a larger cache would hand old ones to a late joiner."""
+HEARTBEAT_S = 0.3
+"""A dropped last sample is noticed after so long."""
+
+_SPEECH: dict[str, Any] = {
+    "congestion_control": CongestionControl.BLOCK,
+    "priority": Priority.INTERACTIVE_HIGH,
+    "express": True,
+}
+_LOG: dict[str, Any] = {"congestion_control": CongestionControl.DROP, "priority": Priority.DATA_LOW, "express": False}
+
+
+async def open_bus(config: BusConfig) -> ZenohBus:
+    """Opens a session.
+
+    Raises:
+        BusError: the configuration is wrong, there is no router, or it cannot listen; the text says what to do.
+    """
+    check(config)
+    zenoh_config = zenoh.Config()
+    for path, value in settings(config).items():
+        try:
+            zenoh_config.insert_json5(path, json.dumps(value))
+        except zenoh.ZError as error:
+            raise BusError(f"Zenoh does not accept {value!r} for {path!r}: {plain(str(error))}") from None
+    try:
+        session = await _on_thread(lambda: zenoh.open(zenoh_config))
+    except zenoh.ZError as error:
+        said = str(error)
+        if "Unable to connect" in said:
+            raise BusError(await why_not_connected(config)) from None
+        raise BusError(why_not_listening(config, said) if config.listen_on else plain(said)) from None
+    return ZenohBus(session, config)
+
+
+async def probe(config: BusConfig) -> tuple[str, ...]:
+    """Identities of the routers that a client of `config` gets connected to; at least one.
+
+    Raises:
+        BusError: as `open_bus` does.
+    """
+    bus = await open_bus(config.model_copy(update={"mode": "client", "listen": ()}))
+    try:
+        return bus.routers
+    finally:
+        await bus.close()
+
+
+class ZenohBus:
+    """A session of Zenoh; keeps the promises of `protocol.bus`. Made by `open_bus`."""
+
+    def __init__(self, session: zenoh.Session, config: BusConfig) -> None:
+        self._session = session
+        self._config = config
+        self._loop = asyncio.get_running_loop()
+        self._is_client = config.mode == "client"
+        self._held = _Held()
+        self._question = ""
+        self._speech = Lane("khala-speech", Window(self._ask) if self._is_client else Shut())
+        self._bulk = Lane("khala-bulk", OneBatch())
+        self._mailboxes: set[Mailbox[Any]] = set()
+        self._sightings: set[Sightings] = set()
+        self._links = {str(transport.zid) for transport in session.info.transports()}
+        events = Callback(partial(self._hand_over, self._on_transport), indirect=False)
+        self._held.add(session.info.declare_transport_events_listener(events))
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where this session listens, with the ports that it took; or where it connects to, if it does not listen."""
+        if not self._config.listen_on:
+            return self._config.connect_to
+        if not any(endpoint.endswith(":0") for endpoint in self._config.listen_on):
+            return self._config.listen_on
+        for reply in self._session.get(f"@/{self._session.zid()}/{self._config.mode}", timeout=ANSWER_TIMEOUT_S):
+            if reply.ok is not None:
+                return tuple(json.loads(reply.ok.payload.to_bytes())["locators"])
+        raise BusError("the session did not tell where it listens")
+
+    @property
+    def routers(self) -> tuple[str, ...]:
+        """Identities of the routers that this session is connected to."""
+        return tuple(str(zid) for zid in self._session.info.routers_zid())
+
+    async def publisher(self, key: str, delivery: Delivery) -> Publisher:
+        """See `protocol.bus.Bus.publisher`."""
+        self._check_open()
+        key_expr = zenoh.KeyExpr(check_key(key))
+        if delivery is Delivery.STATE:
+            advanced = _declare_state_publisher(self._session, key_expr)
+            self._held.add(advanced)
+            return _Publisher(key, self._held, self._bulk, advanced.put, advanced)
+        # A declared publisher is silent until it has heard of a subscriber: up to 60 of 60 first puts were lost. A put
+        # of the session goes to the router in any case.
+        if delivery is Delivery.LOG:
+            return _Publisher(key, self._held, self._bulk, partial(self._session.put, key_expr, **_LOG))
+        self._question = self._question or key
+        return _Publisher(key, self._held, self._speech, partial(self._session.put, key_expr, **_SPEECH))
+
+    async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
+        """See `protocol.bus.Bus.subscribe`."""
+        self._check_open()
+        check_key_expr(key_expr)
+        mailbox: Mailbox[Sample] = Mailbox(depth, on_close=lambda: self._forget(mailbox, *declared))
+        take = Callback(partial(_take, mailbox), indirect=False)
+        if delivery is Delivery.STATE:
+            declared = _declare_state_subscriber(self._session, key_expr, take, mailbox)
+        else:
+            declared = (self._session.declare_subscriber(key_expr, take),)
+        self._mailboxes.add(mailbox)
+        self._held.add(*declared)
+        await self._settle(key_expr)
+        return mailbox
+
+    async def announce(self, key: str) -> Token:
+        """See `protocol.bus.Bus.announce`."""
+        self._check_open()
+        token = self._session.liveliness().declare_token(check_key(key))
+        self._held.add(token)
+        return _Token(self._held, token)
+
+    async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
+        """See `protocol.bus.Bus.watch`."""
+        self._check_open()
+        check_key_expr(key_expr)
+        mailbox: Mailbox[Liveness] = Mailbox(depth, on_close=lambda: self._stop_watching(mailbox, sightings, watcher))
+        # Only a client has one link, which is its own; a router or peer that loses one has lost the other side.
+        patience_s = PATIENCE_S if self._is_client else 0.0
+        sightings = Sightings(mailbox, patience_s=patience_s, link_up=bool(self._links) or not self._is_client)
+        see = Callback(partial(self._hand_over, partial(_see, sightings)), indirect=False)
+        watcher = self._session.liveliness().declare_subscriber(key_expr, see, history=True)
+        self._mailboxes.add(mailbox)
+        self._sightings.add(sightings)
+        self._held.add(watcher)
+        return mailbox
+
+    async def close(self) -> None:
+        """See `protocol.bus.Bus.close`."""
+        if self._held.closed:
+            return
+        self._held.closed = True
+        for mailbox in self._mailboxes:
+            mailbox.shut()
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT_S):
+                await _on_thread(self._shut)
+        except TimeoutError:
+            log.warning("the bus did not close within %g s and was left behind", CLOSE_TIMEOUT_S)
+        except zenoh.ZError as error:
+            log.warning("closing the bus: %s", plain(str(error)))
+
+    def _shut(self) -> None:
+        self._speech.close()
+        self._bulk.close()
+        self._session.close()  # type: ignore[no-untyped-call]  # Zenoh's stub lacks the `-> None`
+
+    def _check_open(self) -> None:
+        if self._held.closed:
+            raise BusClosed("the bus is closed")
+
+    def _forget(self, mailbox: Mailbox[Any], *declared: Any) -> None:
+        self._mailboxes.discard(mailbox)
+        self._held.take_back(*declared)
+
+    def _stop_watching(self, mailbox: Mailbox[Liveness], sightings: Sightings, watcher: Any) -> None:
+        self._sightings.discard(sightings)
+        self._forget(mailbox, watcher)
+
+    async def _settle(self, key_expr: str) -> None:
+        """Waits until the router knows what was declared: a question that nobody answers follows it, and comes back."""
+        back = self._loop.create_future()
+        done = partial(self._hand_over, _resolve, back)
+        self._session.get(key_expr, Callback(_ignore, done, indirect=False), timeout=ANSWER_TIMEOUT_S)
+        await back
+
+    def _ask(self, answer: Callable[[bool], None]) -> None:
+        """Sends a question behind the SPEECH puts, for `Window`."""
+        errors: list[zenoh.Reply] = []  # a timeout comes as an error
+        self._session.get(
+            self._question,
+            Callback(errors.append, lambda: answer(not errors), indirect=False),
+            priority=Priority.INTERACTIVE_HIGH,
+            congestion_control=CongestionControl.DROP,
+            express=True,
+            timeout=ANSWER_TIMEOUT_S,
+        )
+
+    def _hand_over(self, action: Callable[..., None], *args: Any) -> None:
+        """From a thread of Zenoh to the loop, for what is rare; samples go through mailboxes."""
+        try:
+            self._loop.call_soon_threadsafe(action, *args)
+        except RuntimeError:
+            log.debug("the loop is closed; %s is not told", action)
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        peer = str(event.transport.zid)
+        if event.kind == SampleKind.PUT:
+            self._links.add(peer)
+        else:
+            self._links.discard(peer)
+        if not self._is_client or self._held.closed:
+            return
+        log.info("the link to router %s is %s", peer, "up" if self._links else "down; trying to get it back")
+        for sightings in self._sightings:
+            sightings.link(up=bool(self._links))
+
+
+class _Held:
+    """What a session declared: Zenoh takes back what nobody refers to."""
+
+    def __init__(self) -> None:
+        self.closed = False
+        self._declared: set[Any] = set()
+
+    def add(self, *declared: Any) -> None:
+        self._declared.update(declared)
+
+    def take_back(self, *declared: Any) -> None:
+        self._declared.difference_update(declared)
+        if not self.closed:
+            for one in declared:
+                one.undeclare()
+
+
+class _Publisher:
+    def __init__(
+        self, key: str, held: _Held, lane: Lane, put: Callable[[bytes], None], declared: AdvancedPublisher | None = None
+    ) -> None:
+        self._key = key
+        self._held = held
+        self._lane = lane
+        self._put = put
+        self._declared = declared
+        self._closed = False
+
+    @property
+    def key(self) -> str:
+        return self._key
+
+    async def put(self, payload: bytes) -> None:
+        if self._closed or self._held.closed:
+            raise BusClosed(f"the publisher of {self._key!r} is closed")
+        try:
+            await self._lane.put(self._put, payload)
+        except zenoh.ZError as error:
+            if self._held.closed:
+                raise BusClosed("the bus was closed while something was put") from None
+            raise BusError(f"cannot put under {self._key!r}: {plain(str(error))}") from None
+
+    async def close(self) -> None:
+        if not self._closed and self._declared is not None:
+            self._held.take_back(self._declared)
+        self._closed = True
+
+
+class _Token:
+    def __init__(self, held: _Held, token: zenoh.LivelinessToken) -> None:
+        self._held = held
+        self._token: zenoh.LivelinessToken | None = token
+
+    async def close(self) -> None:
+        token, self._token = self._token, None
+        if token is not None:
+            self._held.take_back(token)
+
+
+def _declare_state_publisher(session: zenoh.Session, key_expr: zenoh.KeyExpr) -> AdvancedPublisher:
+    # BLOCK would let one stopped agent freeze all others for seconds; DROP with a cache and a heartbeat kept their
+    # worst gap at 0.1 s, and the stopped one had the newest sample 0.08 s after it went on.
+    replies = RepliesConfig(congestion_control=CongestionControl.DROP, priority=Priority.DATA_HIGH)
+    return declare_advanced_publisher(
+        session,
+        key_expr,
+        congestion_control=CongestionControl.DROP,
+        priority=Priority.DATA_HIGH,
+        cache=CacheConfig(max_samples=STATE_CACHE, replies_config=replies),
+        sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+        publisher_detection=True,
+    )
+
+
+def _declare_state_subscriber(
+    session: zenoh.Session, key_expr: str, take: Callback[zenoh.Sample], mailbox: Mailbox[Sample]
+) -> tuple[Any, ...]:
+    subscriber = declare_advanced_subscriber(
+        session,
+        key_expr,
+        take,
+        history=HistoryConfig(detect_late_publishers=True, max_samples=1),
+        recovery=RecoveryConfig(periodic_queries=None, heartbeat=True),
+    )
+    listener = subscriber.sample_miss_listener(Callback(partial(_count, mailbox), indirect=False))
+    return subscriber, listener
+
+
+# --- callbacks, on threads of Zenoh -----------------------------------------------------------------
+
+
+def _take(mailbox: Mailbox[Sample], sample: zenoh.Sample) -> None:
+    if sample.kind == SampleKind.PUT:
+        mailbox.offer_from_thread(Sample(str(sample.key_expr), sample.payload.to_bytes()))
+
+
+def _count(mailbox: Mailbox[Sample], miss: Miss) -> None:
+    mailbox.miss(miss.nb)
+
+
+def _ignore(reply: zenoh.Reply) -> None:
+    """For questions whose end is the answer."""
+
+
+# --- on the loop ------------------------------------------------------------------------------------
+
+
+def _see(sightings: Sightings, sample: zenoh.Sample) -> None:
+    sightings.token(str(sample.key_expr), alive=sample.kind == SampleKind.PUT)
+
+
+def _resolve(future: asyncio.Future[None]) -> None:
+    if not future.done():
+        future.set_result(None)
+
+
+async def _on_thread(work: Callable[[], T]) -> T:
+    """Runs what may block for seconds. Not on the loop's executor, whose threads keep a process from ending."""
+    future: concurrent.futures.Future[T] = concurrent.futures.Future()
+
+    def run() -> None:
+        try:
+            future.set_result(work())
+        except Exception as error:  # noqa: BLE001  it is raised where it is awaited
+            future.set_exception(error)
+
+    threading.Thread(target=run, name="khala-bus", daemon=True).start()
+    return await asyncio.wrap_future(future)
