@@ -1,0 +1,109 @@
+"""Counts what an episode comes to: reports and snapshots in, one `Result` out."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import raw_pb2
+
+from bridge.snapshot import LOOPS_PER_S
+from protocol.messages import Casualties, Report, Result, Usage
+
+if TYPE_CHECKING:
+    from s2clientprotocol import score_pb2
+
+    from bridge.snapshot import Snapshot
+    from protocol.messages import Outcome
+
+
+class Tally:
+    """The running account of one episode."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self._first = self._last = snapshot
+        self._alliance: dict[int, int] = {}
+        self._dead: Counter[int] = Counter()
+        self._usage: dict[str, Usage] = defaultdict(Usage)
+        self._statuses: dict[str, Counter[str]] = defaultdict(Counter)
+        self._rejections: Counter[str] = Counter()
+        self._latencies_s: list[float] = []
+        self._accepted = 0
+        self._steps = 0
+        self._note(snapshot)
+
+    def add(self, report: Report, after: Snapshot) -> None:
+        """Counts one step, and what the game looked like after it."""
+        self._steps += 1
+        for agent in report.agents:
+            name = agent.agent
+            self._usage[name] += agent.usage
+            self._statuses[name][agent.status] += 1
+            self._rejections.update(rejection.reason for rejection in agent.rejections)
+            self._accepted += len(agent.accepted)
+            if agent.latency_s is not None:
+                self._latencies_s.append(agent.latency_s)
+        self._note(after)
+
+    def result(self, run: str, episode: int, *, wall_s: float, cause: str | None = None) -> Result:
+        """The account at the end of the episode.
+
+        Args:
+            run: name of the run.
+            episode: its number, from 0.
+            wall_s: time it took.
+            cause: why it ended, if the game itself does not say.
+        """
+        outcome = self._last.outcome or "draw"
+        killed = Casualties(units=self._dead[raw_pb2.Enemy], value=self._value("killed"))
+        lost = Casualties(units=self._dead[raw_pb2.Self], value=self._value("lost"))
+        return Result(
+            run=run,
+            episode=episode,
+            outcome=outcome,
+            cause=cause or CAUSES[outcome],
+            steps=self._steps,
+            game_loop=self._last.game_loop,
+            game_s=self._last.game_loop / LOOPS_PER_S,
+            wall_s=wall_s,
+            killed=killed,
+            lost=lost,
+            kd=killed.value / lost.value if lost.value else None,
+            score=float(self._last.response.observation.score.score),
+            usage=dict(self._usage),
+            statuses={name: dict(count) for name, count in self._statuses.items()},
+            rejections=dict(self._rejections),
+            accepted=self._accepted,
+            latency_p50_s=statistics.median(self._latencies_s) if self._latencies_s else None,
+            latency_p95_s=_quantile(self._latencies_s, 0.95),
+        )
+
+    def _note(self, snapshot: Snapshot) -> None:
+        self._dead.update(self._alliance[tag] for tag in snapshot.dead if tag in self._alliance)
+        self._alliance.update((unit.tag, unit.alliance) for unit in snapshot.units.values())
+        self._last = snapshot
+
+    def _value(self, what: str) -> float:
+        """Minerals + vespene of what was killed or lost since the first snapshot."""
+        return _spent(self._last, what) - _spent(self._first, what)
+
+
+CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
+"""What a result of the game means on maps that end by the death of one side or by a clock."""
+
+
+def _spent(snapshot: Snapshot, what: str) -> float:
+    details = snapshot.response.observation.score.score_details
+    return sum(_total(getattr(details, f"{what}_{resource}")) for resource in ("minerals", "vespene"))
+
+
+def _total(category: score_pb2.CategoryScoreDetails) -> float:
+    return category.none + category.army + category.economy + category.technology + category.upgrade
+
+
+def _quantile(values: list[float], share: float) -> float | None:
+    if not values:
+        return None
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
