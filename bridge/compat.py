@@ -11,8 +11,9 @@ Three things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
 * `pysc2.env.sc2_env` imports a renderer, and with it pygame, which greets on stdout, and skvideo, which
   imports the deprecated `scipy.misc`. The greeting and the warnings are muted for the import only.
 
-Import this module before anything of `pysc2`: then all that the bridge needs of it is in place, also where
-warnings are errors. It is no adapter: PySC2 itself stays as it was installed.
+All that the bridge uses of PySC2 is imported here, and taken from here by the other modules, so that the order
+of imports is right by construction, also where warnings are errors. It is no adapter: PySC2 itself stays as it
+was installed.
 """
 
 from __future__ import annotations
@@ -74,5 +75,23 @@ def protobuf_kind() -> str:
 
 with old_shuffle(), quiet_pygame(), warnings.catch_warnings():
     warnings.simplefilter("ignore")
-    import pysc2.env.sc2_env
-    import pysc2.lib.features  # noqa: F401  # palettes of the feature layers are the only user of the old shuffle
+    from pysc2 import run_configs
+    from pysc2.env import environment, sc2_env
+    from pysc2.lib import actions, buffs, features, point, units, upgrades
+    from pysc2.maps import lib as maps
+
+__all__ = [
+    "actions",
+    "buffs",
+    "environment",
+    "features",
+    "maps",
+    "old_shuffle",
+    "point",
+    "protobuf_kind",
+    "quiet_pygame",
+    "run_configs",
+    "sc2_env",
+    "units",
+    "upgrades",
+]

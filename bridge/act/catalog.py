@@ -1,0 +1,106 @@
+"""The catalogue of text actions: a typed reading of `bridge/data/actions.yaml`.
+
+It says what an action is called, what it takes, who may use it and what PySC2 calls it. It decides nothing: whether
+a call fits it is the business of `bridge.act.recognise`, whether it may be done now that of `bridge.act.translate`.
+Ids of functions and abilities are looked up in PySC2 by name, so that a misspelt name is an error at import.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Literal, Self, TypeAlias
+
+from pydantic import model_validator
+
+from bridge import data
+from bridge.compat import actions as pysc2_actions
+from protocol.messages import ActionSpec, Frozen
+
+ArgKind: TypeAlias = Literal["tag", "screen", "minimap"]
+FILE = "actions.yaml"
+
+
+class Needs(Frozen):
+    """What has to be true for an action to be valid now."""
+
+    weapon: bool = False
+    """The unit type has a weapon."""
+    upgrade: str | None = None
+    """The player has this upgrade, named as in `pysc2.lib.upgrades`."""
+
+
+class Action(Frozen):
+    """One text action."""
+
+    name: str = ""
+    args: tuple[ArgKind, ...] = ()
+    about: str
+    subject: Literal["team", "unit"] = "team"
+    """Who carries it out: the whole team, or the unit that the first argument names."""
+    units: tuple[str, ...] = ()
+    """Unit types that have it; () for every type."""
+    target: Literal["enemy", "own"] | None = None
+    raw: str | None = None
+    """Name of PySC2's raw function; None for an action that orders nothing."""
+    screen: str | None = None
+    """Name of PySC2's function for the screen executor."""
+    queue: bool = False
+    needs: Needs = Needs()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.raw is None) != (self.screen is None):
+            raise ValueError("an action has both a raw and a screen function, or none")
+        if self.subject == "unit" and self.args[:1] != ("tag",):
+            raise ValueError("the first argument has to be the tag of the unit")
+        if self.raw and self.screen:
+            raw, screen = pysc2_actions.RAW_FUNCTIONS[self.raw], pysc2_actions.FUNCTIONS[self.screen]
+            if raw.ability_id != screen.ability_id:
+                raise ValueError(f"{self.raw} and {self.screen} are different abilities")
+        return self
+
+    @property
+    def ability(self) -> int | None:
+        """Id of the ability that the raw interface is told."""
+        return None if self.raw is None else int(pysc2_actions.RAW_FUNCTIONS[self.raw].ability_id)
+
+    @property
+    def function(self) -> Any:
+        """PySC2's function for the screen; only for actions that order something."""
+        return pysc2_actions.FUNCTIONS[self.screen]
+
+    @property
+    def target_kind(self) -> ArgKind | None:
+        """What the target is given as; None for an action without a target."""
+        args = self.args[1:] if self.subject == "unit" else self.args
+        return args[0] if args else None
+
+    @property
+    def form(self) -> str:
+        """How it is written: `<Attack_Unit(tag)>`."""
+        return f"<{self.name}({', '.join(self.args)})>"
+
+    @property
+    def spec(self) -> ActionSpec:
+        """What an agent is told of it."""
+        return _spec(self)
+
+    def fits(self, unit_type: str) -> bool:
+        """Whether units of this type have it at all."""
+        return not self.units or unit_type in self.units
+
+
+@functools.cache
+def _spec(action: Action) -> ActionSpec:
+    return ActionSpec(name=action.name, args=action.args, description=action.about)
+
+
+@functools.cache
+def catalogue() -> dict[str, Action]:
+    """Every text action by name, in the order of the file."""
+    return {name: action.model_copy(update={"name": name}) for name, action in data.table(FILE, Action).items()}
+
+
+def catalogue_sha256() -> str:
+    """Hash of the catalogue, for the run card."""
+    return data.sha256(FILE)

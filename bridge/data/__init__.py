@@ -1,0 +1,38 @@
+"""Data files of the bridge and the one way to read them.
+
+`actions.yaml` (text actions), `maps.yaml`, `knowledge/` (unit types); SOURCES.md says where the facts come from.
+They are part of the program: a fault in them is a bug, found by the tests, not an error to explain to a user.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+from pydantic import BaseModel, TypeAdapter
+
+if TYPE_CHECKING:
+    from typing import TypeVar
+
+    M = TypeVar("M", bound=BaseModel)
+
+_LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml is 15 times faster, and not in every wheel
+_HERE = Path(__file__).parent
+
+
+def path(name: str) -> Path:
+    """Where a data file is."""
+    return _HERE / name
+
+
+def table(name: str, model: type[M]) -> dict[str, M]:
+    """The entries of a data file by their name, in the order of the file."""
+    data = yaml.load(path(name).read_bytes(), Loader=_LOADER)  # noqa: S506  # a safe loader in both cases
+    return TypeAdapter(dict[str, model]).validate_python(data)  # type: ignore[valid-type]  # a type known at run time
+
+
+def sha256(name: str) -> str:
+    """Hash of a data file, for the run card."""
+    return hashlib.sha256(path(name).read_bytes()).hexdigest()

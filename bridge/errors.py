@@ -1,0 +1,25 @@
+"""What can go wrong between Khala and the game.
+
+    protocol.errors.KhalaError
+    └── GameError            the game could not be started, died, hangs or broke its contract
+        ├── GameMissing      there is no StarCraft II, or no such map, where it was looked for
+        └── GameHangs        the game did not answer in time and was ended
+
+A wrong action of a model is none of these: it is a `protocol.messages.Rejection`.
+"""
+
+from __future__ import annotations
+
+from protocol.errors import KhalaError
+
+
+class GameError(KhalaError):
+    """The game could not be started, died, or broke its contract; the match cannot go on."""
+
+
+class GameMissing(GameError):
+    """There is no game, or no map, where it was looked for."""
+
+
+class GameHangs(GameError):
+    """The game did not answer in time; its process was ended."""

@@ -1,0 +1,191 @@
+"""A task: a map, the agents that play it, which units answer to them and what they may do with them.
+
+The model of the files in `configs/tasks/`. It is checked against the map table, the catalogue and PySC2's unit
+names while it is read, so that a wrong name is an error with its line, not a surprise in the game. It holds no
+state: who has which unit in a running game is known by `bridge.observe.teams`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from typing import TYPE_CHECKING, Literal, Self, TypeAlias
+
+from pydantic import Field, field_validator, model_validator
+
+from bridge.act.catalog import Action, catalogue
+from bridge.maps import Difficulty, MapSpec, Race, known_maps
+from bridge.names import unit_types
+from protocol.errors import WrongKey
+from protocol.keys import check_name
+from protocol.messages import AgentCard, Clock, Frames, Frozen, TeamSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+TeamKind: TypeAlias = Literal["select", "select_all_type", "group"]
+Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
+
+
+class TeamConfig(Frozen):
+    """One team of an agent."""
+
+    name: str
+    unit_types: tuple[str, ...] = Field(min_length=1)
+    kind: TeamKind = "group"
+    """`select`: every unit is a team of its own, named `<name>-1`, `<name>-2`, …; `select_all_type`: the units of
+    a type around the first one; `group`: a control group, units are spread over the agent's teams."""
+    control_group: int | None = Field(default=None, ge=0, le=9)
+    """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
+    task: str = ""
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        return _key_name(name)
+
+    @field_validator("unit_types")
+    @classmethod
+    def _unit_types(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            _known(name, unit_types(), "unit type")
+        return names
+
+
+class AgentConfig(Frozen):
+    """One agent: who it is, its teams, and what each type of unit may be told."""
+
+    name: str
+    role: str
+    admits: Admission = "combat"
+    """Which units it takes of those that its teams list; see `bridge.observe.teams`."""
+    teams: tuple[TeamConfig, ...] = Field(min_length=1)
+    actions: dict[str, tuple[str, ...]]
+    """Names of text actions by unit type, in the order in which they are shown."""
+    task: str = ""
+    """What it has to do besides the task of all."""
+    required: bool = True
+    """Whether the match waits for it at the start."""
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        return _key_name(name)
+
+    @field_validator("actions")
+    @classmethod
+    def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        for unit_type, names in actions.items():
+            _known(unit_type, unit_types(), "unit type")
+            for name in names:
+                _known(name, catalogue(), "action")
+                if not catalogue()[name].fits(unit_type):
+                    raise ValueError(f"{unit_type} has no action {name}")
+        return actions
+
+    @model_validator(mode="after")
+    def _every_type_has_actions(self) -> Self:
+        _once((team.name for team in self.teams), "team")
+        for team in self.teams:
+            if missing := [name for name in team.unit_types if name not in self.actions]:
+                raise ValueError(f"team {team.name} has units of type {missing[0]}, for which no actions are listed")
+        return self
+
+    def catalogue(self) -> tuple[Action, ...]:
+        """Every action that any of its units may be told, in the order in which they are first listed."""
+        names = dict.fromkeys(name for listed in self.actions.values() for name in listed)
+        return tuple(catalogue()[name] for name in names)
+
+    def team_specs(self) -> tuple[TeamSpec, ...]:
+        """Its teams as its briefing tells them."""
+        return tuple(TeamSpec(name=t.name, unit_types=t.unit_types, task=t.task) for t in self.teams)
+
+
+class Opponent(Frozen):
+    """The computer player; what is not given is as the map table says."""
+
+    race: Race | None = None
+    difficulty: Difficulty | None = None
+
+
+class TaskConfig(Frozen):
+    """What is played, by whom, under which rules."""
+
+    name: str
+    description: str = ""
+    map: str
+    race: Race | None = None
+    """The agents' race; None for the map's own."""
+    opponent: Opponent = Opponent()
+    side: str = "blue"
+    """Name of the agents' side in keys and reports."""
+    task: str
+    """What all agents have to do."""
+    agents: tuple[AgentConfig, ...] = Field(min_length=1)
+    channels: tuple[str, ...] = ()
+    """Names under which more than one agent can be written to."""
+    communication: bool = True
+    """Whether agents may write to each other."""
+    executor: Literal["raw", "screen"] = "raw"
+    clock: Clock = Clock()
+    frames: Frames = Frames()
+    max_actions: int = Field(default=3, ge=1)
+    """Actions that one team may have in one reply."""
+    max_steps: int | None = Field(default=None, ge=1)
+    """Decisions after which an episode ends without a result; None leaves it to the map."""
+
+    @field_validator("name", "side")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        return _key_name(name)
+
+    @field_validator("map")
+    @classmethod
+    def _map(cls, name: str) -> str:
+        return _known(name, known_maps(), "map")
+
+    @field_validator("agents")
+    @classmethod
+    def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
+        _once((agent.name for agent in agents), "agent")
+        groups = [t.control_group for a in agents for t in a.teams if t.control_group is not None]
+        _once((str(group) for group in groups), "control group")
+        return agents
+
+    @property
+    def map_spec(self) -> MapSpec:
+        """The map, with what this task changes of it."""
+        changed = {"race": self.race, "opponent": self.opponent.race, "difficulty": self.opponent.difficulty}
+        return known_maps()[self.map].model_copy(update={k: v for k, v in changed.items() if v is not None})
+
+    def agent(self, name: str) -> AgentConfig:
+        """The agent of this name."""
+        return next(agent for agent in self.agents if agent.name == name)
+
+    def cards(self) -> tuple[AgentCard, ...]:
+        """The agents as the run card lists them."""
+        return tuple(
+            AgentCard(name=a.name, side=self.side, teams=tuple(t.name for t in a.teams), required=a.required)
+            for a in self.agents
+        )
+
+
+def _key_name(name: str) -> str:
+    try:
+        return check_name(name)
+    except WrongKey as error:
+        raise ValueError(str(error)) from None
+
+
+def _known(name: str, known: Iterable[str], what: str) -> str:
+    names = list(known)
+    if name in names:
+        return name
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f", did you mean '{close[0]}'?" if close else ""
+    raise ValueError(f"there is no {what} '{name}'{hint}")
+
+
+def _once(names: Iterable[str], what: str) -> None:
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        raise ValueError(f"there are two of {what} {twice[0]}")
