@@ -1,0 +1,505 @@
+"""The text language: one row for each rule of tolerance, one for each fault; and what holds for every text."""
+
+from __future__ import annotations
+
+import re
+import time
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import protocol.speech
+import protocol.speech.arguments
+import protocol.speech.headings
+from protocol.messages import Call
+from protocol.speech import ListenTo, MessageTo, Speech, parse, render
+
+REPLY = """Analysis: the Zealot 0x10ac is weak, so <Attack_Unit(0x10ac)> it.
+Actions:
+    Team Stalker-1:
+        <Attack_Unit(0x1008c0001)>
+        <Move_Screen([20, 9])>
+    Team Zealot-1:
+        <Hold_Position()>
+Communications:
+    <MessageTo(CombatGroup1, '''hold the ramp''')>
+    <ListenTo(Channel-2)>
+"""
+
+
+def outline(speech: Speech) -> list[str]:
+    """What a reply says, one line each, in the order of the text; `?` marks mentions, `!` faults."""
+    lines = [(call.start, f"{call.team}: {render(call)}" if call.team else render(call)) for call in speech.calls]
+    lines += [(call.start, f"? {render(call)}") for call in speech.mentions]
+    lines += [(message.start, f"to {message.recipient}: {message.text}") for message in speech.messages]
+    lines += [(listen.start, f"hear {listen.channel}") for listen in speech.listens]
+    lines += [(fault.start, f"! {fault.text}") for fault in speech.faults]
+    return [line for _, line in sorted(lines, key=lambda line: line[0])]
+
+
+def test_the_sample_of_the_documentation_is_read_in_full() -> None:
+    assert outline(parse(REPLY)) == [
+        "? <Attack_Unit(0x10ac)>",
+        "Stalker-1: <Attack_Unit(0x1008c0001)>",
+        "Stalker-1: <Move_Screen([20, 9])>",
+        "Zealot-1: <Hold_Position()>",
+        "to CombatGroup1: hold the ramp",
+        "hear Channel-2",
+    ]
+
+
+ARGUMENTS = [
+    ("A1", "0X001002C0001", ["0x1002c0001"]),
+    ("A1", "0x0", ["0x0"]),
+    ("A2", "'0x1'", ["0x1"]),
+    ("A2", '"0x1"', ["0x1"]),
+    ("A2", "`0x1`", ["0x1"]),
+    ("A2", "“0x1”", ["0x1"]),
+    ("A2", "**0x1**", ["0x1"]),
+    ("A2", "'[3, 4]'", [(3, 4)]),
+    ("A3", "tag=0x1", ["0x1"]),
+    ("A3", "tag = '0x1'", ["0x1"]),
+    ("A3", "target: 0x1", ["0x1"]),
+    ("A3", "Stalker 0x1", ["0x1"]),
+    ("A3", "screen=[3, 4]", [(3, 4)]),
+    ("A3", "x=3, y=4", [(3, 4)]),
+    ("A4", "[0x1]", ["0x1"]),
+    ("A4", "('0x1')", ["0x1"]),
+    ("A5", "[3, 4]", [(3, 4)]),
+    ("A5", "[ 3 , 4 ]", [(3, 4)]),
+    ("A5", "(3, 4)", [(3, 4)]),
+    ("A5", "[3,4]", [(3, 4)]),
+    ("A5", "[3 4]", [(3, 4)]),
+    ("A5", "[3; 4]", [(3, 4)]),
+    ("A5", "[3,\n4]", [(3, 4)]),
+    ("A5", "{x: 3, y: 4}", [(3, 4)]),
+    ("A5", '{"x": 3, "y": 4}', [(3, 4)]),
+    ("A5", "[x=3, y=4]", [(3, 4)]),
+    ("A5", "0x1, [3, 4]", ["0x1", (3, 4)]),
+    ("A5", "[3, 4], 0x1", [(3, 4), "0x1"]),
+    ("A5", "[3, 4], [5, 6]", [(3, 4), (5, 6)]),
+    ("A6", "3, 4", [(3, 4)]),
+    ("A6", "0x1, 3, 4", ["0x1", (3, 4)]),
+    ("A6", "3", ["3"]),
+    ("A6", "3, 4, 5", [(3, 4), "5"]),
+    ("A6", "4295229441, 4295229442", ["4295229441", "4295229442"]),
+    ("A7", "[-0.5, 1e1]", [(-0.5, 10)]),
+    ("A7", "[.5, +2.]", [(0.5, 2)]),
+    ("A7", "[100000, -7]", [(100000, -7)]),
+    ("A8", "0x1,", ["0x1"]),
+    ("A8", "0x1; ", ["0x1"]),
+    ("A8", " , ", []),
+    ("A9", "4295229441", ["4295229441"]),
+    ("A9", "[1, 2, 3]", ["[1, 2, 3]"]),
+    ("A9", "[1]", ["[1]"]),
+    ("A9", "[1-2]", ["[1-2]"]),
+    ("A9", "[nan, inf]", ["[nan, inf]"]),
+    ("A9", "[1e999, 2]", ["[1e999, 2]"]),
+    ("A9", "0xZZ", ["0xZZ"]),
+    ("A9", "0x", ["0x"]),
+    ("A9", "left flank", ["left flank"]),
+    ("A9", "mode=fast", ["mode=fast"]),
+    ("A9", "", []),
+]
+
+
+@pytest.mark.parametrize(("rule", "inside", "arguments"), ARGUMENTS)
+def test_the_form_of_an_argument_says_what_it_is(rule: str, inside: str, arguments: list[object]) -> None:
+    speech = parse(f"<Act({inside})>")
+    assert [list(call.args) for call in speech.calls] == [arguments]
+    assert not speech.faults
+
+
+HEADINGS = [
+    ("H1", "<Stop()>\nACTIONS:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H1", "<Stop()>\nactions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H1", "<Stop()>\nAction:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H1", "<MessageTo(A, 'x')>\nCOMMUNICATION:\n<MessageTo(A, 'y')>", ["to A: y"]),
+    ("H1", "<MessageTo(A, 'x')>\nmessages:\n<MessageTo(A, 'y')>", ["to A: y"]),
+    ("H2", "<Stop()>\n**Actions**:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n**Actions:**\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n__Actions__:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n### 2. Actions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n  - *Actions* :\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n> _Actions_:\n> <Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n`Actions`:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n[Actions]:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", "<Stop()>\n🎯 Actions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H2", '<Stop()>\n"Actions": ["<Go()>"]', ["? <Stop()>", "<Go()>"]),
+    ("H3", "<Stop()>\n### Actions\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H3", "<Stop()>\nActions\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H3", "<Stop()>\r\n**Actions**\r\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H3", "<Stop()>\nActions speak louder than words\n<Go()>", ["<Stop()>", "<Go()>"]),
+    ("H4", "<Stop()>\nFinal Actions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H4", "<Stop()>\nAnalysis and Actions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H4", "<Stop()>\nActions (at most 3):\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H4", "<Stop()>\nAction 1: <Go()>\nAction 2: <Hold()>", ["? <Stop()>", "<Go()>", "<Hold()>"]),
+    ("H4", "<Stop()>\nActions for Team Stalker-1:\n<Go()>", ["? <Stop()>", "Stalker-1: <Go()>"]),
+    ("H5", "<Stop()>\n<Actions>\n<Go()>\n</Actions>", ["? <Stop()>", "<Go()>"]),
+    ("H6", "Analysis: weak, <Stop()>? No. Actions: <Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H6", "Actions: Team A: <Stop()> Team B-1: <Go()>", ["A: <Stop()>", "B-1: <Go()>"]),
+    ("H6", "Actions: A-1: <Stop()>; B-1: <Go()>", ["A-1: <Stop()>", "B-1: <Go()>"]),
+    ("H7", "Team Stalker-1:\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "team stalker-1 :\n<Go()>", ["stalker-1: <Go()>"]),
+    ("H7", "TEAM STALKER-1:\n<Go()>", ["STALKER-1: <Go()>"]),
+    ("H7", "**Team Stalker-1**:\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "**Team Stalker-1:**\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "_Team Stalker-1_:\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "- Team `Stalker-1`: <Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", '1) Team "Stalker-1":\n<Go()>', ["Stalker-1: <Go()>"]),
+    ("H7", "Team: Stalker-1\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "Team Stalker 1:\n<Go()>", ["Stalker 1: <Go()>"]),
+    ("H7", "Team Stalker-1 actions:\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "Team Stalker-1: kite them\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H7", "Our team attacks now\n<Go()>", ["<Go()>"]),
+    ("H7", "Team Stalker-1 is hurt\n<Go()>", ["<Go()>"]),
+    ("H8", "#### Team Stalker-1\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H8", "Team Stalker-1 -> <Go()>", ["Stalker-1: <Go()>"]),
+    ("H9", "Stalker-1:\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H9", "- **Stalker-1**: <Go()>", ["Stalker-1: <Go()>"]),
+    ("H9", "Protoss_Units:\n<Go()>", ["Protoss_Units: <Go()>"]),
+    ("H9", "Zealots:\n<Go()>", ["Zealots: <Go()>"]),
+    ("H10", "Team Stalker-1 (2 units):\n<Go()>", ["Stalker-1: <Go()>"]),
+    ("H10", "Stalker-1 (all): <Go()>", ["Stalker-1: <Go()>"]),
+    ("H11", "<Team Stalker-1>\n<Go()>\n</Team>", ["Stalker-1: <Go()>"]),
+    ("H12", "Team A:\n<Stop()>\nBoth teams:\n<Go()>", ["A: <Stop()>", "Both teams: <Go()>"]),
+    ("H13", "Team A:\n<Stop()>\nTeam:\n<Go()>", ["A: <Stop()>", "<Go()>"]),
+    ("H14", "Team A:\nReasoning:\n<Go()>\nThen: <Stop()>", ["A: <Go()>", "A: <Stop()>"]),
+    ("H14", "Team A:\n<Go()> and: <Stop()>", ["A: <Go()>", "A: <Stop()>"]),
+]
+
+RULES = [
+    ("S1", "<Stop()>", ["<Stop()>"]),
+    ("S1", "I will do this.\n<Stop()>\n<Go()>", ["<Stop()>", "<Go()>"]),
+    ("S1", "<MessageTo(A, 'go')>", ["to A: go"]),
+    ("S1", "Analysis: I think <Stop()> is best", ["<Stop()>"]),
+    ("S2", "first <Stop()>, then <Go()>!", ["<Stop()>", "<Go()>"]),
+    ("S2", "<Stop()><Go()>", ["<Stop()>", "<Go()>"]),
+    ("S2", "<Stop()> <MessageTo(A, 'x')> <Go()>", ["<Stop()>", "to A: x", "<Go()>"]),
+    ("S2", "<Stop()>  # keep team A: alive", ["<Stop()>"]),
+    ("S3", "< Attack_Unit ( 0x1 ) >", ["<Attack_Unit(0x1)>"]),
+    ("S3", "<Move_Screen(\n    [3,\n 4]\n)\n>", ["<Move_Screen([3, 4])>"]),
+    ("S4", "<Hold_Position>", ["<Hold_Position()>"]),
+    ("S4", "<Stop>", ["<Stop()>"]),
+    ("S4", "<Hold_Position/>", ["<Hold_Position()>"]),
+    ("S4", "< Hold_Position />", ["<Hold_Position()>"]),
+    ("S4", "<Hold_Position></Hold_Position>", ["<Hold_Position()>"]),
+    ("S5", "- <Stop()>\n* <Go()>\n3. <Hold()>", ["<Stop()>", "<Go()>", "<Hold()>"]),
+    ("S5", "`<Stop()>`, **<Go()>**", ["<Stop()>", "<Go()>"]),
+    ("S5", "```python\n<Stop()>\n```", ["<Stop()>"]),
+    ("S5", "> <Stop()>\n> <Go()>", ["<Stop()>", "<Go()>"]),
+    ("S5", r"\<Attack\_Unit\(0x1\)\>", ["<Attack_Unit(0x1)>"]),
+    ("S6", "＜Stop（）＞", ["<Stop()>"]),
+    ("S6", "<Move_Screen（【３，４】）>", ["<Move_Screen([3, 4])>"]),
+    ("S6", "Team A：\n<Stop()>", ["A: <Stop()>"]),
+    ("S6", "<MessageTo（A，“走”）>", ["to A: 走"]),
+    ("S7", "<b>x</b><br><br/><DIV><h1>", []),
+    ("S7", "<answer>\n<Stop()>\n</answer>", ["<Stop()>"]),
+    ("S7", "<Answer>\n<Stop()>\n</Answer>", ["<Stop()>"]),
+    ("S7", '<tool_call>{"name": 1}</tool_call>', []),
+    ("S7", "<a href='x(1)'>x</a> <!-- no --> <|end|> <0x1008c0001>", []),
+    ("S7", "health < 50 and > 20, 3<4, a <b, a < b(c), x <= y, <- <3 <", []),
+    ("S8", "<think><Stop()>\nActions: <Bad_Call(></think><Go()>", ["<Go()>"]),
+    ("S8", "<Thinking> <Stop()> </THINKING> <Go()>", ["<Go()>"]),
+    ("S8", "[THINK]<Stop()>[/THINK]<Go()>", ["<Go()>"]),
+    ("S8", "<think>a</think><Go()><think><Stop()></think>", ["<Go()>"]),
+    ("S9", "Actions:\nTeam A:\n<Stop()> </think> <Go()>", ["<Go()>"]),
+    ("S10", "Analysis: <Stop()>?\nActions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("S10", "I may <Stop()>.\nActions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("S10", "Actions:\n<Go()>\nAnalysis: <Stop()> is worse", ["<Go()>", "? <Stop()>"]),
+    ("S10", "Analysis: Attack_Unit(0x1) or <Attack_Unit 0x1>?\nActions:\n<Go()>", ["<Go()>"]),
+    ("S10", "Analysis: <Stop()>\nActions:", ["? <Stop()>"]),
+    ("S11", "Analysis: <MessageTo(A, 'x')>?\nCommunications:\n<MessageTo(A, 'y')>", ["to A: y"]),
+    ("S11", "Analysis: <MessageTo(A, 'x')>\nActions:\n<Go()>", ["to A: x", "<Go()>"]),
+    ("S12", "Actions:\n<Stop()>\nActions:\n<Go()>", ["<Stop()>", "<Go()>"]),
+    ("S12", "Communications:\n<MessageTo(A, 'x')>\nActions:\n<Go()>", ["to A: x", "<Go()>"]),
+    ("S12", "Actions:\n<MessageTo(A, 'x')>\n<Go()>", ["to A: x", "<Go()>"]),
+    ("S12", "Communications:\n<MessageTo(A, 'x')>\n<Go()>", ["to A: x", "<Go()>"]),
+    ("S12", "<Go()>\nCommunications:\n<MessageTo(A, 'x')>", ["<Go()>", "to A: x"]),
+    ("S13", "Team A:\n<Stop()>\nsome words\n<Go()>", ["A: <Stop()>", "A: <Go()>"]),
+    ("S13", "Actions:\nTeam A:\n<Stop()>\nActions:\n<Go()>", ["A: <Stop()>", "<Go()>"]),
+    ("S13", "Analysis:\nTeam A: is hurt\nActions:\n<Go()>", ["<Go()>"]),
+    ("S14", "Team A:\nAnalysis: x\nActions: <Stop()>\nTeam B:\nActions: <Go()>", ["A: <Stop()>", "B: <Go()>"]),
+    ("S14", "**Team A**\n\n**Actions:** <Stop()>", ["A: <Stop()>"]),
+    ("S15", "<MessageTo(A, '''it's \"on\"''')>", ["to A: it's \"on\""]),
+    ("S15", '<MessageTo(A, """go""")>', ["to A: go"]),
+    ("S15", "<MessageTo(A, ```go```)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, 'go')>", ["to A: go"]),
+    ("S15", '<MessageTo(A, "go")>', ["to A: go"]),
+    ("S15", "<MessageTo(A, `go`)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, “go”)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, ‘go’)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, „go“)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, «go»)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, »go«)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, ‹go›)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, 「go」)>", ["to A: go"]),
+    ("S15", "<MessageTo(A, “go\")>", ["to A: go"]),
+    ("S15", "<MessageTo(A, ''go'')>", ["to A: go"]),
+    ("S16", "<MessageTo(A, '''one\n  two\nActions:\nTeam B:''')>", ["to A: one\n  two\nActions:\nTeam B:"]),
+    ("S16", "<MessageTo(A, '''a) (b) > 3 [x] {y} <b>''')>", ["to A: a) (b) > 3 [x] {y} <b>"]),
+    ("S16", "<MessageTo(A, '''use <Attack_Unit(0x1)> now''')>", ["to A: use <Attack_Unit(0x1)> now"]),
+    ("S16", "<MessageTo(A, '''tell <MessageTo(B, \"x\")> so''')>", ["to A: tell <MessageTo(B, \"x\")> so"]),
+    ("S16", "<MessageTo(A, 'don't stop, I'm (here) now')>", ["to A: don't stop, I'm (here) now"]),
+    ("S16", "<MessageTo(A, '''<think>''')>\n<Go()>", ["to A: <think>", "<Go()>"]),
+    ("S17", "<MessageTo(A, hold the ramp)>", ["to A: hold the ramp"]),
+    ("S17", "<MessageTo(A, hold (now) > 3)> <Go()>", ["to A: hold (now) > 3", "<Go()>"]),
+    ("S17", "<MessageTo(A, use <Attack_Unit(0x1)> now)>", ["to A: use <Attack_Unit(0x1)> now"]),
+    ("S17", "<MessageTo(A, '''hold)>\n<MessageTo(B, '''go''')>", ["to A: hold", "to B: go"]),
+    ("S17", "<MessageTo(A, '''hold'')>\n<Go()>", ["to A: hold", "<Go()>"]),
+    ("S17", "<MessageTo(A, hold''')>", ["to A: hold"]),
+    ("S18", "<MessageTo( A , 'go' )>", ["to A: go"]),
+    ("S18", "<MessageTo('A', 'go')>", ["to A: go"]),
+    ("S18", '<MessageTo(to="A", text="go")>', ["to A: go"]),
+    ("S18", "<MessageTo(recipient: A, message: 'go')>", ["to A: go"]),
+    ("S18", "<MessageTo([Combat Group 1], 'go')>", ["to Combat Group 1: go"]),
+    ("S18", "<MessageTo(A '''go''')>", ["to A: go"]),
+    ("S18", "<MessageTo(\"A\" \"go\")>", ["to A: go"]),
+    ("S18", "<MessageTo(Channel-1: 'go')>", ["to Channel-1: go"]),
+    ("S19", "<messageto(A, 'go')> <Message_To(A, 'go')> <LISTENTO(C)>", ["to A: go", "to A: go", "hear C"]),
+    ("S20", "<ListenTo(Channel-1, 'Channel-2')>", ["hear Channel-1", "hear Channel-2"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("rule", "text", "lines"), HEADINGS + RULES)
+def test_a_reply_is_read_as_it_was_meant(rule: str, text: str, lines: list[str]) -> None:
+    assert outline(parse(text)) == lines
+
+
+def test_every_rule_of_the_documentation_has_a_row_and_every_row_a_rule() -> None:
+    documented = [
+        rule
+        for module in (protocol.speech, protocol.speech.headings, protocol.speech.arguments)
+        for rule in re.findall(r"^\| ([SHA]\d+) \|", module.__doc__ or "", re.MULTILINE)
+    ]
+    assert len(documented) == len(set(documented))
+    assert {row[0] for row in [*ARGUMENTS, *HEADINGS, *RULES]} == set(documented)
+
+
+FAULTS = [
+    ("<Attack_Unit(0x1", "<Attack_Unit(0x1", "the call is not closed: end it with )> as in <Attack_Unit(...)>"),
+    (
+        "<Attack_Unit(0x1\n<Go()>",
+        "<Attack_Unit(0x1",
+        "the call is not closed: end it with )> as in <Attack_Unit(...)>",
+    ),
+    (
+        "<Attack_Unit(0x1>",
+        "<Attack_Unit(0x1>",
+        "a bracket is not closed before '>': write <Attack_Unit(...)> and close every bracket",
+    ),
+    (
+        "<Move_Screen([20, 9)>",
+        "<Move_Screen([20, 9)>",
+        "a bracket is not closed before ')': write <Move_Screen(...)> and close every bracket",
+    ),
+    ("<Stop()", "<Stop()", "a '>' is missing behind the ')': write <Stop(...)>"),
+    (
+        "<Act(0x1,,0x2)>",
+        "<Act(0x1,,0x2)>",
+        "an argument between two commas is empty: fill it in or leave the comma out",
+    ),
+    (
+        "<Attack_Unit 0x1>",
+        "<Attack_Unit 0x1>",
+        "the name of a call is one word, its arguments stand in parentheses: write <Attack_Unit(...)>",
+    ),
+    (
+        "<Attack Unit(0x1)>",
+        "<Attack Unit(0x1)>",
+        "the name of a call is one word, its arguments stand in parentheses: write <Attack(...)>",
+    ),
+    (
+        "<Attack_Unit[0x1]>",
+        "<Attack_Unit[0x1]>",
+        "the name of a call is one word, its arguments stand in parentheses: write <Attack_Unit(...)>",
+    ),
+    ("- Attack_Unit(0x1)", "Attack_Unit(0x1)", "a call stands in angle brackets: write <Attack_Unit(...)>"),
+    ("Stop()", "Stop()", "a call stands in angle brackets: write <Stop(...)>"),
+    (
+        "<MessageTo(A)>",
+        "<MessageTo(A)>",
+        "a message needs a recipient and a text: write <MessageTo(Name, '''text''')>",
+    ),
+    (
+        "<MessageTo('''go''')>",
+        "<MessageTo('''go''')>",
+        "a message needs a recipient and a text: write <MessageTo(Name, '''text''')>",
+    ),
+    ("<MessageTo>", "<MessageTo>", "a message needs a recipient and a text: write <MessageTo(Name, '''text''')>"),
+    (
+        "<MessageTo(A, '''''')>",
+        "<MessageTo(A, '''''')>",
+        "the message has no text: write <MessageTo(Name, '''text''')>",
+    ),
+    (
+        "<MessageTo(A, '''hold the",
+        "<MessageTo(A, '''hold the",
+        "the message to A is not closed: end it with ''')>",
+    ),
+    ("MessageTo(A, 'go')", "MessageTo(A, 'go')", "a call stands in angle brackets: write <MessageTo(...)>"),
+    ("<ListenTo()>", "<ListenTo()>", "a channel is missing: write <ListenTo(Name)>"),
+    (
+        "<think>hm <Stop()>",
+        "<think>",
+        "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "words", "message"), FAULTS)
+def test_what_looks_like_a_call_and_is_none_is_reported_with_its_place(text: str, words: str, message: str) -> None:
+    prefix = "Actions:\n  Team A:\n    "
+    speech = parse(prefix + text)
+    assert [(fault.reason, fault.text, fault.message) for fault in speech.faults] == [("malformed", words, message)]
+    fault = speech.faults[0]
+    assert (prefix + text)[fault.start :].startswith(fault.text)
+    assert fault.team == "A"
+
+
+@pytest.mark.parametrize("bad", [text for text, _, _ in FAULTS if not text.startswith("<think>")])
+def test_a_fault_costs_nothing_but_itself(bad: str) -> None:
+    text = f"Actions:\nTeam A:\n<Stop()>\n{bad}\nTeam B:\n<Go()>\nCommunications:\n<MessageTo(C, '''hi''')>"
+    assert outline(parse(text))[0] == "A: <Stop()>"
+    assert outline(parse(text))[-2:] == ["B: <Go()>", "to C: hi"]
+
+
+def test_a_fault_repeats_only_the_beginning_of_its_words() -> None:
+    fault = parse("<Attack_Unit(" + "x" * 5000).faults[0]
+    assert len(fault.text) == 120
+
+
+# --- what holds for every text ----------------------------------------------------------------------
+
+FRAGMENTS = st.sampled_from(
+    [
+        "\n",
+        "\r\n",
+        " ",
+        "\t",
+        "\u3000",
+        *"<>()[]{},;:'\"`“”«»\\/|*#_-+.!?=＜＞（）🎯é",
+        "'''",
+        '"""',
+        "''')>",
+        ")>",
+        "0x",
+        "0x1f",
+        "3",
+        "-4.5",
+        "1e9",
+        "###",
+        "**",
+        "<b>",
+        "</b>",
+        "<think>",
+        "</think>",
+        "Team",
+        "team",
+        "Stalker-1",
+        "A",
+        "Actions:",
+        "Analysis:",
+        "Communications:",
+        "[THINK]",
+        "Stop",
+        "Attack_Unit",
+        "MessageTo",
+        "ListenTo",
+        "<MessageTo(A, ",
+        "<Attack_Unit(",
+        "<Move_Screen([",
+        "<Stop()>",
+    ]  # fmt: skip
+)
+TEXTS = st.one_of(st.text(), st.lists(st.one_of(FRAGMENTS, st.text(max_size=3)), max_size=60).map("".join))
+
+
+@given(TEXTS)
+def test_no_text_raises_and_all_is_where_it_is_said_to_be(text: str) -> None:
+    speech = parse(text)
+    for call in speech.calls + speech.mentions:
+        alone = parse(text[call.start : call.end])
+        assert text[call.start] in "<＜"
+        assert [(one.name, one.args) for one in alone.calls] == [(call.name, call.args)]
+        assert (alone.calls[0].start, alone.calls[0].end) == (0, call.end - call.start)
+    for fault in speech.faults:
+        assert text[fault.start :].startswith(fault.text)
+        assert fault.text
+    for message in speech.messages:
+        alone = parse(text[message.start : message.end])
+        assert alone.messages == (MessageTo(message.recipient, message.text, 0, message.end - message.start),)
+    for listen in speech.listens:
+        alone = parse(text[listen.start : listen.end])
+        assert ListenTo(listen.channel, 0, listen.end - listen.start) in alone.listens
+
+
+@given(TEXTS)
+def test_what_was_read_is_rendered_so_that_it_reads_the_same(text: str) -> None:
+    for call in parse(text).calls:
+        again = parse(render(call)).calls
+        assert [(one.name, one.args) for one in again] == [(call.name, call.args)]
+
+
+@given(TEXTS)
+def test_nothing_overlaps_and_all_is_in_order(text: str) -> None:
+    speech = parse(text)
+    spans = sorted(
+        {(item.start, item.end) for item in speech.calls + speech.mentions + speech.messages + speech.listens}
+    )
+    assert all(before[1] <= after[0] for before, after in pairwise(spans))
+    starts = [call.start for call in speech.calls]
+    assert starts == sorted(starts)
+
+
+NAMES = st.from_regex(r"[A-Z][a-z]{1,8}(_[A-Z][a-z]{1,8}){0,3}", fullmatch=True)
+TAGS = st.integers(0, 2**40).map(hex)
+POINTS = st.tuples(*[st.floats(-200, 200).map(lambda x: round(x, 3) + 0.0)] * 2)
+CALLS = st.builds(
+    Call,
+    name=NAMES,
+    args=st.lists(st.one_of(TAGS, POINTS), max_size=3).map(tuple),
+    team=st.none(),
+    start=st.just(0),
+    end=st.just(0),
+)
+PROSE = st.text(alphabet=st.characters(exclude_characters="<＜>\\:：[【(（", exclude_categories=["Cs"]), max_size=30)
+
+
+@given(st.lists(st.tuples(CALLS, PROSE), max_size=8))
+def test_rendered_calls_with_words_between_are_read_back(pieces: list[tuple[Call, str]]) -> None:
+    text = "Actions:\n" + "".join(f"{render(call)} {words}\n" for call, words in pieces)
+    assert [(call.name, call.args) for call in parse(text).calls] == [(call.name, call.args) for call, _ in pieces]
+
+
+HARD = [
+    *("<", "<A_b(", "<A_b(((((", "<A_b\\", "< ", "<a>", "</a>", "> ", "\n", "a\n", "a: ", "-", "_", "1. ", "A_b("),
+    *("<MessageTo(A, '''", '<MessageTo(A, "x', "<MessageTo(A, x", "<MessageTo(A <", "''')>", "'", "<ListenTo("),
+    *("<think>", "</think>", "Team A ", "Team A (", "Team A:\n", "Actions:\n", ". Actions: ", "<Stop()>", "a a a "),
+    *("A_b(())", "<MessageTo(A, '''<MessageTo(A, \"<MessageTo(A, “", "<A(" + "1, " * 50 + ")>"),
+]  # fmt: skip
+
+
+def seconds(text: str) -> float:
+    begin = time.process_time()
+    parse(text)
+    return time.process_time() - begin
+
+
+@pytest.mark.parametrize("prefix", ["", "<MessageTo(A, '"])
+@pytest.mark.parametrize("piece", HARD)
+def test_time_grows_with_the_length_and_no_faster(piece: str, prefix: str) -> None:
+    short = min(seconds(prefix + piece * (5_000 // len(piece))) for _ in range(3))
+    long = min(seconds(prefix + piece * (20_000 // len(piece))) for _ in range(3))
+    assert long < 8 * short + 0.02  # 4 if it is linear, 16 if it is quadratic
+
+
+@pytest.mark.parametrize(
+    "text",
+    [REPLY * 600, "".join(piece * (7_000 // len(piece)) for piece in HARD if "hink" not in piece)],
+    ids=["a reply", "everything hard"],
+)
+def test_two_hundred_kilobytes_take_less_than_a_second(text: str) -> None:
+    assert min(seconds(text[:200_000]) for _ in range(2)) < 1.0
