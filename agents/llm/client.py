@@ -108,9 +108,11 @@ class LLMError(KhalaError):
     Attributes:
         status: as in `Exchange.status`: `http 429`, `timeout`, `connection`, …
         retryable: whether the same request may succeed a little later.
+        may_be_billed: whether an answer may have been generated; False if the endpoint refused to.
     """
 
     retryable: ClassVar[bool] = False
+    may_be_billed: ClassVar[bool] = True
 
     def __init__(self, message: str, *, status: str) -> None:
         self.status = status
@@ -120,6 +122,8 @@ class LLMError(KhalaError):
 class Refused(LLMError):
     """The endpoint will never accept this request."""
 
+    may_be_billed = False
+
 
 class Unauthorized(Refused):
     """The endpoint does not accept the key."""
@@ -127,6 +131,8 @@ class Unauthorized(Refused):
 
 class OutOfMoney(LLMError):
     """The account at the endpoint has no money or no quota left."""
+
+    may_be_billed = False
 
 
 class Unavailable(LLMError):
@@ -137,6 +143,7 @@ class Unavailable(LLMError):
     """
 
     retryable = True
+    may_be_billed = False
 
     def __init__(self, message: str, *, status: str, retry_after_s: float | None = None) -> None:
         self.retry_after_s = retry_after_s

@@ -8,7 +8,7 @@ that would end after it is not begun: the error goes up at once and the agent se
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import Field
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception, stop_after_attempt
@@ -18,7 +18,9 @@ from protocol.messages import Frozen
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Callable
+    from collections.abc import Awaitable, Callable
+
+T = TypeVar("T")
 
 RETRIED_STATUSES = frozenset({408, 409, 429})
 """HTTP statuses below 500 that are tried again; all from 500 to 599 are, among them 529 ("overloaded")."""
@@ -43,10 +45,13 @@ def is_retried(status: int) -> bool:
     return status in RETRIED_STATUSES or 500 <= status <= 599
 
 
-def retrying(rule: RetryRule, *, deadline: float | None, rng: random.Random) -> AsyncRetrying:
-    """The loop for one decision: call it with the function that makes a try. It raises what the last try raised.
+async def retried(
+    attempt: Callable[[], Awaitable[T]], rule: RetryRule, *, deadline: float | None, rng: random.Random
+) -> T:
+    """What `attempt` returns, tried again when it raises an `LLMError` that may pass. Raises what the last try raised.
 
     Args:
+        attempt: makes one try.
         rule: how often, after what time.
         deadline: on the clock of the running loop; None is no deadline.
         rng: source of the jitter.
@@ -57,13 +62,14 @@ def retrying(rule: RetryRule, *, deadline: float | None, rng: random.Random) -> 
         return deadline is not None and now() + state.upcoming_sleep >= deadline
 
     attempts = stop_after_attempt(rule.tries)
-    return AsyncRetrying(
+    loop = AsyncRetrying(
         sleep=asyncio.sleep,
         retry=retry_if_exception(_may_succeed_later),
         wait=_wait(rule, rng),
         stop=lambda state: attempts(state) or is_late(state),
         reraise=True,
     )
+    return await loop(attempt)
 
 
 def _may_succeed_later(error: BaseException) -> bool:
