@@ -163,7 +163,7 @@ def _production(raw: dict[str, Any]) -> Production:
 def _unit(row: int, raw: dict[str, Any], weapon_of_id: dict[str, Weapon]) -> UnitType:
     raw = dict(raw)
     resource = raw.pop("resource", {})
-    for name in ("attributes", "planes", "collide", "cost"):
+    for name in ("attributes", "planes", "collide", "cost", "tech_alias"):
         if name in raw:
             raw[name] = tuple(raw[name])
     return UnitType(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from simulator.orders import ATTACK, HOLD_POSITION, MOVE, PATROL, SCAN_MOVE, Order, OrderKind
 from simulator.players import GameResult
+from simulator.systems.engagement import disengage, engage
 from simulator.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
@@ -146,6 +147,8 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
         owned.append(world.catalog.upgrade(upgrade_id).id)
         owned.sort()
         world.stats.apply(player, owned)
+        for slot in world.units_of(player).tolist():
+            world.refresh(slot)
 
 
 # what a unit can do ---------------------------------------------------------------------------------------------------
@@ -208,17 +211,9 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.order_target[slot] = target
     world.order_point[slot] = world.pos[slot] if order.point is None else order.point
     world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
-    keeps = order.kind is OrderKind.ATTACK_UNIT and world.target[slot] == target
-    if not keeps:
-        _interrupt(world, slot)
-    world.target[slot] = target if order.kind is OrderKind.ATTACK_UNIT else NOBODY
+    if order.kind is not OrderKind.ATTACK_UNIT or target == NOBODY or not engage(world, slot, target):
+        disengage(world, slot)
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0
-    world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
-
-
-def _interrupt(world: World, slot: int) -> None:
-    """An attack that is started and then dropped costs no cooldown (estimate, see data/mechanics.yaml)."""
-    if world.windup[slot] >= 0.0:
-        world.windup[slot] = -1.0
-        world.cooldown[slot] = 0.0
+    world.returning[slot] = world.nav_end[slot] = False
+    world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0

@@ -1,38 +1,265 @@
-"""Where ground units can walk, and which way round."""
+"""Which way round: free cells, connected parts and shortest ways over a terrain with its structures.
+
+A ``Surface`` is one grid of free cells that never changes, so it remembers the ways it has found, across games too.
+``Ground`` belongs to one game and swaps surfaces when structures come and go. Positions are world units, cells are
+flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import heapq
+import math
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.traits import Layer
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from simulator.geometry import Floats
     from simulator.maps import Grid, Terrain
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FIELDS_KEPT: Final = 2048
+SIDE_CLEARANCE: Final = 0.3
+SAMPLE_STEP: Final = 0.35
+LOOK_AHEAD: Final = (1, 2, 3, 4, 6, 8, 11, 15, 20, 26)
+NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
+
+
+class Surface:
+    """Free cells of one layer, with shortest ways to any cell."""
+
+    def __init__(self, free: Grid) -> None:
+        self.free = free
+        self.height, self.width = free.shape
+        self.flat: Bools = free.ravel()
+        padded = np.pad(free, 1)
+        # free with all eight neighbours free: a body of at most one cell touches no wall from here
+        self.open: Bools = np.logical_and.reduce(
+            [padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width] for dx, dy in ((0, 0), *NEIGHBOURS)]
+        ).ravel()
+        self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+        self._fields: dict[int, tuple[Ints, Floats]] = {}
+
+    # cells --------------------------------------------------------------------------------------------------------
+
+    def cell(self, points: Floats) -> Ints:
+        """Cells under points (..., 2); points outside count as the nearest cell inside."""
+        x = np.clip(points[..., 0].astype(np.int64), 0, self.width - 1)
+        y = np.clip(points[..., 1].astype(np.int64), 0, self.height - 1)
+        result: Ints = y * self.width + x
+        return result
+
+    def centre(self, cells: Ints) -> Floats:
+        """Centres (..., 2) of cells."""
+        return np.stack([cells % self.width + 0.5, cells // self.width + 0.5], axis=-1)
+
+    def nearest(self, point: Floats, part: int) -> int:
+        """The cell of a connected part whose centre is nearest to ``point``."""
+        members = self._members[part]
+        offset = self.centre(members) - point
+        return int(members[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
+
+    def nearest_free(self, point: Floats) -> int | None:
+        """The free cell nearest to ``point`` over all parts, or None when nothing is free."""
+        candidates = [self.nearest(point, part) for part in range(len(self._members))]
+        if not candidates:
+            return None
+        offset = self.centre(np.array(candidates)) - point
+        return candidates[int(np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2))]
+
+    # lines --------------------------------------------------------------------------------------------------------
+
+    def clear(self, start: Floats, end: Floats) -> Bools:
+        """(k,) whether a body of ordinary width gets straight from ``start`` (k, 2) to ``end`` (k, 2)."""
+        result = self._box_is_free(start, end)
+        unsure = np.flatnonzero(~result)
+        if unsure.size:
+            result[unsure] = self._sampled(start[unsure], end[unsure])
+        return result
+
+    def _box_is_free(self, start: Floats, end: Floats) -> Bools:
+        low = np.floor(np.minimum(start, end) - SIDE_CLEARANCE).astype(np.int64)
+        high = np.floor(np.maximum(start, end) + SIDE_CLEARANCE).astype(np.int64) + 1
+        limits = np.array([self.width, self.height])
+        np.clip(low, 0, limits - 1, out=low)
+        np.clip(high, 1, limits, out=high)
+        s = self._sums
+        free = s[high[:, 1], high[:, 0]] - s[low[:, 1], high[:, 0]] - s[high[:, 1], low[:, 0]] + s[low[:, 1], low[:, 0]]
+        size = high - low
+        result: Bools = np.equal(free, size[:, 0] * size[:, 1])
+        return result
+
+    def _sampled(self, start: Floats, end: Floats) -> Bools:
+        offset = end - start
+        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        count = int(float(distance.max()) / SAMPLE_STEP) + 2
+        share = np.linspace(0.0, 1.0, count)
+        scale = SIDE_CLEARANCE / np.maximum(distance, SIDE_CLEARANCE)
+        side = np.stack([-offset[:, 1] * scale, offset[:, 0] * scale], axis=1)
+        line = start[:, None, :] + offset[:, None, :] * share[None, :, None]
+        left = self.flat[self.cell(line + side[:, None, :])].all(axis=1)
+        right = self.flat[self.cell(line - side[:, None, :])].all(axis=1)
+        result: Bools = left & right
+        return result
+
+    # ways ---------------------------------------------------------------------------------------------------------
+
+    def corners(self, start: Floats, goal_cell: Ints) -> Floats:
+        """(k, 2) the farthest cell centre on the way to each goal cell that can be walked to straight.
+
+        Each start must lie in the connected part of its goal.
+        """
+        here = self.cell(start)
+        steps = np.stack([self._follow(int(c), int(g)) for c, g in zip(here, goal_cell, strict=True)])
+        ahead = self.centre(steps)  # (k, len(LOOK_AHEAD), 2)
+        k, m = steps.shape
+        seen = self.clear(np.repeat(start, m, axis=0), ahead.reshape(-1, 2)).reshape(k, m)
+        seen[:, 0] = True
+        farthest = m - 1 - np.argmax(seen[:, ::-1], axis=1)
+        result: Floats = ahead[np.arange(k), farthest]
+        return result
+
+    def distance(self, start: Floats, goal: Floats) -> float:
+        """Length of the way between two points, 0 when there is none (the API's convention)."""
+        a, b = int(self.cell(start)), int(self.cell(goal))
+        if not (self.flat[a] and self.flat[b]) or self.part[a] != self.part[b]:
+            return 0.0
+        if self.clear(start[None], goal[None])[0]:
+            return math.dist(start, goal)
+        return float(self._field(b)[1][a])
+
+    def _follow(self, cell: int, goal: int) -> Ints:
+        towards = self._field(goal)[0]
+        steps, at = [], 0
+        for wanted in LOOK_AHEAD:
+            while at < wanted:
+                cell = int(towards[cell])
+                at += 1
+            steps.append(cell)
+        return np.array(steps)
+
+    def _field(self, goal: int) -> tuple[Ints, Floats]:
+        """For every cell the next cell towards ``goal`` (itself where there is no way) and the distance."""
+        found = self._fields.get(goal)
+        if found is None:
+            if len(self._fields) >= FIELDS_KEPT:
+                self._fields.clear()
+            found = self._fields[goal] = self._dijkstra(goal)
+        return found
+
+    def _dijkstra(self, goal: int) -> tuple[Ints, Floats]:
+        distance = [math.inf] * self.flat.size
+        towards = list(range(self.flat.size))
+        distance[goal] = 0.0
+        heap = [(0.0, goal)]
+        while heap:
+            reached, cell = heapq.heappop(heap)
+            if reached > distance[cell]:
+                continue
+            for neighbour, cost in self._edges[cell]:
+                further = reached + cost
+                if further < distance[neighbour]:
+                    distance[neighbour] = further
+                    towards[neighbour] = cell
+                    heapq.heappush(heap, (further, neighbour))
+        return np.array(towards), np.array(distance)
+
+    @cached_property
+    def _edges(self) -> dict[int, list[tuple[int, float]]]:
+        """Every free cell's neighbours with their distance; diagonals need both sides free."""
+        return {cell: self._neighbours(cell) for cell in np.flatnonzero(self.flat).tolist()}
+
+    @cached_property
+    def part(self) -> Ints:
+        """(cells,) number of the connected part each cell belongs to, -1 where it is blocked."""
+        part: Ints = np.full(self.flat.size, -1)
+        number = 0
+        for cell in self._edges:
+            if part[cell] < 0:
+                part[cell], stack = number, [cell]
+                while stack:
+                    unlabelled = [n for n, _ in self._edges[stack.pop()] if part[n] < 0]
+                    part[unlabelled] = number
+                    stack += unlabelled
+                number += 1
+        return part
+
+    @cached_property
+    def _members(self) -> list[Ints]:
+        """The cells of each connected part, ascending."""
+        return [np.flatnonzero(self.part == number) for number in range(int(self.part.max()) + 1)]
+
+    def _neighbours(self, cell: int) -> list[tuple[int, float]]:
+        y, x = divmod(cell, self.width)
+        found = []
+        for dx, dy in NEIGHBOURS:
+            nx, ny = x + dx, y + dy
+            inside = 0 <= nx < self.width and 0 <= ny < self.height
+            if inside and self.free[ny, nx] and self.free[y, nx] and self.free[ny, x]:
+                found.append((ny * self.width + nx, math.sqrt(dx * dx + dy * dy)))
+        return found
+
+
+@lru_cache(maxsize=64)
+def _bare_surface(terrain: Terrain, layer: Layer) -> Surface:
+    """The surface of a terrain without structures, shared by all games on it."""
+    return Surface(_layer_grid(terrain, layer))
+
+
+def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
+    if layer is Layer.AIR:
+        grid = np.zeros_like(terrain.walk)
+        x0, y0, x1, y1 = terrain.playable
+        grid[y0:y1, x0:x1] = True
+        return grid
+    return terrain.walk if layer is Layer.WALK else terrain.glide
 
 
 class Ground:
-    """The terrain of one game with its structures on it."""
+    """The surfaces of one game: the terrain with the structures that stand on it now."""
 
     def __init__(self, terrain: Terrain) -> None:
         self.terrain = terrain
-        self.walk: Grid = terrain.walk.copy()  # (h, w) free for a ground unit's centre now
-        self._blocked: dict[int, NDArray[np.int64]] = {}
-        self.version = 0
+        self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
+        self._blocked: dict[int, Ints] = {}
+        self._surfaces: dict[Layer, Surface] = {}
 
-    def block(self, slot: int, cells: NDArray[np.int64]) -> None:
-        """Put a structure's cells ``(x, y)`` (k, 2) on the ground."""
-        if len(cells):
-            self._blocked[slot] = cells
-            self._rebuild()
+    def surface(self, layer: Layer) -> Surface:
+        """What units of a layer move on now."""
+        found = self._surfaces.get(layer)
+        if found is None:
+            if layer is Layer.AIR or not self._blocked:
+                found = _bare_surface(self.terrain, layer)
+            else:
+                found = Surface(self._with_structures(_layer_grid(self.terrain, layer)))
+            self._surfaces[layer] = found
+        return found
+
+    def block(self, slot: int, cells: Ints) -> None:
+        """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
+        height, width = self.terrain.walk.shape
+        inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
+        if inside.any():
+            self._blocked[slot] = cells[inside]
+            self._changed()
 
     def unblock(self, slot: int) -> None:
         """Take the structure of a slot away, if it has one."""
         if self._blocked.pop(slot, None) is not None:
-            self._rebuild()
+            self._changed()
 
-    def _rebuild(self) -> None:
-        self.walk = self.terrain.walk.copy()
+    def _changed(self) -> None:
+        self.walk = self._with_structures(self.terrain.walk)
+        self._surfaces.clear()
+
+    def _with_structures(self, grid: Grid) -> Grid:
+        grid = grid.copy()
         for cells in self._blocked.values():
-            self.walk[cells[:, 1], cells[:, 0]] = False
-        self.version += 1
+            grid[cells[:, 1], cells[:, 0]] = False
+        return grid

@@ -187,7 +187,7 @@ class UnitType:
     tech_requirement: int = 0
     require_attached: bool = False
     unit_alias: int = 0
-    tech_alias: int = 0
+    tech_alias: tuple[int, ...] = ()
     made_by: tuple[Production, ...] = ()
     priority: int = 0
     defensive: bool = False
@@ -218,7 +218,6 @@ class UnitType:
     score_kill: float = 0.0
     subgroup: int = 0
     not_in_melee: bool = False
-    id_4_10: int | None = None
 
     @property
     def radius_shown(self) -> float:

@@ -31,11 +31,12 @@ class _Table:
     def __len__(self) -> int:
         return len(self.source)
 
-    def append(self, **row: object) -> None:
-        """Add one row; every column must be given."""
-        for name, dtype, _ in self.columns:
-            value: NDArray[np.generic] = np.asarray(row[name], dtype=dtype)[None]
-            setattr(self, name, np.concatenate([getattr(self, name), value]))
+    def append(self, count: int, **rows: object) -> None:
+        """Add ``count`` rows; every column must be given, as one value for all or one per row."""
+        for name, dtype, width in self.columns:
+            shape = (count, width) if width else (count,)
+            new: NDArray[np.generic] = np.broadcast_to(np.asarray(rows[name], dtype=dtype), shape)
+            setattr(self, name, np.concatenate([getattr(self, name), new]))
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Drop the rows where ``mask`` is false."""

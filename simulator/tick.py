@@ -13,6 +13,7 @@ from simulator.systems import (
     collision,
     damage,
     death,
+    engagement,
     missiles,
     movement,
     navigation,
@@ -34,10 +35,11 @@ if TYPE_CHECKING:
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     orders.carry_out,  # finished orders end, queued ones begin
     acquire.choose_targets,  # whom to fight, without being told
+    engagement.measure,  # who is in reach of his target, who wants to walk where
+    weapons.fire,  # attacks start, take effect, cool down
     navigation.find_ways,  # the next corner on the way to every goal
     movement.move,  # steps, turning, acceleration
     collision.separate,  # bodies and walls
-    weapons.fire,  # attacks start, take effect, cool down
     missiles.fly,
     damage.deal_pending,  # hits that are due
     regeneration.regenerate,

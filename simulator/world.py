@@ -5,7 +5,7 @@ State and bookkeeping only. What happens in it is in ``systems``, what players a
 again with another tag, so whoever keeps a unit for longer than a loop keeps its tag.
 
 Everything that decides the future lies in ``COLUMNS``, the queues, the shots under way, the players, the random
-generator and the loop counter; ``digest`` covers exactly these.
+generator and the loop counter; ``digest`` covers exactly these. ``TRAITS`` only spare the systems a look-up.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from simulator import geometry
 from simulator.catalog import load_catalog
-from simulator.orders import Order, OrderKind
+from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
 from simulator.shots import Missiles, PendingHits
 from simulator.stats import Stats
+from simulator.traits import body_traits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,18 +65,62 @@ COLUMNS: Final[tuple[tuple[str, type, int, float], ...]] = (
     ("order_point", np.float64, 2, 0),
     ("order_origin", np.float64, 2, 0),
     ("target", np.int64, 0, NOBODY),
+    ("attacker", np.int64, 0, NOBODY),
+    ("scan_loop", np.int64, 0, 0),
     ("guard", np.float64, 2, 0),
+    ("returning", np.bool_, 0, 0),
     ("weapon", np.int64, 0, -1),
+    ("reach", np.float64, 0, 0),
+    ("reach_min", np.float64, 0, 0),
+    ("slop", np.float64, 0, 0),
+    ("aim_cos", np.float64, 0, -1),
     ("cooldown", np.float64, 0, 0),
     ("windup", np.float64, 0, -1),
     ("backswing", np.float64, 0, 0),
     ("help_loop", np.int64, 0, -(1 << 30)),
     ("nav_point", np.float64, 2, 0),
-    ("nav_goal", np.float64, 2, 0),
-    ("nav_loop", np.int64, 0, -1),
+    ("nav_loop", np.int64, 0, 0),
+    ("nav_straight", np.bool_, 0, 0),
+    ("nav_end", np.bool_, 0, 0),
     ("blocked", np.int64, 0, 0),
     ("detour", np.int64, 0, 0),
     ("detour_loop", np.int64, 0, 0),
+)
+# What follows from type, owner and upgrades, or is written anew in every loop before it is read.
+TRAITS: Final[tuple[tuple[str, type, int, float], ...]] = (
+    ("radius", np.float64, 0, 0),
+    ("separation", np.float64, 0, 0),
+    ("clearance", np.float64, 0, 0),
+    ("layer", np.int64, 0, 0),
+    ("layer_bits", np.int64, 0, 0),
+    ("plane_bits", np.int64, 0, 0),
+    ("step_max", np.float64, 0, 0),
+    ("step_gain", np.float64, 0, 0),
+    ("turn_cos", np.float64, 0, 0),
+    ("turn_sin", np.float64, 0, 0),
+    ("priority", np.float64, 0, 0),
+    ("ground_weapon", np.int64, 0, -1),
+    ("air_weapon", np.int64, 0, -1),
+    ("ground_scan", np.float64, 0, 0),
+    ("air_scan", np.float64, 0, 0),
+    ("acquires", np.bool_, 0, 0),
+    ("targetable", np.bool_, 0, 0),
+    ("gap", np.float64, 0, 0),
+    ("in_reach", np.bool_, 0, 0),
+    ("wants", np.bool_, 0, 0),
+    ("goal", np.float64, 2, 0),
+    ("stop_at", np.float64, 0, 0),
+    ("intended", np.float64, 2, 0),
+    ("creep_factor", np.float64, 0, 1),
+    ("life_max", np.float64, 0, 0),
+    ("life_regen", np.float64, 0, 0),
+    ("life_delay", np.float64, 0, 0),
+    ("shields_max", np.float64, 0, 0),
+    ("shield_regen", np.float64, 0, 0),
+    ("shield_delay", np.float64, 0, 0),
+    ("energy_max", np.float64, 0, 0),
+    ("energy_regen", np.float64, 0, 0),
+    ("walled", np.bool_, 0, 0),
 )
 
 
@@ -118,18 +163,60 @@ class World:
     order_point: Floats  # (capacity, 2)
     order_origin: Floats  # (capacity, 2) the other end of a patrol
     target: Ints  # (capacity,) slot the weapon is engaged with, or NOBODY
-    guard: Floats  # (capacity, 2) where an idle unit stood when it engaged; an attack-move's leash point
-    weapon: Ints  # (capacity,) row of the weapon in use, or -1
+    attacker: Ints  # (capacity,) slot that damaged it last, or NOBODY
+    scan_loop: Ints  # (capacity,) loop from which it looks for a target again
+    guard: Floats  # (capacity, 2) where an idle unit stood when it engaged somebody by itself
+    returning: Bools  # (capacity,) an idle unit that will go back there after the fight
+    weapon: Ints  # (capacity,) row of the weapon for that target, or -1
+    reach: Floats  # (capacity,) its range, edge to edge
+    reach_min: Floats  # (capacity,) and the range below which it can't fire
+    slop: Floats  # (capacity,) how far beyond its range a started attack still takes effect
+    aim_cos: Floats  # (capacity,) cosine of the largest angle between body and target, -1 for turrets
     cooldown: Floats  # (capacity,) loops until the next attack may start
     windup: Floats  # (capacity,) loops until the started attack takes effect, -1 when none is started
     backswing: Floats  # (capacity,) loops the body stays in the finished attack unless ordered away
     help_loop: Ints  # (capacity,) last loop this unit called for help
     nav_point: Floats  # (capacity, 2) next corner of the path
-    nav_goal: Floats  # (capacity, 2) goal the path was made for
     nav_loop: Ints  # (capacity,) loop at which the path is looked over again
+    nav_straight: Bools  # (capacity,) the straight line to the goal is free
+    nav_end: Bools  # (capacity,) no way leads nearer to the goal
     blocked: Ints  # (capacity,) loops without progress in a row
     detour: Ints  # (capacity,) side of a detour, -1 right, 1 left, 0 none
     detour_loop: Ints  # (capacity,) loop at which the detour ends
+
+    radius: Floats  # (capacity,) body for ranges
+    separation: Floats  # (capacity,) body for pushing
+    clearance: Floats  # (capacity,) body for cliffs
+    layer: Ints  # (capacity,) Layer the unit moves on
+    layer_bits: Ints  # (capacity,) stats.LAYERS it collides in
+    plane_bits: Ints  # (capacity,) planes on which it can be hit
+    step_max: Floats  # (capacity,) world units per loop
+    step_gain: Floats  # (capacity,) world units per loop, per loop
+    turn_cos: Floats  # (capacity,) cosine and
+    turn_sin: Floats  # (capacity,) sine of the largest turn per loop
+    priority: Floats  # (capacity,) as a target
+    ground_weapon: Ints  # (capacity,) row of the weapon against ground units, or -1
+    air_weapon: Ints  # (capacity,)
+    ground_scan: Floats  # (capacity,) how far it looks for ground targets, edge to edge, -1 without a weapon
+    air_scan: Floats  # (capacity,)
+    acquires: Bools  # (capacity,) it picks fights by itself
+    targetable: Bools  # (capacity,) it may be a target at all
+    gap: Floats  # (capacity,) distance to its target this loop, edge to edge
+    in_reach: Bools  # (capacity,) its target is within the weapon's reach this loop
+    wants: Bools  # (capacity,) it wants to move this loop
+    goal: Floats  # (capacity, 2) and where to
+    stop_at: Floats  # (capacity,) distance from the goal, centre to centre, at which it stops
+    intended: Floats  # (capacity, 2) the step it takes this loop if nobody is in the way
+    creep_factor: Floats  # (capacity,) speed on creep, times the ordinary one
+    life_max: Floats  # (capacity,)
+    life_regen: Floats  # (capacity,) per loop
+    life_delay: Floats  # (capacity,) loops without damage before it begins
+    shields_max: Floats  # (capacity,)
+    shield_regen: Floats  # (capacity,) per loop
+    shield_delay: Floats  # (capacity,)
+    energy_max: Floats  # (capacity,)
+    energy_regen: Floats  # (capacity,) per loop
+    walled: Bools  # (capacity,) it stands on a footprint, which blocks the ground for others
 
     def __init__(
         self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
@@ -148,6 +235,9 @@ class World:
         width, height = game_map.terrain.size
         never = 0 if game_map.scenario.visibility.black_mask else 1
         self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
+        self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
+        self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
+        self.looked_at = -1  # the population that ``visible`` was written for
         self.missiles = Missiles()
         self.pending = PendingHits()
         self.deaths: list[Death] = []
@@ -157,7 +247,12 @@ class World:
         self.capacity = 0
         self.live: Ints = np.zeros(0, dtype=np.int64)
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
-        self._top = 1  # slot 0 stays unused, as in the game
+        self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
+        self.settled = -1  # the population among which no body touched another when all last stood still
+        self.pairs: tuple[Floats, Floats] | None = None  # collision.pair_table of this population
+        self.creep_counts = bool(game_map.terrain.creep.any())
+        self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
+        self.population = 0  # counts births and deaths, for what is worth remembering between them
         self._grow(64)
 
     # units --------------------------------------------------------------------------------------------------------
@@ -165,13 +260,13 @@ class World:
     def spawn(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float = 4.7124) -> int:
         """Put a complete unit into the world, exactly at ``point``; returns its slot."""
         slot = self._free_slot()
-        for name, _, _, empty in COLUMNS:
+        for name, _, _, empty in COLUMNS + TRAITS:
             getattr(self, name)[slot] = empty
         self.alive[slot] = True
         self.tag[slot] = TAG_BASE | slot << INDEX_SHIFT | int(self._recycles[slot])
         self.type[slot] = unit.row
         self.owner[slot] = owner
-        self.pos[slot] = self.nav_goal[slot] = self.nav_point[slot] = self.guard[slot] = point
+        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
         self.heading[slot] = geometry.heading(facing)
         self.life[slot] = self.stats.life_max[owner, unit.row] if unit.life_start is None else unit.life_start
         self.shields[slot] = self.stats.shields_max[owner, unit.row]
@@ -179,22 +274,27 @@ class World:
         self.cloaked[slot], self.burrowed[slot] = unit.cloaked, unit.burrowed
         self.born_loop[slot] = self.loop
         self.queue[slot] = []
-        self.live = np.flatnonzero(self.alive)
+        self.refresh(slot)
         self.ground.block(slot, self.footprint_cells(slot))
+        self._population_changed()
         return slot
 
     def remove(self, slot: int) -> None:
         """Take a unit out of the world; every reference to its slot becomes NOBODY."""
-        self.alive[slot] = False
-        self.tag[slot] = NO_TAG
+        for name, _, _, empty in COLUMNS + TRAITS:
+            getattr(self, name)[slot] = empty
         self._recycles[slot] += 1
         self.queue[slot] = []
-        self.live = np.flatnonzero(self.alive)
-        self.target[self.target == slot] = NOBODY
-        self.order_target[self.order_target == slot] = NOBODY
+        for column in (self.target, self.order_target, self.attacker):
+            column[column == slot] = NOBODY
         self.missiles.forget(slot)
         self.pending.forget(slot)
         self.ground.unblock(slot)
+        self._population_changed()
+
+    def refresh(self, slot: int) -> None:
+        """Write the traits of a slot from its type, its owner and the owner's upgrades."""
+        body_traits(self, slot)
 
     def slot_of(self, tag: int) -> int:
         """The slot of a living unit with this tag, or NOBODY."""
@@ -242,7 +342,8 @@ class World:
         """
         kind = OrderKind(int(self.order_kind[slot]))
         if kind is OrderKind.IDLE:
-            return []
+            fights = self.target[slot] != NOBODY
+            return [Order(OrderKind.ATTACK_UNIT, ATTACK, self.tag_of(int(self.target[slot])))] if fights else []
         x, y = self.order_point[slot]
         ox, oy = self.order_origin[slot]
         targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW)
@@ -282,30 +383,38 @@ class World:
         sha = hashlib.sha256(self.map.digest.encode())
         sha.update(repr((self.loop, self.ended, self.rng.bit_generator.state)).encode())
         for name, _, _, _ in COLUMNS:
-            sha.update(np.ascontiguousarray(getattr(self, name)[: self._top]).tobytes())
-        sha.update(self._recycles[: self._top].tobytes())
+            sha.update(np.ascontiguousarray(getattr(self, name)[: self.top]).tobytes())
+        sha.update(self._recycles[: self.top].tobytes())
         sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
         sha.update(repr([player.counters() for player in self.players]).encode())
         sha.update(self.missiles.content() + self.pending.content())
         sha.update(self.visibility.tobytes())
         return sha.hexdigest()
 
+    def _population_changed(self) -> None:
+        self.live = np.flatnonzero(self.alive)
+        self.population += 1
+        self.pairs = None
+
     def _free_slot(self) -> int:
-        free = np.flatnonzero(~self.alive[1 : self._top])
+        free = np.flatnonzero(~self.alive[1 : self.top])
         if free.size:
             return int(free[0]) + 1
-        if self._top == self.capacity:
+        if self.top == self.capacity:
             self._grow(self.capacity * 2)
-        self._top += 1
-        return self._top - 1
+        self.top += 1
+        return self.top - 1
 
     def _grow(self, capacity: int) -> None:
-        for name, dtype, width, empty in COLUMNS:
+        for name, dtype, width, empty in COLUMNS + TRAITS:
             shape: Any = (capacity, width) if width else capacity
             column = np.full(shape, empty, dtype=dtype)
             if self.capacity:
                 column[: self.capacity] = getattr(self, name)
             setattr(self, name, column)
+        visible = np.zeros((len(self.players), capacity), dtype=np.bool_)
+        visible[:, : self.capacity] = self.visible
+        self.visible = visible
         recycles = np.zeros(capacity, dtype=np.int64)
         recycles[: self.capacity] = self._recycles
         self._recycles = recycles

@@ -1,0 +1,67 @@
+"""Constants of the rules that belong to no unit, with where each is from.
+
+``data/mechanics.yaml`` holds every one with its unit, its source and, where the source is an estimate, the reasoning.
+The rules read ``MECHANICS``; whoever writes a table of estimates reads ``entries``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any, Final, Literal
+
+import yaml
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One constant as the data file tells it."""
+
+    name: str
+    value: float | str | bool
+    unit: str
+    source: Literal["catalog", "replay", "estimate"]
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanics:
+    """The numbers, by name; units and sources are in the data file."""
+
+    damage_min: float
+    leash_radius: float
+    help_radius: float
+    help_period: int
+    scan_period: int
+    switch_gain: float
+    guard_slack: float
+    arrival_radius: float
+    path_period: int
+    body_clearance: float
+    chase_slack: float
+    push_iterations: int
+    push_limit: float
+    push_firm: float
+    push_idle: float
+    blocked_share: float
+    detour_after: int
+    detour_loops: int
+    crowd_share: float
+    vision_period: int
+    high_ground_step: float
+
+
+def entries() -> tuple[Entry, ...]:
+    """All constants of the data file, in its order; some are choices of a rule and have no number."""
+    text = (resources.files("simulator.data") / "mechanics.yaml").read_text(encoding="utf-8")
+    raw: dict[str, dict[str, Any]] = yaml.safe_load(text)
+    return tuple(Entry(name=name, **fields) for name, fields in raw.items())
+
+
+def _load() -> Mechanics:
+    values: dict[str, Any] = {entry.name: entry.value for entry in entries()}
+    return Mechanics(**{field.name: values[field.name] for field in dataclasses.fields(Mechanics)})
+
+
+MECHANICS: Final = _load()

@@ -1,0 +1,160 @@
+"""Acquiring: whom a unit fights without being told, and when it gives up.
+
+Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk look at nobody. The
+best target is the one with the highest attack priority, then the nearest. An idle unit remembers where it stood and
+goes back there; one that is attacked from farther than it looks turns on the attacker, and so do its idle friends.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.mechanics import MECHANICS
+from simulator.orders import OrderKind
+from simulator.stats import AIR_PLANE, GROUND_PLANE
+from simulator.systems.engagement import disengage, engage
+from simulator.world import NOBODY
+
+if TYPE_CHECKING:
+    from simulator.geometry import Floats
+    from simulator.world import Bools, Ints, World
+
+LOOKS_AROUND = np.zeros(len(OrderKind), dtype=np.bool_)
+LOOKS_AROUND[[OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.HOLD, OrderKind.PATROL]] = True
+PRIORITY_WEIGHT = 1000.0
+OUT_OF_SIGHT = -1e9
+
+
+def choose_targets(world: World) -> None:
+    """Answer attacks, give up lost causes, and let whoever is due look for a target."""
+    if world.hurt:
+        _answer(world)
+    n = world.top
+    due = world.acquires[:n] & (world.scan_loop[:n] <= world.loop) & LOOKS_AROUND[world.order_kind[:n]]
+    due &= ~world.in_reach[:n] & (world.windup[:n] < 0.0)
+    if not due.any():
+        return
+    _give_up(world, due)
+    period = MECHANICS.scan_period
+    world.scan_loop[:n][due] = world.loop + period - world.loop % period
+    for player in range(1, len(world.players)):
+        seekers = np.flatnonzero(due & (world.owner[:n] == player))
+        if seekers.size:
+            _seek(world, player, seekers)
+
+
+def _give_up(world: World, due: Bools) -> None:
+    """Let go of targets that went out of sight, can't be reached by one who holds, or led too far away."""
+    n = world.top
+    chasing = np.flatnonzero(due & (world.target[:n] != NOBODY))
+    if not chasing.size:
+        return
+    offset = world.pos[chasing] - world.guard[chasing]
+    idle = world.order_kind[chasing] == OrderKind.IDLE
+    too_far = idle & (offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_radius**2)
+    lost = too_far | (world.order_kind[chasing] == OrderKind.HOLD) | ~_seen(world, chasing)
+    for slot in chasing[lost].tolist():
+        disengage(world, slot)
+
+
+def _seen(world: World, slots: Ints) -> Bools:
+    """Whether each unit's owner sees its target."""
+    target = world.target[slots]
+    seen: Bools = world.visible[world.owner[slots], target]
+    return seen
+
+
+def _seek(world: World, player: int, seekers: Ints) -> None:
+    """Give each seeker of a player the best target it can see, if that is better than what it has."""
+    foes = world.live
+    foes = foes[(world.owner[foes] != player) & (world.owner[foes] != 0)]
+    foes = foes[world.targetable[foes] & world.visible[player, foes]]
+    if not foes.size:
+        return
+    gap, worth = _worth(world, seekers, foes)
+    best = np.argmax(worth, axis=1)
+    rows = np.arange(len(seekers))
+    found = worth[rows, best] > OUT_OF_SIGHT
+    now = world.target[seekers]
+    closer = world.gap[seekers] - gap[rows, best]
+    hand = _reaches(world, seekers, foes[best], gap[rows, best])
+    better = found & ((now == NOBODY) | hand | (closer > MECHANICS.switch_gain)) & (foes[best] != now)
+    for i in np.flatnonzero(better).tolist():
+        _take(world, int(seekers[i]), int(foes[best[i]]))
+
+
+def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
+    """(k, m) edge distances, and the worth of every foe to every seeker."""
+    at, there = world.pos[seekers], world.pos[foes]
+    dx = at[:, 0, None] - there[:, 0]
+    dy = at[:, 1, None] - there[:, 1]
+    gap = np.sqrt(dx * dx + dy * dy) - world.radius[seekers, None] - world.radius[foes]
+    planes = world.plane_bits[foes]
+    sight = np.maximum(
+        np.where(planes & GROUND_PLANE, world.ground_scan[seekers, None], -1.0),
+        np.where(planes & AIR_PLANE, world.air_scan[seekers, None], -1.0),
+    )
+    holding = world.order_kind[seekers] == OrderKind.HOLD
+    if holding.any():
+        sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
+    worth = np.where(gap <= sight, world.priority[foes] * PRIORITY_WEIGHT - gap, OUT_OF_SIGHT)
+    return gap, worth
+
+
+def _longest_reach(world: World, slots: Ints) -> Floats:
+    owner = world.owner[slots]
+    ground, air = world.ground_weapon[slots], world.air_weapon[slots]
+    reach: Floats = np.maximum(
+        np.where(ground >= 0, world.stats.range[owner, ground], 0.0),
+        np.where(air >= 0, world.stats.range[owner, air], 0.0),
+    )
+    return reach
+
+
+def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
+    """Whether each seeker could fire at its foe from where it stands."""
+    owner = world.owner[seekers]
+    on_ground = (world.plane_bits[foes] & GROUND_PLANE != 0) & (world.ground_weapon[seekers] >= 0)
+    weapon = np.where(on_ground, world.ground_weapon[seekers], world.air_weapon[seekers])
+    reaches: Bools = gap <= world.stats.range[owner, weapon]
+    return reaches
+
+
+def _take(world: World, slot: int, target: int) -> None:
+    """Start a fight by the unit's own choice; an idle one remembers where it stood."""
+    idle = world.order_kind[slot] == OrderKind.IDLE
+    if idle and world.target[slot] == NOBODY and not world.returning[slot]:
+        world.guard[slot] = world.pos[slot]
+        world.returning[slot] = True
+    engage(world, slot, target)
+
+
+def _answer(world: World) -> None:
+    """Units under attack turn on their attackers and call their idle friends."""
+    hurt, world.hurt = world.hurt, []
+    for victim, attacker in hurt:
+        if not (world.alive[victim] and world.alive[attacker]) or world.owner[victim] == world.owner[attacker]:
+            continue
+        helpers = [victim]
+        if world.loop - world.help_loop[victim] >= MECHANICS.help_period:
+            world.help_loop[victim] = world.loop
+            helpers += _friends_near(world, victim)
+        for slot in helpers:
+            if _free_to_answer(world, slot) and world.visible[world.owner[slot], attacker]:
+                _take(world, slot, attacker)
+
+
+def _friends_near(world: World, victim: int) -> list[int]:
+    friends = world.units_of(int(world.owner[victim]))
+    offset = world.pos[friends] - world.pos[victim]
+    near = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= MECHANICS.help_radius**2
+    found: list[int] = friends[near & (friends != victim)].tolist()
+    return found
+
+
+def _free_to_answer(world: World, slot: int) -> bool:
+    kind = int(world.order_kind[slot])
+    roams = kind in (OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.PATROL)
+    return bool(roams and world.acquires[slot] and world.target[slot] == NOBODY and world.step_max[slot] > 0.0)

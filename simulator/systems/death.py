@@ -1,0 +1,59 @@
+"""Death: units without life leave the world, and both players' scores remember them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.world import NOBODY, Death
+
+if TYPE_CHECKING:
+    from simulator.players import Spent
+    from simulator.records import UnitType
+    from simulator.world import World
+
+NO_KILLER = -1
+
+
+def bury(world: World) -> None:
+    """Remove every unit whose life is used up, in the order of slots."""
+    slots = world.live
+    dead = slots[world.life[slots] <= 0.0]
+    for slot in dead.tolist():
+        attacker = int(world.attacker[slot])
+        killer = int(world.owner[attacker]) if attacker != NOBODY else NO_KILLER
+        owner, unit = int(world.owner[slot]), world.unit_type(slot)
+        world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, killer))
+        _count(world, unit, owner, killer)
+        world.remove(slot)
+
+
+def _count(world: World, unit: UnitType, owner: int, killer: int) -> None:
+    """Enter a death into the scores of the loser and of the killer, if it was an enemy."""
+    if unit.no_score:
+        return
+    lost = world.players[owner].score
+    _add(lost.lost, unit)
+    if unit.structure:
+        lost.lost_structures += 1
+    else:
+        lost.lost_units += 1
+    if killer in (NO_KILLER, owner):
+        return
+    won = world.players[killer].score
+    _add(won.killed, unit)
+    if unit.structure:
+        won.killed_structures += 1
+        won.killed_value_structures += unit.score_kill
+    else:
+        won.killed_units += 1
+        won.killed_value_units += unit.score_kill
+
+
+def _add(spent: Spent, unit: UnitType) -> None:
+    """Add a unit's price to its category: workers and town halls are economy, other structures technology."""
+    if unit.worker or (unit.structure and unit.provides > 0 and "structure" in unit.attributes):
+        category = spent.economy
+    else:
+        category = spent.technology if unit.structure and not unit.weapons else spent.army
+    category[0] += unit.cost[0]
+    category[1] += unit.cost[1]

@@ -1,0 +1,68 @@
+"""Navigation: the next corner on every walker's way, round cliffs and structures.
+
+A unit whose straight line is free heads for its goal; the others follow the shortest way over the cells, cut short to
+the farthest corner they can walk to straight. Bodies in the way are ``collision``'s matter.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.mechanics import MECHANICS
+from simulator.traits import Layer
+
+if TYPE_CHECKING:
+    from simulator.world import Ints, World
+
+CORNER_REACHED = 0.4
+
+
+def find_ways(world: World) -> None:
+    """Write ``nav_point`` of every unit that wants to move; ways are looked over every few loops."""
+    n = world.top
+    np.copyto(world.nav_point[:n], world.goal[:n], where=world.nav_straight[:n, None])
+    walkers = np.flatnonzero(world.wants[:n])
+    if not walkers.size:
+        return
+    due = world.nav_loop[walkers] <= world.loop
+    crooked = ~world.nav_straight[walkers] & ~due
+    if crooked.any():
+        offset = world.nav_point[walkers] - world.pos[walkers]
+        due |= crooked & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
+    if not due.any():
+        return
+    walkers = walkers[due]
+    layers = world.layer[walkers]
+    for layer in Layer:
+        on_layer = walkers[layers == layer]
+        if on_layer.size:
+            _look_over(world, on_layer, layer)
+    # spread over the loops, so that a crowd told at once does not look at once for ever
+    world.nav_loop[walkers] = world.loop + MECHANICS.path_period - walkers % 2
+
+
+def _look_over(world: World, slots: Ints, layer: Layer) -> None:
+    goal = world.goal[slots]
+    surface = world.ground.surface(layer)
+    straight = np.ones(len(slots), dtype=np.bool_) if layer is Layer.AIR else surface.clear(world.pos[slots], goal)
+    world.nav_straight[slots] = straight
+    world.nav_end[slots] = False
+    world.nav_point[slots] = goal
+    crooked = slots[~straight]
+    if not crooked.size:
+        return
+    start = world.pos[crooked]
+    cells = surface.cell(world.goal[crooked])
+    parts = surface.part[surface.cell(start)]
+    usable = parts >= 0
+    for i in np.flatnonzero(usable & (surface.part[cells] != parts)).tolist():
+        cells[i] = surface.nearest(world.goal[crooked[i]], int(parts[i]))
+    crooked, start, cells = crooked[usable], start[usable], cells[usable]
+    if crooked.size:
+        centre = surface.centre(cells)
+        at_goal = surface.cell(start) == cells
+        world.nav_point[crooked] = np.where(at_goal[:, None], centre, surface.corners(start, cells))
+        offset = centre - start
+        world.nav_end[crooked] = at_goal & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)

@@ -1,0 +1,164 @@
+"""Weapons: attacks start when the target is in reach and the weapon is ready, and take effect at the damage point.
+
+The time from one start to the next is the period with a random delay; fractions of a loop carry over while the fight
+goes on, so that the mean is exact. What the attack then does, at once, later or by missile, is laid into ``pending``
+and ``missiles``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.stats import GROUND_PLANE, INSTANT_ACCELERATION_N
+from simulator.world import NOBODY
+
+if TYPE_CHECKING:
+    from simulator.geometry import Floats
+    from simulator.records import Hit, Weapon
+    from simulator.world import Bools, Ints, World
+
+NOT_STARTED = -1.0
+
+
+def fire(world: World) -> None:
+    """Start attacks, let those whose damage point has come take effect, and count down."""
+    n = world.top
+    cooldown, windup, backswing = world.cooldown[:n], world.windup[:n], world.backswing[:n]
+    counting = cooldown > 0.0
+    cooldown -= counting
+    np.maximum(backswing - 1.0, 0.0, out=backswing)
+    fighting = world.target[:n] != NOBODY
+    if not fighting.any():
+        np.maximum(cooldown, 0.0, out=cooldown)
+        return
+    started = windup >= 0.0
+    windup -= started
+    _drop_lost(world, started & fighting & ~world.in_reach[:n])
+    ready = fighting & world.in_reach[:n] & (cooldown <= 0.0) & ~started
+    starting = np.flatnonzero(ready)
+    if starting.size:
+        starting = starting[_aimed(world, starting)]
+        _start(world, starting)
+    idle = cooldown < 0.0
+    if idle.any():
+        cooldown[idle] = 0.0
+    effective = np.flatnonzero((windup <= 0.0) & (windup > NOT_STARTED))
+    if effective.size:
+        _take_effect(world, effective)
+
+
+def _drop_lost(world: World, lost: Bools) -> None:
+    """Attacks whose target got away before the damage point leave no cooldown."""
+    if lost.any():
+        world.windup[: world.top][lost] = NOT_STARTED
+        world.cooldown[: world.top][lost] = 0.0
+
+
+def _aimed(world: World, slots: Ints) -> Bools:
+    """Whether each unit faces its target within its weapon's arc; turrets always do."""
+    needs = world.aim_cos[slots] > -1.0
+    if not needs.any():
+        return ~needs
+    offset = world.pos[world.target[slots]] - world.pos[slots]
+    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+    along = offset[:, 0] * world.heading[slots, 0] + offset[:, 1] * world.heading[slots, 1]
+    aimed: Bools = ~needs | (along >= world.aim_cos[slots] * distance)
+    return aimed
+
+
+def _start(world: World, slots: Ints) -> None:
+    """Begin attacks: the cooldown of the next one runs from here."""
+    for slot in slots.tolist():
+        row = int(world.weapon[slot])
+        weapon = world.catalog.weapons[row]
+        low, high = weapon.jitter_loops
+        delay = low + (high - low) * world.rng.random()
+        world.cooldown[slot] += world.stats.period[world.owner[slot], row] + delay
+        world.windup[slot] = weapon.damage_point_loops
+
+
+def _take_effect(world: World, slots: Ints) -> None:
+    """Lay the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
+    rows = world.weapon[slots]
+    owner, target = world.owner[slots], world.target[slots]
+    moment = world.loop + world.windup[slots]
+    for row in dict.fromkeys(rows.tolist()):
+        weapon = world.catalog.weapons[row]
+        mine = rows == row
+        for index, hit in enumerate(weapon.hits):
+            chosen = mine if not hit.when else mine & _branch(world, hit, weapon, target)
+            count = int(chosen.sum())
+            if count and not is_unmodelled(hit):
+                world.pending.append(
+                    count,
+                    source=slots[chosen],
+                    owner=owner[chosen],
+                    target=target[chosen],
+                    weapon=row,
+                    hit=index,
+                    due=moment[chosen] + first_delay(hit),
+                    single=False,
+                    goal=world.pos[target[chosen]],
+                    start=world.pos[slots[chosen]],
+                )
+        world.backswing[slots[mine]] = weapon.backswing_loops
+    world.windup[slots] = NOT_STARTED
+
+
+def first_delay(hit: Hit) -> float:
+    """Loops from the damage point until the hit begins."""
+    return hit.sweep.points[0][0] if hit.sweep is not None else hit.delay_loops
+
+
+def is_unmodelled(hit: Hit) -> bool:
+    """Whether the rules do not carry out this hit yet: bounces and second circles."""
+    return hit.bounce or hit.search is not None
+
+
+def _branch(world: World, hit: Hit, weapon: Weapon, target: Ints) -> Bools:
+    """(k,) whether the game's switch takes the branch ``hit`` stands in; unknown conditions never hold."""
+    if hit.when == "else":
+        others = [h.when for h in weapon.hits if h.when not in ("", "else")]
+        taken = np.zeros(len(target), dtype=np.bool_)
+        for name in others:
+            taken |= _condition(world, name, target)
+        return ~taken
+    return _condition(world, hit.when, target)
+
+
+def _condition(world: World, name: str, target: Ints) -> Bools:
+    if name == "GroundUnitFilter":
+        on_ground: Bools = (world.plane_bits[target] & GROUND_PLANE) != 0
+        return on_ground
+    if name == "IsStructure":
+        walled: Bools = world.walled[target]
+        return walled
+    return np.zeros(len(target), dtype=np.bool_)
+
+
+def launch(world: World, shot: int) -> None:
+    """Send the missile of a pending hit on its way."""
+    pending = world.pending
+    hit = world.catalog.weapons[int(pending.weapon[shot])].hits[int(pending.hit[shot])]
+    gain_n = hit.missile_acceleration_n
+    top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
+    instant = gain_n is None or gain_n >= INSTANT_ACCELERATION_N
+    gain = np.inf if instant or gain_n is None else gain_n / LOOPS_PER_NORMAL_SECOND**2
+    start: Floats = pending.start[shot]
+    world.missiles.append(
+        1,
+        source=pending.source[shot],
+        owner=pending.owner[shot],
+        target=pending.target[shot],
+        weapon=pending.weapon[shot],
+        hit=pending.hit[shot],
+        pos=start,
+        start=start,
+        goal=pending.goal[shot],
+        step=top if instant else 0.0,
+        step_max=top,
+        step_gain=gain,
+    )
