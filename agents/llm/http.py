@@ -17,11 +17,12 @@ from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from functools import cache
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit, urlunsplit
+from urllib.parse import urlsplit
 
 import httpx
 from pydantic_core import from_json
 
+from agents.llm.address import checked_address
 from agents.llm.client import (
     LLMError,
     MalformedCompletion,
@@ -34,7 +35,6 @@ from agents.llm.client import (
 )
 from agents.llm.retry import is_retried
 from agents.secret import scrub
-from protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     import ssl
@@ -121,30 +121,6 @@ class HttpEndpoint:
                 trust_env=urlsplit(self.address).hostname not in _LOOPBACK,  # a proxy cannot know our loopback
             )
         return self._client
-
-
-def checked_address(base_url: str) -> str:
-    """`base_url` without a slash at its end.
-
-    Raises:
-        ConfigError: it is none, or holds a user name, a password or a query, which would be seen in every recording.
-    """
-    try:
-        parts = urlsplit(base_url)
-        _ = parts.port
-    except ValueError:
-        raise ConfigError("this is no URL", field="base_url") from None
-    if parts.scheme not in {"http", "https"} or not parts.hostname:
-        raise ConfigError(
-            f"'{scrub(base_url)}' is no http:// or https:// URL" if "@" not in base_url else "this is no URL",
-            field="base_url",
-        )
-    if "@" in parts.netloc or parts.query or parts.fragment:
-        raise ConfigError(
-            "credentials and queries do not belong into a base URL: name a variable with the key in api_key_env",
-            field="base_url",
-        )
-    return urlunsplit((parts.scheme, parts.netloc, parts.path.rstrip("/"), "", ""))
 
 
 def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes) -> LLMError:

@@ -23,8 +23,8 @@ _SCREEN = re.compile(r"    Screen on the map: x (-?[\d.]+) to (-?[\d.]+), y (-?[
 _VALID = re.compile(r"^    Team (\S+): (.*)", re.MULTILINE)
 _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d+) actions? per team")
-_WRITE_TO = re.compile(r"    You can write to: (.*)")
-_NAME = re.compile(r"(?:^|, )([A-Za-z0-9][\w.-]*)(?: \([^()]*\))?")
+_WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTILINE)
+_NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
 
 
 class Unit(NamedTuple):

@@ -1,0 +1,144 @@
+"""Configuration → clients and policies: the place of this package that knows all its parts.
+
+What is shared within a process is shared here: the limits of an endpoint by all agents that use the same model
+file, the budget by all. Each agent has a client, and so a connection, of its own.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from agents.config import ModelConfig, WorkerSpec, load_model
+from agents.llm.anthropic import Anthropic
+from agents.llm.limits import Budget, Limits
+from agents.llm.openai_compatible import OpenAICompatible
+from agents.llm.profiles import PROFILES
+from agents.llm_policy import LLMPolicy
+from agents.memory import LastSteps
+from agents.policy import FunctionPolicy, Policy
+from agents.scripted.policies import Silent
+from agents.secret import read_key
+from protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from agents.llm.client import LLMClient
+
+
+def client_for(config: ModelConfig) -> LLMClient:
+    """A client for one agent.
+
+    Raises:
+        ConfigError: the key that the model file names is not there.
+    """
+    key = read_key(config.api_key_env) if config.api_key_env else None
+    if config.profile == "anthropic":
+        return Anthropic(
+            model=config.model,
+            prices=config.prices,
+            key=key,
+            base_url=config.base_url,
+            max_tokens=config.max_tokens or 1024,
+            temperature=config.temperature,
+            extra=config.extra,
+        )
+    return OpenAICompatible(
+        PROFILES[config.profile],
+        model=config.model,
+        base_url=config.base_url,
+        prices=config.prices,
+        key=key,
+        max_tokens=config.max_tokens,
+        temperature=config.temperature,
+        seed=config.seed,
+        extra=config.extra,
+    )
+
+
+class Workshop:
+    """Makes the policies of one process.
+
+    Args:
+        budget_usd: what all agents of the process together may spend.
+        overrides: fields of every model file that are given on the command line.
+    """
+
+    def __init__(
+        self, *, budget_usd: float | None = None, overrides: Mapping[str, str | float | None] | None = None
+    ) -> None:
+        self._budget = Budget(budget_usd, source="the budget of this process")
+        self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
+        self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+
+    def policy(self, spec: WorkerSpec) -> Policy:
+        """The policy of one agent.
+
+        Raises:
+            ConfigError: a file, a key or a module is missing or wrong.
+        """
+        if spec.policy is not None:
+            return load_policy(spec.policy)
+        assert spec.model is not None
+        config, limits = self._model(spec.model)
+        return LLMPolicy(
+            client_for(config),
+            memory=LastSteps(spec.memory) if spec.memory else None,
+            retry=config.retry,
+            limits=limits,
+            try_timeout_s=config.try_timeout_s,
+        )
+
+    def _model(self, name: str) -> tuple[ModelConfig, Limits]:
+        if name not in self._models:
+            config = self._overridden(load_model(name))
+            if self._budget.limit_usd is not None and not config.prices.known:
+                raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
+            limits = Limits(config.limits, prices=config.prices, budget=self._budget, source=f"model file {name}")
+            self._models[name] = config, limits
+        return self._models[name]
+
+    def _overridden(self, config: ModelConfig) -> ModelConfig:
+        try:
+            return ModelConfig.model_validate({**config.model_dump(), **self._overrides})
+        except ValidationError as error:
+            fault = error.errors(include_url=False)[0]
+            field = ".".join(str(part) for part in fault["loc"])
+            raise ConfigError(fault["msg"].removeprefix("Value error, "), source="command line", field=field) from None
+
+
+def load_policy(name: str) -> Policy:
+    """The policy called `silent`, or the function, class or policy at `module:name`.
+
+    Modules are looked for in the current directory, too.
+
+    Raises:
+        ConfigError: there is none, or importing it failed.
+    """
+    if name == "silent":
+        return Silent()
+    module_name, _, attribute = name.partition(":")
+    if not module_name or not attribute:
+        raise ConfigError(f"'{name}' is no policy: write 'silent' or module:name, such as my_agent:decide")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"there is no module '{error.name}'", source=f"policy {name}") from None
+    except Exception as error:  # an import runs the user's code, which may raise anything
+        raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=f"policy {name}") from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        raise ConfigError(f"the module {module_name} has no '{attribute}'", source=f"policy {name}")
+    policy = found() if isinstance(found, type) else found
+    if hasattr(policy, "decide"):
+        return policy  # type: ignore[no-any-return]  # a policy is whatever has a `decide`
+    if callable(policy):
+        return FunctionPolicy(policy)
+    raise ConfigError("it is no function and has no method `decide`", source=f"policy {name}")
