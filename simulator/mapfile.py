@@ -33,7 +33,11 @@ class MapDataError(ValueError):
 def placeholders() -> Iterator[tuple[str, bytes]]:
     """Path below `Maps` and content of the file of every shipped map."""
     for name in map_names():
-        yield name + SUFFIX, _MARK + name.encode() + b"\n"
+        yield name + SUFFIX, _placeholder(name)
+
+
+def _placeholder(name: str) -> bytes:
+    return _MARK + name.encode() + b"\n"
 
 
 def is_placeholder(data: bytes) -> bool:
@@ -67,19 +71,18 @@ def _read_text(data: bytes, path: str) -> GameMap:
         raise MapDataError(f"{path or 'the map'}: {error}") from error
 
 
-def find_map_file(path: str, saved: Mapping[str, bytes], data_dir: Path) -> GameMap | None:
-    """The map that a path means: one the client saved, a file of the install, any file, or a shipped map's name.
+def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:
+    """The bytes of the map that a path means, or None.
 
-    Raises:
-        MapDataError: the file is there but holds no map.
+    It may be one that the client saved, a file of the install, any file, or the name of a shipped map.
     """
     if path in saved:
-        return read_map(saved[path], path)
+        return saved[path]
     for file in _files(path, data_dir):
         if file.is_file():
-            return read_map(file.read_bytes(), path)
+            return file.read_bytes()
     try:
-        return load_map(find_map(path))
+        return _placeholder(find_map(path))
     except MapError:
         return None
 

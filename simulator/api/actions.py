@@ -1,0 +1,191 @@
+"""What a client's actions do, and how they are reported back.
+
+An action is judged when it arrives, which gives the result code of the response, and takes effect when the game next
+advances. From then on the next observation reports it, in every form that the client's interface has: a raw command
+also as the click that would have given it, a click also as the raw command that it was. Nothing that a client puts
+into an action is a usage error.
+
+Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` (commands).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from s2clientprotocol import error_pb2, spatial_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api import abilities, clicks
+from simulator.api.abilities import Command, Outcome, Target
+from simulator.api.selection import at_point, panel_order
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from s2clientprotocol import common_pb2, raw_pb2
+
+    from simulator.api.seat import Seat
+
+    Result: TypeAlias = error_pb2.ActionResult.ValueType
+
+
+def judge(seat: Seat, action: sc.Action) -> Result:
+    """The result code for an action as things stand; an action that says nothing succeeds."""
+    for command in _commands(seat, action):
+        outcome = abilities.judge(seat.world, seat.player, command)
+        if outcome.result != error_pb2.Success:
+            return outcome.result
+    if action.action_raw.HasField("camera_move") and not _finite(action.action_raw.camera_move.center_world_space):
+        return error_pb2.MustTargetVisibleLocation
+    if action.HasField("action_ui") and not clicks.is_possible(seat, action.action_ui):
+        return error_pb2.Error
+    return error_pb2.Success
+
+
+def perform(seat: Seat, action: sc.Action, loop: int) -> None:
+    """Lets an action take effect, and notes what the next observation is to report of it."""
+    for command in _commands(seat, action):
+        _give(seat, command, loop, by_tags=action.action_raw.HasField("unit_command"))
+    if action.action_raw.HasField("camera_move"):
+        point = action.action_raw.camera_move.center_world_space
+        if _finite(point):
+            _move_camera(seat, (point.x + seat.origin[0], point.y + seat.origin[1]), loop)
+    spatial = _spatial(action)
+    if spatial.HasField("camera_move"):
+        pixel = spatial.camera_move.center_minimap
+        _move_camera(seat, seat.minimap.to_world(float(pixel.x), float(pixel.y)), loop)
+    if clicks.select(seat, spatial):
+        _report_spatial(seat, spatial, loop)
+    if action.HasField("action_ui") and clicks.press(seat, action.action_ui):
+        seat.report(loop).action_ui.CopyFrom(action.action_ui)
+
+
+def _spatial(action: sc.Action) -> spatial_pb2.ActionSpatial:
+    return action.action_feature_layer if action.HasField("action_feature_layer") else action.action_render
+
+
+def _finite(point: common_pb2.Point) -> bool:
+    return math.isfinite(point.x) and math.isfinite(point.y)
+
+
+# commands -------------------------------------------------------------------------------------------------------------
+
+
+def _commands(seat: Seat, action: sc.Action) -> Iterator[Command]:
+    if action.action_raw.HasField("unit_command"):
+        yield _from_tags(seat, action.action_raw.unit_command)
+    spatial = _spatial(action)
+    if spatial.HasField("unit_command"):
+        yield _from_click(seat, spatial.unit_command)
+
+
+def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
+    point = None
+    if message.HasField("target_world_space_pos"):
+        x, y = message.target_world_space_pos.x, message.target_world_space_pos.y
+        point = (x + seat.origin[0], y + seat.origin[1])
+    return Command(
+        ability=message.ability_id,
+        tags=tuple(message.unit_tags),
+        target=message.target_unit_tag,
+        point=point,
+        queue=message.queue_command,
+    )
+
+
+def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand) -> Command:
+    """The command that a click on the screen or the minimap gives to the selected units."""
+    target, point = 0, None
+    if message.HasField("target_screen_coord"):
+        pixel = message.target_screen_coord
+        point = seat.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
+        if Target.UNIT in abilities.aims_of(message.ability_id):
+            sight = seat.look()
+            row = at_point(sight, seat.types, point, seat.screen.scale / 2)
+            if row is not None:
+                target, point = int(sight.tag[row]), None
+    elif message.HasField("target_minimap_coord"):
+        pixel = message.target_minimap_coord
+        point = seat.minimap.to_world(float(pixel.x), float(pixel.y))
+    tags = tuple(seat.selection.tags)
+    return Command(message.ability_id, tags, target=target, point=point, queue=message.queue_command)
+
+
+def _give(seat: Seat, command: Command, loop: int, *, by_tags: bool) -> None:
+    outcome = abilities.carry_out(seat.world, seat.player, command)
+    if outcome.result != error_pb2.Success:
+        tag = command.tags[0] if command.tags else 0
+        seat.hands.errors.append(
+            sc.ActionError(unit_tag=tag, ability_id=max(0, command.ability), result=outcome.result)
+        )
+        return
+    tags = panel_order(seat.world, seat.types, map(seat.world.tag_of, outcome.slots))
+    if by_tags and seat.options.raw_affects_selection:
+        seat.selection.choose(tags)
+    _report_command(seat, command, outcome, tags, loop)
+
+
+def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[int], loop: int) -> None:
+    action = seat.report(loop)
+    if seat.options.raw:
+        raw = action.action_raw.unit_command
+        raw.ability_id, raw.queue_command = outcome.ability, command.queue
+        raw.unit_tags.extend(tags)
+        if command.target:
+            raw.target_unit_tag = command.target
+        elif command.point is not None:
+            raw.target_world_space_pos.x = command.point[0] - seat.origin[0]
+            raw.target_world_space_pos.y = command.point[1] - seat.origin[1]
+    spatial = spatial_pb2.ActionSpatial()
+    spatial.unit_command.ability_id = outcome.ability
+    spatial.unit_command.queue_command = command.queue
+    _write_target(seat, spatial.unit_command, command)
+    _write_spatial(seat, action, spatial)
+
+
+def _write_target(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, command: Command) -> None:
+    """Where the click of a command would have been: on the screen, or on the minimap if that is elsewhere."""
+    if command.target:
+        x, y = seat.world.pos[seat.world.slot_of(command.target)]
+    elif command.point is not None:
+        x, y = command.point
+    else:
+        return
+    column, row = (math.floor(v) for v in seat.screen.to_pixels(float(x), float(y), seat.camera))
+    if 0 <= column < seat.screen.columns and 0 <= row < seat.screen.rows:
+        message.target_screen_coord.x, message.target_screen_coord.y = column, row
+        return
+    column, row = (math.floor(v) for v in seat.minimap.to_pixels(float(x), float(y)))
+    message.target_minimap_coord.x = int(np.clip(column, 0, seat.minimap.columns - 1))
+    message.target_minimap_coord.y = int(np.clip(row, 0, seat.minimap.rows - 1))
+
+
+# camera and clicks ----------------------------------------------------------------------------------------------------
+
+
+def _move_camera(seat: Seat, point: tuple[float, float], loop: int) -> None:
+    seat.move_camera(*point)
+    x, y = seat.camera
+    action = seat.report(loop)
+    if seat.options.raw:
+        centre = action.action_raw.camera_move.center_world_space
+        centre.x, centre.y = x - seat.origin[0], y - seat.origin[1]
+        centre.z = float(seat.world.map.terrain.ground_z(np.array([[x, y]]))[0])
+    spatial = spatial_pb2.ActionSpatial()
+    column, row = (math.floor(v) for v in seat.minimap.to_pixels(x, y))
+    spatial.camera_move.center_minimap.x = min(column, seat.minimap.columns - 1)
+    spatial.camera_move.center_minimap.y = min(row, seat.minimap.rows - 1)
+    _write_spatial(seat, action, spatial)
+
+
+def _report_spatial(seat: Seat, spatial: spatial_pb2.ActionSpatial, loop: int) -> None:
+    _write_spatial(seat, seat.report(loop), spatial)
+
+
+def _write_spatial(seat: Seat, action: sc.Action, spatial: spatial_pb2.ActionSpatial) -> None:
+    if seat.options.HasField("feature_layer"):
+        action.action_feature_layer.CopyFrom(spatial)
+    if seat.options.HasField("render"):
+        action.action_render.CopyFrom(spatial)

@@ -1,0 +1,115 @@
+"""The answer to `observation`: everything that a player knows at this loop.
+
+Small parts are messages; units, images and the frame around them are joined as bytes (`wire.py`), because an
+observation with feature layers is half a megabyte and is asked for after every step.
+
+Above: `play.py`. Below: `raw.py`, `layers.py`, `ui.py`, `score.py`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api import ui, wire
+from simulator.api.abilities import abilities_of
+from simulator.api.layers import Frame
+from simulator.api.raw import Units, write_image
+from simulator.api.score import Holdings
+from simulator.api.sight import Alliance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from simulator.api.game import Game
+    from simulator.api.seat import Seat
+    from simulator.api.sight import Sight
+
+_OBSERVATION = sc.ResponseObservation.DESCRIPTOR.fields_by_name["observation"].number
+_LAYERS = sc.Observation.DESCRIPTOR.fields_by_name["feature_layer_data"].number
+_ALARM_PAUSE_LOOPS = 160
+"""Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
+
+
+def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[bytes]:
+    """The parts of a `ResponseObservation`; takes along what is to be told only once."""
+    world = game.world
+    sight = seat.look(through_fog=disable_fog)
+    selected = seat.selection.rows(sight)
+    attacked = _attacked(seat, sight)
+    told = sc.ResponseObservation(
+        actions=seat.hands.echoes,
+        action_errors=seat.hands.errors,
+        player_result=game.results(),
+        chat=seat.hands.chat,
+    )
+    holdings = Holdings(world, game.types, seat.player)
+    observation = sc.Observation(game_loop=world.loop, player_common=holdings.common())
+    observation.ui_data.CopyFrom(ui.panel(world, game.types, seat.selection, seat.player))
+    _write_abilities(observation, seat)
+    observation.alerts.extend(_alerts(seat, sight, attacked))
+    if seat.options.score:
+        observation.score.CopyFrom(holdings.score())
+    if seat.options.raw:
+        _write_raw(observation.raw_data, seat, sight, selected)
+    layers: list[bytes] = []
+    if seat.layers is not None:
+        frame = Frame(world, seat.player, sight, selected, seat.camera, sight.pos[attacked])
+        layers = wire.embed(_LAYERS, seat.layers.encode(frame))
+    _told(seat, sight)
+    return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *layers])]
+
+
+def _told(seat: Seat, sight: Sight) -> None:
+    seat.hands.forget()
+    seat.deaths_told = len(seat.world.deaths)
+    seat.known = frozenset(sight.tag.tolist())
+    seat.observed_loop = seat.world.loop
+
+
+def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
+    """What the selection can be told to do now; a foreign unit can be told nothing."""
+    world = seat.world
+    rows = {int(world.type[s]) for s in seat.selection.slots(world) if world.owner[s] == seat.player}
+    found = {ability.id: ability for row in rows for ability in abilities_of(world.catalog.units[row])}
+    for number in sorted(found):
+        observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
+
+
+def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
+    """Rows of own units damaged since the last observation, if it is time for another alarm."""
+    world = seat.world
+    if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
+        return np.zeros(0, np.intp)
+    own = sight.alliance == Alliance.SELF
+    rows = np.flatnonzero(own & (world.damaged_loop[sight.slot] > seat.observed_loop))
+    if rows.size:
+        seat.alarm_loop = world.loop
+    return rows
+
+
+def _alerts(seat: Seat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Alert.ValueType]:
+    structures = seat.types.structure[sight.row[attacked]]
+    alerts = [sc.BuildingUnderAttack] if structures.any() else []
+    return [*alerts, sc.UnitUnderAttack] if (~structures).any() else alerts
+
+
+def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: NDArray[np.bool_]) -> None:
+    world, terrain = seat.world, seat.world.map.terrain
+    x, y = seat.camera
+    camera = raw.player.camera
+    camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
+    camera.z = float(terrain.ground_z(np.array([seat.camera]))[0])
+    raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
+    Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin).write(raw)
+    visibility, creep = world.visibility[seat.player], terrain.creep
+    if seat.options.raw_crop_to_playable_area:
+        x0, y0, x1, y1 = terrain.playable
+        visibility, creep = visibility[y0:y1, x0:x1], creep[y0:y1, x0:x1]
+    write_image(raw.map_state.visibility, visibility, 8)
+    write_image(raw.map_state.creep, creep, 1)
+    dead = (d.tag for d in world.deaths[seat.deaths_told :] if d.owner == seat.player or d.tag in seat.known)
+    raw.event.dead_units.extend(dead)

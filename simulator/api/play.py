@@ -1,0 +1,92 @@
+"""Requests while a game is played or a replay is watched.
+
+Each function takes the process and a request and gives the body of the response: a message, or for the large ones
+the parts of its bytes. Above: `requests.py`. Below: `game.py`, `observation.py` and their neighbours.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import query_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api import data, query, replay
+from simulator.api.observation import observe
+from simulator.status import UsageError
+
+if TYPE_CHECKING:
+    from simulator.api.process import Process
+
+
+def game_info(process: Process, _: sc.RequestGameInfo) -> list[bytes]:
+    """Players, options and the map."""
+    return process.table.info.encode()
+
+
+def tables(process: Process, request: sc.RequestData) -> sc.ResponseData:
+    """Abilities, unit types, upgrades, buffs and effects."""
+    return data.answer(process.table.game.catalog, request)
+
+
+def observation(process: Process, request: sc.RequestObservation) -> list[bytes]:
+    """What the player knows now; with a game loop in real time, not before that loop."""
+    table = process.table
+    if table.clock is not None:
+        table.clock.wait_for(request.game_loop)
+    return observe(table.game, table.seat, disable_fog=request.disable_fog)
+
+
+def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
+    """Advances the game, by one loop unless the request says how many."""
+    if process.table.clock is not None:
+        raise UsageError("step is not possible in a game in real time")
+    return sc.ResponseStep(simulation_loop=process.table.game.step(request.count or 1))
+
+
+def action(process: Process, request: sc.RequestAction) -> sc.ResponseAction:
+    """Notes actions of the player, and says of each how it looks as things stand."""
+    table = process.table
+    results = [table.game.act(table.seat.player, action) for action in request.actions]
+    return sc.ResponseAction(result=results)
+
+
+def obs_action(_: Process, __: sc.RequestObserverAction) -> sc.ResponseObserverAction:
+    """Accepted; the only observer there is watches a replay through its player's eyes."""
+    return sc.ResponseObserverAction()
+
+
+def ask(process: Process, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
+    """Ways, places to build, abilities of units."""
+    return query.answer(process.table.seat, request)
+
+
+def debug(process: Process, request: sc.RequestDebug) -> sc.ResponseDebug:
+    """Notes debug commands; they take effect with the next loop."""
+    table = process.table
+    for command in request.debug:
+        table.game.debug(table.seat.player, command)
+    return sc.ResponseDebug()
+
+
+def map_command(_: Process, __: sc.RequestMapCommand) -> sc.ResponseMapCommand:
+    """Accepted; no map has commands."""
+    return sc.ResponseMapCommand()
+
+
+def save_replay(process: Process, _: sc.RequestSaveReplay) -> sc.ResponseSaveReplay:
+    """The game up to now, as the bytes of a replay."""
+    table = process.table
+    if table.replay:
+        raise UsageError("A replay of a replay cannot be saved")
+    return sc.ResponseSaveReplay(data=replay.record(table.game).encode())
+
+
+def quick_save(_: Process, __: sc.RequestQuickSave) -> sc.ResponseQuickSave:
+    """Not there: python-sc2 names it, nobody sends it."""
+    raise UsageError("quick_save is not supported by the simulator")
+
+
+def quick_load(_: Process, __: sc.RequestQuickLoad) -> sc.ResponseQuickLoad:
+    """Not there: python-sc2 names it, nobody sends it."""
+    raise UsageError("quick_load is not supported by the simulator")

@@ -1,0 +1,91 @@
+"""The answer to `query`: ways, places to build, and what units can be told to do.
+
+Above: `play.py`. Below: `abilities.py`, the world's ground.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import error_pb2, query_pb2
+
+from simulator.api.abilities import abilities_of
+from simulator.traits import Layer
+from simulator.world import NOBODY
+
+if TYPE_CHECKING:
+    from simulator.api.seat import Seat
+    from simulator.catalog import Footprint
+    from simulator.world import World
+
+
+def answer(seat: Seat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
+    """One answer to each question, in their order."""
+    return query_pb2.ResponseQuery(
+        pathing=[query_pb2.ResponseQueryPathing(distance=_distance(seat, question)) for question in request.pathing],
+        abilities=[_abilities(seat, question.unit_tag) for question in request.abilities],
+        placements=[query_pb2.ResponseQueryBuildingPlacement(result=_place(seat, q)) for q in request.placements],
+    )
+
+
+def _abilities(seat: Seat, tag: int) -> query_pb2.ResponseQueryAvailableAbilities:
+    answer = query_pb2.ResponseQueryAvailableAbilities(unit_tag=tag)
+    slot = seat.world.slot_of(tag)
+    if slot != NOBODY:
+        unit = seat.world.unit_type(slot)
+        answer.unit_type_id = unit.id
+        if seat.world.owner[slot] == seat.player:
+            for ability in abilities_of(unit):
+                answer.abilities.add(ability_id=ability.id, requires_point=ability.requires_point)
+    return answer
+
+
+# ways -----------------------------------------------------------------------------------------------------------------
+
+
+def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
+    """Length of the way on the ground, 0 where there is none; a flying unit's is the straight line."""
+    world, (ox, oy) = seat.world, seat.origin
+    end = (question.end_pos.x + ox, question.end_pos.y + oy)
+    start = (question.start_pos.x + ox, question.start_pos.y + oy)
+    flying = False
+    if question.WhichOneof("start") == "unit_tag":
+        slot = world.slot_of(question.unit_tag)
+        if slot == NOBODY:
+            return 0.0
+        start = (float(world.pos[slot, 0]), float(world.pos[slot, 1]))
+        flying = world.unit_type(slot).flying
+    if not all(map(math.isfinite, (*start, *end))):
+        return 0.0
+    if flying:
+        return math.dist(start, end)
+    return world.ground.surface(Layer.WALK).distance(np.array(start), np.array(end))
+
+
+# places ---------------------------------------------------------------------------------------------------------------
+
+
+def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> error_pb2.ActionResult.ValueType:
+    """Whether what an ability builds may stand at a point; the unit that would build it is not looked at."""
+    world = seat.world
+    footprint = _footprint(world, question.ability_id)
+    if footprint is None:
+        return error_pb2.NotSupported
+    x, y = question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1]
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return error_pb2.CantBuildLocationInvalid
+    cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
+    terrain = world.map.terrain
+    if not ((cells >= 0) & (cells < terrain.size)).all() or not terrain.build[cells[:, 1], cells[:, 0]].all():
+        return error_pb2.CantBuildLocationInvalid
+    taken = terrain.walk[cells[:, 1], cells[:, 0]] & ~world.ground.walk[cells[:, 1], cells[:, 0]]
+    return error_pb2.CantBuildOnThat if taken.any() else error_pb2.Success
+
+
+def _footprint(world: World, ability: int) -> Footprint | None:
+    for unit in world.catalog.units:
+        if unit.structure and unit.ability == ability and ability:
+            return world.catalog.footprints.get(unit.placement or unit.footprint)
+    return None

@@ -1,0 +1,165 @@
+"""The units of `Observation.raw_data`, with every field that the game would send of them.
+
+Which field is present depends on whose unit it is and how it is perceived; the table of that was taken from 96
+real observations. Above: `observation.py`. Below: `sight.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+
+from simulator.api.sight import Alliance
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+    from s2clientprotocol import common_pb2
+
+    from simulator.api.sight import Sight
+    from simulator.api.types import Types
+    from simulator.orders import Order
+    from simulator.world import World
+
+    Bools = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Units:
+    """What is to be told of the units: their perception, and where the player's interface has them."""
+
+    world: World
+    types: Types
+    sight: Sight
+    selected: Bools
+    on_screen: Bools
+    origin: tuple[float, float]  # world point that is (0, 0) for the client
+
+    def write(self, raw: raw_pb2.ObservationRaw) -> None:
+        """Adds all units to an observation."""
+        orders = self._orders()
+        for known, vital, level, slot in zip(self._known(), self._vitals(), self._levels(), self._slots(), strict=True):
+            unit = raw.units.add()
+            _write_known(unit, *known)
+            if unit.display_type == raw_pb2.Snapshot:
+                continue
+            _write_vitals(unit, *vital)
+            self._write_side(unit, slot, *level)
+            if unit.alliance == raw_pb2.Self:
+                self._write_own(unit, slot)
+                for order, height in orders[slot]:
+                    self._write_order(unit.orders.add(), order, height)
+
+    def _slots(self) -> list[int]:
+        slots: list[int] = self.sight.slot.tolist()
+        return slots
+
+    def _known(self) -> Iterator[tuple[Any, ...]]:
+        s = self.sight
+        x, y = (s.pos - self.origin).T
+        return _rows(s.display, s.alliance, s.tag, s.type_id, s.owner, x, y, s.z, s.facing, s.radius,
+                     s.build_progress, s.cloak, self.on_screen)  # fmt: skip
+
+    def _vitals(self) -> Iterator[tuple[Any, ...]]:
+        s = self.sight
+        return _rows(s.life, s.life_max, s.shields, s.shields_max, s.energy, s.energy_max, s.flying, s.burrowed,
+                     s.hallucination, s.active, self.selected)  # fmt: skip
+
+    def _levels(self) -> Iterator[tuple[int, ...]]:
+        tables = np.stack([self.types.levels(tuple(player.upgrades)) for player in self.world.players])
+        return _rows(*tables[self.world.owner[self.sight.slot], :, self.sight.row].T)
+
+    def _write_side(self, unit: raw_pb2.Unit, slot: int, attack: int, armor: int, shield: int) -> None:
+        types, row = self.types, int(self.world.type[slot])
+        mobile = unit.alliance != raw_pb2.Neutral and not types.structure[row]
+        unit.armor_upgrade_level, unit.shield_upgrade_level = armor, shield
+        if mobile or types.armed[row]:
+            unit.attack_upgrade_level = attack
+        if not mobile:
+            unit.is_powered = False
+        if types.minerals_in[row]:
+            unit.mineral_contents = int(types.resource[row])
+        if types.vespene_in[row]:
+            unit.vespene_contents = int(types.resource[row])
+
+    def _write_own(self, unit: raw_pb2.Unit, slot: int) -> None:
+        world, types, row = self.world, self.types, int(self.world.type[slot])
+        unit.assigned_harvesters = unit.ideal_harvesters = 0
+        if types.armed[row]:
+            unit.weapon_cooldown = max(0.0, float(world.cooldown[slot]))
+            if target := world.tag_of(int(world.target[slot])):
+                unit.engaged_target_tag = target
+        if types.detect[row]:
+            unit.detect_range = float(types.detect[row])
+        if types.cargo[row]:
+            unit.cargo_space_taken, unit.cargo_space_max = 0, int(types.cargo[row])
+
+    def _write_order(self, message: raw_pb2.UnitOrder, order: Order, height: float) -> None:
+        message.ability_id = order.ability
+        if order.target:
+            message.target_unit_tag = order.target
+        elif order.point is not None:
+            point = message.target_world_space_pos
+            point.x, point.y = order.point[0] - self.origin[0], order.point[1] - self.origin[1]
+            point.z = height
+
+    def _orders(self) -> dict[int, list[tuple[Order, float]]]:
+        """The orders of own units by slot, each with the ground height at its point."""
+        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF].tolist()
+        orders = {slot: self.world.orders_of(slot) for slot in own}
+        points = [order.point or (0.0, 0.0) for some in orders.values() for order in some]
+        heights = iter(self.world.map.terrain.ground_z(np.array(points).reshape(-1, 2)).tolist())
+        return {slot: [(order, next(heights)) for order in some] for slot, some in orders.items()}
+
+
+def _rows(*columns: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _write_known(  # a row of the table, in the order of its columns
+    unit: raw_pb2.Unit, display: raw_pb2.DisplayType.ValueType, alliance: raw_pb2.Alliance.ValueType, tag: int,
+    type_id: int, owner: int, x: float, y: float, z: float, facing: float, radius: float, build_progress: float,
+    cloak: raw_pb2.CloakState.ValueType, on_screen: bool,
+) -> None:  # fmt: skip
+    unit.display_type = display
+    unit.alliance = alliance
+    unit.tag = tag
+    unit.unit_type = type_id
+    unit.owner = owner
+    pos = unit.pos
+    pos.x, pos.y, pos.z = x, y, z
+    unit.facing = facing
+    unit.radius = radius
+    unit.build_progress = build_progress
+    unit.cloak = cloak
+    unit.is_on_screen = on_screen
+    unit.is_blip = False
+
+
+def _write_vitals(  # a row of the table, in the order of its columns
+    unit: raw_pb2.Unit, life: float, life_max: float, shields: float, shields_max: float, energy: float,
+    energy_max: float, flying: bool, burrowed: bool, hallucination: bool, active: bool, selected: bool,
+) -> None:  # fmt: skip
+    unit.health = life
+    unit.health_max = life_max
+    unit.shield = shields
+    unit.shield_max = shields_max
+    unit.energy = energy
+    unit.energy_max = energy_max
+    unit.is_flying = flying
+    unit.is_burrowed = burrowed
+    unit.is_hallucination = hallucination
+    unit.is_active = active
+    unit.is_selected = selected
+
+
+def write_image(image: common_pb2.ImageData, grid: NDArray[Any], bits_per_pixel: int) -> None:
+    """Fills an image with a grid [y, x] of the map; raw images start at the bottom-left, as the grids do."""
+    image.bits_per_pixel = bits_per_pixel
+    image.size.y, image.size.x = grid.shape
+    packed = np.packbits(grid.astype(np.bool_), axis=None) if bits_per_pixel == 1 else grid.astype(np.uint8)
+    image.data = packed.tobytes()

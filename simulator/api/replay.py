@@ -1,0 +1,135 @@
+"""Replays: the setup of a game and all that was done to it, to be simulated again.
+
+The format is ours: a line that marks it, one line of JSON with the setup, then for each entry of the log its loop,
+player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside.
+
+Above: `lobby.py`. Below: `game.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+import zlib
+from typing import TYPE_CHECKING
+
+from google.protobuf.message import DecodeError, Message
+from s2clientprotocol import debug_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api.game import Entry, Game, Setup
+from simulator.mapfile import read_map
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from simulator.api.seat import Seat
+
+_MARK = b"Khala replay 1\n"
+_ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
+_KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
+
+
+class ReplayError(ValueError):
+    """The bytes are no replay of this simulator."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """What is in a replay file."""
+
+    setup: Setup
+    interfaces: dict[int, sc.InterfaceOptions]  # with which the players clicked
+    loops: int
+    results: dict[int, int]
+    log: tuple[Entry, ...]
+
+    def encode(self) -> bytes:
+        """The file."""
+        setup = self.setup
+        head = {
+            "path": setup.path,
+            "map": setup.map_data.decode("latin-1"),
+            "players": [_hex(player) for player in setup.players],
+            "interfaces": {player: _hex(options) for player, options in self.interfaces.items()},
+            "seed": setup.seed,
+            "disable_fog": setup.disable_fog,
+            "loops": self.loops,
+            "results": self.results,
+        }
+        parts = [json.dumps(head).encode(), b"\n"]
+        for entry in self.log:
+            data = entry.act.SerializeToString(deterministic=True)
+            parts += [_ENTRY.pack(entry.loop, entry.player, _KINDS.index(type(entry.act)), len(data)), data]
+        return _MARK + zlib.compress(b"".join(parts))
+
+    @classmethod
+    def decode(cls, data: bytes) -> Replay:
+        """The replay in a file's bytes; raises ReplayError if there is none."""
+        if not data.startswith(_MARK):
+            raise ReplayError("The data is not a replay of this simulator")
+        try:
+            return cls._decode(zlib.decompress(data[len(_MARK) :]))
+        except (zlib.error, ValueError, LookupError, TypeError, struct.error, DecodeError) as error:
+            raise ReplayError(f"The replay is damaged: {error}") from error
+
+    @classmethod
+    def _decode(cls, data: bytes) -> Replay:
+        head, _, log = data.partition(b"\n")
+        fields = json.loads(head)
+        map_data = fields["map"].encode("latin-1")
+        setup = Setup(
+            game_map=read_map(map_data, fields["path"]),
+            map_data=map_data,
+            path=fields["path"],
+            players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in fields["players"]),
+            seed=fields["seed"],
+            disable_fog=fields["disable_fog"],
+            realtime=False,
+        )
+        interfaces = {
+            int(player): sc.InterfaceOptions.FromString(bytes.fromhex(options))
+            for player, options in fields["interfaces"].items()
+        }
+        results = {int(player): result for player, result in fields["results"].items()}
+        return cls(setup, interfaces, fields["loops"], results, tuple(_entries(log)))
+
+
+def _hex(message: Message) -> str:
+    return message.SerializeToString(deterministic=True).hex()
+
+
+def _entries(log: bytes) -> Iterator[Entry]:
+    at = 0
+    while at < len(log):
+        loop, player, kind, size = _ENTRY.unpack_from(log, at)
+        at += _ENTRY.size
+        yield Entry(loop, player, _KINDS[kind].FromString(log[at : at + size]))
+        at += size
+
+
+def record(game: Game) -> Replay:
+    """The replay of a game up to now."""
+    players = range(1, len(game.setup.players) + 1)
+    return Replay(
+        setup=game.setup,
+        interfaces={player: seat.options for player, seat in game.seats.items()},
+        loops=game.world.loop,
+        results={player: int(game.world.players[player].result) for player in players},
+        log=tuple(entry for entry in game.log if entry.loop < game.world.loop),
+    )
+
+
+def rerun(replay: Replay, version: str, player: int, options: sc.InterfaceOptions) -> tuple[Game, Seat]:
+    """A game that plays a replay, and the seat of somebody who looks over a player's shoulder.
+
+    The players sit at their own interfaces, because what a click means depends on the size of the screen; the viewer
+    shares camera and selection with one of them. So the reported clicks are in pixels of the recorded interface.
+    """
+    game = Game(replay.setup, version, log=replay.log, end_loop=replay.loops)
+    for number, recorded in replay.interfaces.items():
+        game.sit(number, recorded)
+    kept = sc.InterfaceOptions()
+    kept.CopyFrom(options)
+    return game, game.watch(player, kept)

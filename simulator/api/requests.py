@@ -1,0 +1,45 @@
+"""Which function answers which request.
+
+Each takes the process and the request and gives the body of the response: a message, or the parts of its bytes.
+Above: `session.py`. Below: `lobby.py`, `play.py`, `viewing.py`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from simulator.api import lobby, play, viewing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from google.protobuf.message import Message
+
+    from simulator.api.process import Process
+
+    Handler = Callable[[Process, Any], Message | list[bytes]]
+
+HANDLERS: Final[dict[str, Handler]] = {
+    "ping": lobby.ping,
+    "available_maps": lobby.available_maps,
+    "save_map": lobby.save_map,
+    "create_game": lobby.create_game,
+    "join_game": lobby.join_game,
+    "restart_game": lobby.restart_game,
+    "leave_game": lobby.leave_game,
+    "quit": lobby.end,
+    "start_replay": viewing.start_replay,
+    "replay_info": viewing.replay_info,
+    "game_info": play.game_info,
+    "data": play.tables,
+    "observation": play.observation,
+    "step": play.step,
+    "action": play.action,
+    "obs_action": play.obs_action,
+    "query": play.ask,
+    "debug": play.debug,
+    "map_command": play.map_command,
+    "save_replay": play.save_replay,
+    "quick_save": play.quick_save,
+    "quick_load": play.quick_load,
+}

@@ -1,0 +1,102 @@
+"""One client's place in a game: what it asked to see, its camera and selection, and what it is still to be told.
+
+State only. `actions.py` changes it, `observation.py` reads it and takes what is to be told once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api.layers import FeatureLayers, minimap_of, screen_of
+from simulator.api.projection import Minimap, Rect, Screen
+from simulator.api.selection import Selection
+from simulator.api.sight import Sight, look
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from simulator.api.types import Types
+    from simulator.world import World
+
+_WITHOUT_LAYERS = Screen(1, 1, 24.0)
+
+
+@dataclasses.dataclass
+class Hands:
+    """What a player does at the interface: where he looks, what he holds, and what came of it."""
+
+    camera: tuple[float, float]
+    selection: Selection = dataclasses.field(default_factory=Selection)
+    echoes: list[sc.Action] = dataclasses.field(default_factory=list)
+    errors: list[sc.ActionError] = dataclasses.field(default_factory=list)
+    chat: list[sc.ChatReceived] = dataclasses.field(default_factory=list)
+
+    def forget(self) -> None:
+        """What came of it has been told."""
+        self.echoes, self.errors, self.chat = [], [], []
+
+
+class Seat:
+    """A player's interface to the world."""
+
+    def __init__(self, world: World, types: Types, player: int, options: sc.InterfaceOptions) -> None:
+        self.world, self.types, self.player, self.options = world, types, player, options
+        width, height = world.map.terrain.size
+        self.playable = Rect(*world.map.terrain.playable)
+        crop = options.raw_crop_to_playable_area
+        self.origin: tuple[float, float] = (self.playable.x0, self.playable.y0) if crop else (0.0, 0.0)
+        layers = options.feature_layer
+        shown = self.playable if crop or layers.crop_to_playable_area else Rect(0, 0, width, height)
+        self.screen: Screen = _WITHOUT_LAYERS
+        self.minimap: Minimap = Minimap(1, 1, shown)
+        self.layers: FeatureLayers | None = None
+        if options.HasField("feature_layer"):
+            self.screen, self.minimap = screen_of(layers), minimap_of(layers, shown)
+            self.layers = FeatureLayers(layers, self.screen, self.minimap)
+        self.sees_all = False  # looks through the fog, which a viewer of a replay may
+        self.hands = Hands(world.map.camera)
+        self.deaths_told = 0
+        self.known: frozenset[int] = frozenset()  # tags in the last observation
+        self.observed_loop = -1
+        self.alarm_loop = -(1 << 30)  # when an attack was last reported
+
+    def share(self, other: Seat) -> None:
+        """Has the camera, the selection and the reports of another seat from now on."""
+        self.hands = other.hands
+
+    @property
+    def camera(self) -> tuple[float, float]:
+        """The world point at which the camera looks."""
+        return self.hands.camera
+
+    @property
+    def selection(self) -> Selection:
+        """The selected units and the control groups."""
+        return self.hands.selection
+
+    def look(self, *, through_fog: bool = False) -> Sight:
+        """What the player perceives now."""
+        show_cloaked, through = self.options.show_cloaked, through_fog or self.sees_all
+        return look(self.world, self.types, self.player, show_cloaked=show_cloaked, through_fog=through)
+
+    def on_screen(self, sight: Sight) -> NDArray[np.bool_]:
+        """[n] whether each unit's centre is in the camera's view."""
+        column, row = self.screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], self.camera)
+        shown: NDArray[np.bool_] = (
+            (column >= 0) & (column < self.screen.columns) & (row >= 0) & (row < self.screen.rows)
+        )
+        return shown
+
+    def move_camera(self, x: float, y: float) -> None:
+        """Points the camera at a world point, or at the nearest one of the playable area."""
+        self.hands.camera = self.playable.clamp(x, y)
+
+    def report(self, loop: int) -> sc.Action:
+        """A new entry of the actions that the next observation reports."""
+        action = sc.Action(game_loop=loop)
+        self.hands.echoes.append(action)
+        return action

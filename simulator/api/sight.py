@@ -1,0 +1,145 @@
+"""What one player perceives of all units at this loop, as columns: the source of every part of an observation.
+
+Rules of perception stand here and nowhere else: who is on whose side, what fog and cloak hide, what of a hidden
+unit is still told. Rows are in drawing order, ground units before flying ones.
+
+Above: `raw.py`, `layers.py`, `ui.py`. Below: the world's arrays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator.orders import OrderKind
+from simulator.world import NOBODY
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from simulator.api.types import Types
+    from simulator.world import World
+
+    Bools = NDArray[np.bool_]
+    Ints = NDArray[np.int64]
+    Floats = NDArray[np.float64]
+
+API_NEUTRAL = 16
+
+
+class Alliance(enum.IntEnum):
+    """Whose side a unit is on, with the API's numbers."""
+
+    SELF = 1
+    ALLY = 2
+    NEUTRAL = 3
+    ENEMY = 4
+
+
+class Display(enum.IntEnum):
+    """How a unit is perceived, with the API's numbers."""
+
+    VISIBLE = 1
+    SNAPSHOT = 2
+    HIDDEN = 3
+    PLACEHOLDER = 4
+
+
+class Cloak(enum.IntEnum):
+    """What the player knows of a unit's cloak, with the API's numbers."""
+
+    UNKNOWN = 0
+    CLOAKED = 1
+    DETECTED = 2
+    NOT_CLOAKED = 3
+    ALLIED = 4
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Sight:
+    """The units that a player perceives, one row each; vitals of units that are not seen clearly are 0."""
+
+    slot: Ints
+    row: Ints  # unit type, row of the catalog
+    tag: Ints
+    type_id: Ints
+    owner: Ints  # 16 is neutral
+    alliance: Ints  # Alliance
+    display: Ints  # Display
+    cloak: Ints  # Cloak
+    pos: Floats  # [n, 2] world
+    z: Floats
+    facing: Floats
+    radius: Floats
+    life: Floats
+    life_max: Floats
+    shields: Floats
+    shields_max: Floats
+    energy: Floats
+    energy_max: Floats
+    build_progress: Floats
+    flying: Bools
+    burrowed: Bools
+    hallucination: Bools
+    active: Bools
+
+    def __len__(self) -> int:
+        return len(self.slot)
+
+
+def look(world: World, types: Types, player: int, *, show_cloaked: bool, through_fog: bool = False) -> Sight:
+    """The units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
+    seen = world.is_visible(player)
+    owner = world.owner[world.live]
+    own = owner == player
+    cloak = _cloak(world, player, own)
+    undetected = cloak == Cloak.CLOAKED
+    told = (seen | through_fog) & (show_cloaked | through_fog | ~undetected)
+    order = np.argsort(types.flying[world.type[world.live]], kind="stable")
+    keep = order[told[order]]
+    hidden = (~seen | undetected)[keep]
+    return _columns(world, types, keep, hidden, own[keep], np.where(seen, cloak, Cloak.UNKNOWN)[keep])
+
+
+def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, cloak: Ints) -> Sight:
+    slot = world.live[keep]
+    row, owner = world.type[slot], world.owner[slot]
+    clear = ~hidden
+    pos = world.pos[slot]
+    stats = world.stats
+    return Sight(
+        slot=slot,
+        row=row,
+        tag=world.tag[slot],
+        type_id=types.id[row],
+        owner=np.where(owner == 0, API_NEUTRAL, owner),
+        alliance=np.where(own, Alliance.SELF, np.where(owner == 0, Alliance.NEUTRAL, Alliance.ENEMY)),
+        display=np.where(hidden, Display.HIDDEN, Display.VISIBLE),
+        cloak=cloak,
+        pos=pos,
+        z=world.map.terrain.ground_z(pos) + types.height[row],
+        facing=world.facing()[slot],
+        radius=types.radius[row],
+        life=world.life[slot] * clear,
+        life_max=stats.life_max[owner, row] * clear,
+        shields=world.shields[slot] * clear,
+        shields_max=stats.shields_max[owner, row] * clear,
+        energy=world.energy[slot] * clear,
+        energy_max=stats.energy_max[owner, row] * clear,
+        build_progress=world.build_progress[slot],
+        flying=types.flying[row],
+        burrowed=world.burrowed[slot],
+        hallucination=world.hallucination[slot] & (own | (cloak == Cloak.DETECTED)),
+        active=((world.order_kind[slot] != OrderKind.IDLE) | (world.target[slot] != NOBODY)) & clear,
+    )
+
+
+def _cloak(world: World, player: int, own: Bools) -> Ints:
+    """[live] what is known of each unit's cloak, seen or not."""
+    hiding = world.cloaked[world.live] | (world.burrowed[world.live] & ~own)
+    detected = world.visible[player, world.live]
+    enemy = np.where(detected, Cloak.DETECTED, Cloak.CLOAKED)
+    return np.where(hiding, np.where(own, Cloak.ALLIED, enemy), Cloak.NOT_CLOAKED)

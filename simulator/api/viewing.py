@@ -1,0 +1,96 @@
+"""Requests about replays: start one, look into one.
+
+Above: `requests.py`. Below: `replay.py`, `game.py`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.api.clock import LOOPS_PER_SECOND
+from simulator.api.game_info import GameInfo
+from simulator.api.process import Failure, Playing
+from simulator.api.replay import Replay, ReplayError, rerun
+
+if TYPE_CHECKING:
+    from simulator.api.process import Process
+
+StartError, InfoError = sc.ResponseStartReplay.Error, sc.ResponseReplayInfo.Error
+
+
+class _Unreadable(Exception):
+    """No replay came of a request; `name` is that of an error which both enums have."""
+
+    def __init__(self, name: str, details: str) -> None:
+        super().__init__(details)
+        self.name = name
+
+
+def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.ResponseStartReplay:
+    """Simulates a game anew, seen by one of its players: his camera, his selection, his actions."""
+    try:
+        replay = _read(process, request)
+    except _Unreadable as error:
+        raise _cannot_start(error.name, str(error)) from error
+    if not request.HasField("options"):
+        raise _cannot_start("MissingOptions", "Say what to observe")
+    if request.options.HasField("render"):
+        raise _cannot_start("LaunchError", "Rendered images are not supported yet")
+    player = request.observed_player_id
+    if player not in replay.interfaces:
+        raise _cannot_start("InvalidObservedPlayerId", f"Nobody played as player {player} in the replay")
+    game, seat = rerun(replay, process.tables, player, request.options)
+    seat.sees_all = request.disable_fog and not replay.setup.disable_fog
+    process.setup = None
+    process.playing = Playing(game, seat, GameInfo(game, seat), replay=True)
+    return sc.ResponseStartReplay()
+
+
+def _cannot_start(name: str, details: str) -> Failure:
+    return Failure(sc.ResponseStartReplay(error=StartError.Value(name), error_details=details))
+
+
+def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseReplayInfo:
+    """Map, players and length of a replay."""
+    try:
+        replay = _read(process, request)
+    except _Unreadable as error:
+        body = sc.ResponseReplayInfo(error=InfoError.Value(error.name), error_details=str(error))
+        raise Failure(body) from error
+    info = sc.ResponseReplayInfo(
+        map_name=replay.setup.game_map.name,
+        local_map_path=replay.setup.path,
+        game_duration_loops=replay.loops,
+        game_duration_seconds=replay.loops / LOOPS_PER_SECOND,
+        game_version=process.game_version,
+        data_version=process.data_version,
+        data_build=process.base_build,
+        base_build=process.base_build,
+    )
+    for number, setup in enumerate(replay.setup.players, start=1):
+        extra = info.player_info.add(player_mmr=0, player_apm=0)
+        player = extra.player_info
+        player.player_id, player.type, player.race_requested = number, setup.type, setup.race
+        player.player_name = setup.player_name
+        extra.player_result.player_id = number
+        extra.player_result.result = sc.Result.Value(sc.Result.Name(replay.results[number]))  # type: ignore[arg-type]  # same numbers
+    return info
+
+
+def _read(process: Process, request: sc.RequestStartReplay | sc.RequestReplayInfo) -> Replay:
+    kind = request.WhichOneof("replay")
+    if kind is None:
+        raise _Unreadable("MissingReplay", "Name a replay by its path or send its data")
+    data = request.replay_data
+    if kind == "replay_path":
+        try:
+            data = (process.data_dir / "Replays" / Path(request.replay_path)).read_bytes()
+        except (OSError, ValueError) as error:
+            raise _Unreadable("InvalidReplayPath", f"No replay {request.replay_path}") from error
+    try:
+        return Replay.decode(data)
+    except ReplayError as error:
+        raise _Unreadable("InvalidReplayData", str(error)) from error

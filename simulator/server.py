@@ -1,0 +1,81 @@
+"""The websocket at `/sc2api`: frames in, frames out.
+
+Requests come as text frames from PySC2 and as binary frames from python-sc2; both carry raw protobuf, so text is
+not decoded. Connections come and go while the session lives on: the newest one is served, and whatever was open
+before it is dropped, so that a client that vanished without a word locks nobody out.
+
+It knows nothing of the game: that is `session.py`, called with the bytes of one request at a time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import gc
+from typing import TYPE_CHECKING
+
+from aiohttp import WSMsgType, web
+
+from simulator.session import Session
+from simulator.status import Status
+
+if TYPE_CHECKING:
+    import socket
+
+    from simulator.__main__ import Arguments
+
+ENDPOINT = "/sc2api"
+_REQUESTS = {WSMsgType.TEXT, WSMsgType.BINARY}
+
+
+class Server:
+    """Serves one session to one client after the other."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.done = asyncio.Event()
+        self._transport: asyncio.Transport | None = None
+
+    async def connect(self, request: web.Request) -> web.WebSocketResponse:
+        """Answers one client until it leaves, is replaced, or ends the process with quit."""
+        client = web.WebSocketResponse(decode_text=False, max_msg_size=0, compress=False, timeout=0.1)
+        await client.prepare(request)
+        before, self._transport = self._transport, request.transport
+        if before is not None:
+            before.abort()  # closing politely would wait for one that may be gone
+        with contextlib.suppress(ConnectionError):  # a client need not wait for its last answer
+            await self._answer(client)
+        return client
+
+    async def _answer(self, client: web.WebSocketResponse) -> None:
+        async for frame in client:
+            if frame.type not in _REQUESTS:
+                continue
+            await client.send_bytes(self.session.handle(frame.data))
+            if self.session.status is Status.quit:
+                self.done.set()
+                return
+
+
+def run(sock: socket.socket, arguments: Arguments) -> None:
+    """Serves on a listening socket until a client says quit."""
+    session = Session(
+        data_dir=arguments.data_dir,
+        base_build=arguments.base_build,
+        data_version=arguments.data_version,
+    )
+    gc.collect()
+    gc.freeze()  # tables and modules stay; collections in a game need not look at them again
+    asyncio.run(serve(sock, session))
+
+
+async def serve(sock: socket.socket, session: Session) -> None:
+    """Serves the session on a listening socket until a client says quit."""
+    server = Server(session)
+    app = web.Application()
+    app.router.add_get(ENDPOINT, server.connect)
+    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.SockSite(runner, sock).start()
+    await server.done.wait()
+    await runner.cleanup()
