@@ -142,7 +142,8 @@ def arguments(page: Page) -> Iterator[str]:
     screen, minimap = _n(page.task.frames.screen), _n(page.task.frames.minimap)
     yield "Arguments"
     if "tag" in kinds:
-        yield f"{INDENT}tag: the tag of a unit that stands above, for example 0x100140001"
+        units = [unit for team in page.teams for unit in (*team.enemies, *team.units)]
+        yield f"{INDENT}tag: the tag of a unit that stands above, for example {units[0].tag}"
     if "screen" in kinds:
         step = _n(CAMERA_WIDTH / page.task.frames.screen)
         yield (
@@ -296,7 +297,7 @@ def _weapon(weapon: Weapon) -> str:
     bonus = "".join(f" (+{_n(more)} against {what})" for what, more in weapon.bonus.items())
     return (
         f"hits {hits}, range {_n(weapon.range)}, damage {_n(weapon.damage)}{bonus}{times} "
-        f"every {_n(weapon.period_s)} s, {_n(round(weapon.per_second, 1))} per second"
+        f"every {_n(weapon.period_s)} s, {_n(round(weapon.per_second, 1))} damage per second"
     )
 
 
