@@ -18,6 +18,8 @@ from agents.llm.anthropic import Anthropic
 from agents.llm.limits import Budget, Limits
 from agents.llm.openai_compatible import OpenAICompatible
 from agents.llm.profiles import PROFILES
+from agents.llm.replay import ReplayClient
+from agents.llm.retry import RetryRule
 from agents.llm_policy import LLMPolicy
 from agents.memory import LastSteps
 from agents.policy import FunctionPolicy, Policy
@@ -26,9 +28,10 @@ from agents.secret import read_key
 from protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from agents.llm.client import LLMClient
+    from protocol.messages import Exchange
 
 
 def client_for(config: ModelConfig) -> LLMClient:
@@ -110,6 +113,23 @@ class Workshop:
             fault = error.errors(include_url=False)[0]
             field = ".".join(str(part) for part in fault["loc"])
             raise ConfigError(fault["msg"].removeprefix("Value error, "), source="command line", field=field) from None
+
+
+def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[str, LLMPolicy]:
+    """A policy for each agent that made the recorded requests; it gets the recorded answers, and waits for none.
+
+    Args:
+        exchanges: of one run, in any order.
+        memory: as the recorded agents had it.
+    """
+    by_agent: dict[str, list[Exchange]] = {}
+    for exchange in exchanges:
+        by_agent.setdefault(exchange.agent, []).append(exchange)
+    at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
+    return {
+        agent: LLMPolicy(ReplayClient(made), memory=LastSteps(memory) if memory else None, retry=at_once)
+        for agent, made in by_agent.items()
+    }
 
 
 def load_policy(name: str) -> Policy:
