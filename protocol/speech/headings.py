@@ -13,13 +13,15 @@ known to the bridge only.
 | H5 | a section written as a tag | `<Actions>` |
 | H6 | a section in the middle of a line, behind a sentence, a heading or a call | `They are weak. Actions: <Stop()>` |
 | H7 | a team with the word Team, in any case, with blanks and markup | `team stalker-1 :`, `Team: A` |
-| H8 | a team heading needs no colon if nothing but a call follows | `#### Team Stalker-1`, `Team A <Stop()>` |
+| H8 | a team heading needs no colon if nothing but a call follows | `#### Team Stalker-1`, `Team A -> <Stop()>` |
 | H9 | a team without the word Team: one word and a colon, then nothing or a call | `- Stalker-1: <Stop()>` |
 | H10 | a remark in brackets behind a team's name is dropped | `Team Stalker-1 (2 units):` |
 | H11 | a team written as a tag | `<Team Stalker-1>` |
-| H12 | all teams at once are a team of that name | `Both teams:` → `Both teams` |
+| H12 | several teams at once are one team of that name: who knows the teams refuses it | `Both teams:`, `Team A, B:` |
 | H13 | the word Team without a name is a heading of no team | `Team:` |
 | H14 | words that open a sentence are no team | `Note:`, `Reasoning:`, `Then:` |
+| H15 | a bare name with a number needs no colon before a call, and may stand in a table | `Stalker-1 → <Stop()>` |
+| H16 | the word Team behind the name, and "for" before it | `Stalker-1 team:`, `For Team A:` |
 """
 
 from __future__ import annotations
@@ -61,12 +63,20 @@ _SECTION = (
     r"(?:(?:final|my|our|next|chosen|team|the)[ \t]+)?+(?:analysis[ \t]+(?:and|&|\+|/)[ \t]+)?"
     rf"(?P<section>{_KEYWORD})(?:[ \t]*+[0-9]{{1,2}}+)?+{_FOR_TEAM}{_CLOSE}(?::|$)"
 )
+_GAP = r"(?:(?=[^\w\n<:,&/+]*+[,&/+])[^\w\n<:]*+|[^\w\n<:]++and[^\w\n<:]++)(?:teams?[ \t]+)?+"
+_SEVERAL = rf"{_WORD}(?:{_GAP}{_WORD}){{1,8}}+"
 _TEAM = (
-    rf"(?:team\b(?:[^\w\n<]*+(?:(?P<team>{_WORD}(?:[ \t]+{_WORD}){{0,2}}){_CLOSE}:"
+    rf"(?:for[ \t]+)?+teams?\b(?:[^\w\n<]*+(?:(?P<team>{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}}){_CLOSE}:"
     rf"|(?P<short>{_WORD}){_CLOSE}{_TO_EDGE})|[^\w\n<:]*+:{_TO_EDGE})"
-    rf"|(?P<every>(?:all|both|each|every)[ \t]+(?:\w++[ \t]+)??teams?){_CLOSE}:)"
+    rf"|(?P<every>(?:all|both|each|every)[ \t]+(?:\w++[ \t]+)??teams?){_CLOSE}:"
+    rf"|(?!(?:my|our|the|this|your)\b)(?P<behind>{_WORD})[ \t]+team{_CLOSE}:"
 )
-_BARE = rf"(?P<bare>[A-Za-z]\w*+(?:[.+-]\w++)*+){_CLOSE}:{_TO_EDGE}"
+_BARE = (
+    rf"(?P<bare>[A-Za-z]\w*+(?:[.+-]\w++)*+){_CLOSE}:{_TO_EDGE}"
+    rf"|(?P<numbered>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<]*+(?=<)"
+    rf"|(?P<several>(?=[^\n<:]*[0-9]){_SEVERAL}){_CLOSE}:{_TO_EDGE}"
+)
+_NAMED_BY = ("team", "short", "every", "behind", "bare", "numbered", "several", "of")
 _FLAGS = re.IGNORECASE | re.MULTILINE
 _LINE = re.compile(rf"{_BULLET}(?:{_SECTION}|{_TEAM}|{_BARE})", _FLAGS)
 _TAG = re.compile(
@@ -94,10 +104,12 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
     match = _LINE.match(text, at)
     if match is None:
         return None
+    if not line_start and ":" not in match.group() and text[match.end() : match.end() + 1] != "<":
+        return None  # "<Stop()> after this analysis" ends a sentence and opens nothing
     found = match.groupdict()
     if found["bare"] is not None and not _may_be_team(found["bare"], line_start=line_start):
         return None
-    name = found["team"] or found["short"] or found["bare"] or found["every"] or found["of"]
+    name = next((found[group] for group in _NAMED_BY if found[group] is not None), None)
     return Heading(
         end=match.end(),
         section=_section(found["section"]),
