@@ -1,76 +1,79 @@
 """Decides where a `put` runs: on the loop while it cannot block, on a thread when it could.
 
-A put on the loop costs 25 µs, one through a thread 150 µs and more; but a put into a full queue holds its thread until
-the link takes something, half a second at most under congestion control BLOCK. A link has `TX_SLOTS` slots per
-priority, and the kernel's buffers behind them (300 slots before the first blocked put was measured with 20 kB, exactly
-16 when the buffers were full): with fewer batches than that on their way, a put cannot block. What tells that they have
-arrived is a question that follows them through the same queue; one small question serves several puts.
+A put on the loop costs 5 to 25 µs, one through a thread 150 µs and more; but a put into a full queue holds its thread
+until the link takes something. How long, depends on its congestion control: half a second under BLOCK, which then
+closes the link; `WAIT_BEFORE_DROP_S` under DROP.
 """
 
 from __future__ import annotations
 
 import asyncio
 import threading
-from concurrent.futures import ThreadPoolExecutor
+import time
 from typing import TYPE_CHECKING, Protocol
 
-from protocol.bus.config import TX_SLOTS
+from protocol.bus.config import BATCH_BYTES, TX_SLOTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Executor
 
     Ask = Callable[[Callable[[bool], None]], None]
 
-BATCH_BYTES = 60_000
-"""A little less than Zenoh's batch of 65535 bytes; a larger payload is cut into several."""
-WINDOW_SLOTS = TX_SLOTS - 4
-"""The rest is for the questions."""
+WINDOW_BYTES = TX_SLOTS // 2 * BATCH_BYTES - BATCH_BYTES // 2
+"""What fits into a queue for sure. A sample that does not fit into the batch begun starts the next, so two neighbouring
+batches hold more than one is large, and all of them more than half; the rest is for the question and for headers."""
+HEADER_BYTES = 200
+SLOW_S = 0.002
 
 
 class Gate(Protocol):
     """Tells whether a put may run on the loop."""
 
-    def fits(self, slots: int) -> bool:
-        """Whether a put of `slots` batches cannot block now."""
+    def fits(self, size: int) -> bool:
+        """Whether a put of `size` bytes cannot block now."""
         ...
 
-    def sent(self, slots: int) -> None:
-        """Takes note of a put of `slots` batches."""
+    def sent(self, size: int, took_s: float) -> None:
+        """Takes note of a put."""
         ...
 
 
 class Lane:
-    """Runs puts in the order in which they are given, each on the loop or on one thread of its own."""
+    """Runs puts in the order in which they are given, each on the loop or on a thread.
 
-    def __init__(self, name: str, gate: Gate) -> None:
+    Args:
+        thread: an executor with one worker; several lanes may share it.
+        gate: decides.
+    """
+
+    def __init__(self, thread: Executor, gate: Gate) -> None:
+        self._thread = thread
         self._gate = gate
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix=name)
         self._waiting = 0
 
     async def put(self, put: Callable[[bytes], None], payload: bytes) -> None:
         """Calls `put(payload)` and returns when it has returned. Cancelled while it waits, the put may still happen."""
-        slots = 1 + len(payload) // BATCH_BYTES
-        if self._waiting or not self._gate.fits(slots):
+        size = len(payload) + HEADER_BYTES
+        if self._waiting or not self._gate.fits(size):
             self._waiting += 1
             try:
-                await asyncio.get_running_loop().run_in_executor(self._thread, put, payload)
+                took_s = await asyncio.get_running_loop().run_in_executor(self._thread, _timed, put, payload)
             finally:
                 self._waiting -= 1
         else:
-            put(payload)
-        self._gate.sent(slots)
-
-    def close(self) -> None:
-        """Waits for the puts that were given; it blocks."""
-        self._thread.shutdown(wait=True)
+            took_s = _timed(put, payload)
+        self._gate.sent(size, took_s)
 
 
 class Window:
-    """The gate of puts that block: open while no more than `WINDOW_SLOTS` batches have not been acknowledged.
+    """The gate of puts that BLOCK: open while what was put and has not arrived would fit into an empty queue.
+
+    The kernel's buffers come on top: with them empty, 225 puts of 20 kB went through before the first one blocked; with
+    them full, 32. What tells that something has arrived is a question that follows it through the same queue.
 
     Args:
-        ask: sends a question behind the puts of this lane. It calls back once, on any thread, and says whether an
-            answer came.
+        ask: sends a question behind the puts. It calls back once, on any thread, and says whether an answer came.
     """
 
     def __init__(self, ask: Ask) -> None:
@@ -79,43 +82,53 @@ class Window:
         self._in_flight = 0
         self._asking = False
 
-    def fits(self, slots: int) -> bool:
+    def fits(self, size: int) -> bool:
         """See `Gate`."""
         with self._lock:
-            return self._in_flight + slots <= WINDOW_SLOTS
+            return self._in_flight + size <= WINDOW_BYTES
 
-    def sent(self, slots: int) -> None:
-        """See `Gate`; asks when a third of the window is used."""
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
+        """See `Gate`; asks when a quarter of the window is used."""
         with self._lock:
-            self._in_flight += slots
-            if self._asking or self._in_flight < WINDOW_SLOTS // 3:
+            self._in_flight += size
+            if self._asking or self._in_flight < WINDOW_BYTES // 4:
                 return
             self._asking, asked = True, self._in_flight
         self._ask(lambda answered: self._acknowledge(asked if answered else 0))
 
-    def _acknowledge(self, slots: int) -> None:
+    def _acknowledge(self, size: int) -> None:
         with self._lock:
             self._asking = False
-            self._in_flight -= slots
+            self._in_flight -= size
 
 
-class OneBatch:
-    """The gate of puts that drop: a batch waits 1 ms for a slot, a payload of several 50 ms for all of them."""
+class Stopwatch:
+    """The gate of puts that DROP: open for what fits into one batch, until one was slow, until one is quick again."""
 
-    def fits(self, slots: int) -> bool:
+    def __init__(self) -> None:
+        self._slow = False
+
+    def fits(self, size: int) -> bool:
         """See `Gate`."""
-        return slots == 1
+        return size <= BATCH_BYTES and not self._slow
 
-    def sent(self, slots: int) -> None:
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
         """See `Gate`."""
+        self._slow = took_s > SLOW_S
 
 
 class Shut:
     """The gate where nothing tells what has arrived."""
 
-    def fits(self, slots: int) -> bool:  # noqa: ARG002  a gate is asked
+    def fits(self, size: int) -> bool:  # noqa: ARG002  a gate is asked
         """See `Gate`."""
         return False
 
-    def sent(self, slots: int) -> None:
+    def sent(self, size: int, took_s: float) -> None:
         """See `Gate`."""
+
+
+def _timed(put: Callable[[bytes], None], payload: bytes) -> float:
+    start = time.perf_counter()
+    put(payload)
+    return time.perf_counter() - start

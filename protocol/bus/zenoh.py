@@ -10,10 +10,10 @@ thread that keeps the process from ending. A session does not survive a fork: st
 from __future__ import annotations
 
 import asyncio
-import concurrent.futures
 import json
 import logging
 import threading
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -34,7 +34,7 @@ from protocol.bus import Delivery, Liveness, Sample
 from protocol.bus.config import BusConfig, check, settings
 from protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
 from protocol.bus.keyexpr import check_key, check_key_expr
-from protocol.bus.lane import Lane, OneBatch, Shut, Window
+from protocol.bus.lane import Lane, Shut, Stopwatch, Window
 from protocol.bus.mailbox import Mailbox
 from protocol.bus.sightings import PATIENCE_S, Sightings
 from protocol.errors import BusClosed, BusError
@@ -54,14 +54,12 @@ ANSWER_TIMEOUT_S = 1.0
 STATE_CACHE = 1
 """Only the newest of a state is worth anything: a larger cache would hand old ones to a late joiner."""
 HEARTBEAT_S = 0.3
-"""A dropped last sample is noticed after so long."""
+"""A dropped last sample is noticed after so long. With a sporadic heartbeat, which comes once after each change, the
+newest was lost for good when what it brought was dropped, too."""
 
-_SPEECH: dict[str, Any] = {
-    "congestion_control": CongestionControl.BLOCK,
-    "priority": Priority.INTERACTIVE_HIGH,
-    "express": True,
-}
-_LOG: dict[str, Any] = {"congestion_control": CongestionControl.DROP, "priority": Priority.DATA_LOW, "express": False}
+_SPEECH: dict[str, Any] = {"congestion_control": CongestionControl.BLOCK, "priority": Priority.INTERACTIVE_HIGH}
+"""Not express, which brought no earlier arrival: each express sample takes a slot of the queue for itself alone."""
+_LOG: dict[str, Any] = {"congestion_control": CongestionControl.DROP, "priority": Priority.DATA_LOW}
 
 
 async def open_bus(config: BusConfig) -> ZenohBus:
@@ -110,8 +108,9 @@ class ZenohBus:
         self._is_client = config.mode == "client"
         self._held = _Held()
         self._question = ""
-        self._speech = Lane("khala-speech", Window(self._ask) if self._is_client else Shut())
-        self._bulk = Lane("khala-bulk", OneBatch())
+        self._threads = [ThreadPoolExecutor(1, f"khala-{name}") for name in ("speech", "bulk")]
+        self._speech = Lane(self._threads[0], Window(self._ask) if self._is_client else Shut())
+        self._stopwatch = Stopwatch()
         self._mailboxes: set[Mailbox[Any]] = set()
         self._sightings: set[Sightings] = set()
         self._links = {str(transport.zid) for transport in session.info.transports()}
@@ -142,11 +141,11 @@ class ZenohBus:
         if delivery is Delivery.STATE:
             advanced = _declare_state_publisher(self._session, key_expr)
             self._held.add(advanced)
-            return _Publisher(key, self._held, self._bulk, advanced.put, advanced)
+            return _Publisher(key, self._held, self._bulk_lane(), advanced.put, advanced)
         # A declared publisher is silent until it has heard of a subscriber: up to 60 of 60 first puts were lost. A put
         # of the session goes to the router in any case.
         if delivery is Delivery.LOG:
-            return _Publisher(key, self._held, self._bulk, partial(self._session.put, key_expr, **_LOG))
+            return _Publisher(key, self._held, self._bulk_lane(), partial(self._session.put, key_expr, **_LOG))
         self._question = self._question or key
         return _Publisher(key, self._held, self._speech, partial(self._session.put, key_expr, **_SPEECH))
 
@@ -202,9 +201,13 @@ class ZenohBus:
         except zenoh.ZError as error:
             log.warning("closing the bus: %s", plain(str(error)))
 
+    def _bulk_lane(self) -> Lane:
+        # One link is slow for all publishers of a client; of a router's links, each has its own.
+        return Lane(self._threads[1], self._stopwatch if self._is_client else Stopwatch())
+
     def _shut(self) -> None:
-        self._speech.close()
-        self._bulk.close()
+        for thread in self._threads:
+            thread.shutdown()
         self._session.close()  # type: ignore[no-untyped-call]  # Zenoh's stub lacks the `-> None`
 
     def _check_open(self) -> None:
@@ -234,7 +237,6 @@ class ZenohBus:
             Callback(errors.append, lambda: answer(not errors), indirect=False),
             priority=Priority.INTERACTIVE_HIGH,
             congestion_control=CongestionControl.DROP,
-            express=True,
             timeout=ANSWER_TIMEOUT_S,
         )
 
@@ -327,7 +329,7 @@ def _declare_state_publisher(session: zenoh.Session, key_expr: zenoh.KeyExpr) ->
         congestion_control=CongestionControl.DROP,
         priority=Priority.DATA_HIGH,
         cache=CacheConfig(max_samples=STATE_CACHE, replies_config=replies),
-        sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+        sample_miss_detection=MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
         publisher_detection=True,
     )
 
@@ -376,7 +378,7 @@ def _resolve(future: asyncio.Future[None]) -> None:
 
 async def _on_thread(work: Callable[[], T]) -> T:
     """Runs what may block for seconds. Not on the loop's executor, whose threads keep a process from ending."""
-    future: concurrent.futures.Future[T] = concurrent.futures.Future()
+    future: Future[T] = Future()
 
     def run() -> None:
         try:

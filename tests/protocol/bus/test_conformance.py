@@ -1,0 +1,61 @@
+"""The promises of the bus, kept by each implementation."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack
+
+import pytest
+
+from protocol.bus import Bus
+from protocol.bus.config import BusConfig
+from protocol.bus.memory import MemoryBroker
+from protocol.bus.testing import BusConformance, Connect
+from protocol.bus.zenoh import open_bus
+
+
+class TestMemoryBus(BusConformance):
+    @pytest.fixture
+    async def connect(self) -> AsyncIterator[Connect]:
+        broker = MemoryBroker()
+        async with AsyncExitStack() as sessions:
+
+            async def connect() -> Bus:
+                session = broker.session()
+                sessions.push_async_callback(session.close)
+                return session
+
+            yield connect
+
+
+class TestZenohBusOfClients(BusConformance):
+    """Every session is a client of a router that takes no part."""
+
+    @pytest.fixture
+    async def connect(self, socket: str) -> AsyncIterator[Connect]:
+        async with AsyncExitStack() as sessions:
+            router = await open_bus(BusConfig(mode="router", listen=(socket,)))
+            sessions.push_async_callback(router.close)
+
+            async def connect() -> Bus:
+                session = await open_bus(BusConfig(connect=(socket,)))
+                sessions.push_async_callback(session.close)
+                return session
+
+            yield connect
+
+
+class TestZenohBusWithTheHostAsRouter(BusConformance):
+    """The first session is the router, and the others are its clients."""
+
+    @pytest.fixture
+    async def connect(self, socket: str) -> AsyncIterator[Connect]:
+        async with AsyncExitStack() as sessions:
+            configs = [BusConfig(mode="router", listen=(socket,))]
+
+            async def connect() -> Bus:
+                session = await open_bus(configs.pop() if configs else BusConfig(connect=(socket,)))
+                sessions.push_async_callback(session.close)
+                return session
+
+            yield connect
