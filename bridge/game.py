@@ -4,8 +4,8 @@
 it, and ends it when it hangs. The implementation on PySC2 is `bridge.pysc2_game`; no code above this module knows
 whether it talks to StarCraft II or to Khala's simulator, which is only a matter of the directory in `GameConfig`.
 
-Players are the ones that Khala plays, in the order of the configuration: one now, two later; so there is a tuple of
-snapshots and not one.
+Players are the ones that Khala plays, in the order of the configuration: one now, two later; so a game has a tuple of
+snapshots and not one. `OneSide` is the game as a match with one side has it: commands in, one snapshot out.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import TracebackType
 
+    from bridge.act import Command, Executor
     from bridge.act.plan import Plan, Played
     from bridge.snapshot import Snapshot
 
@@ -56,7 +57,7 @@ class GameConfig(Frozen):
 
 
 @dataclass(frozen=True, slots=True)
-class GameCard:
+class GameInfo:
     """What plays, for the run card."""
 
     version: str
@@ -80,7 +81,7 @@ class Game(Protocol):
     """One game with its players. Every method blocks; errors are `bridge.errors.GameError`."""
 
     @property
-    def card(self) -> GameCard:
+    def info(self) -> GameInfo:
         """What plays."""
 
     def reset(self) -> tuple[Snapshot, ...]:
@@ -133,9 +134,9 @@ class GameThread:
             self._threads.shutdown(wait=False)
 
     @property
-    def card(self) -> GameCard:
+    def info(self) -> GameInfo:
         """What plays."""
-        return self._playing.card
+        return self._playing.info
 
     async def reset(self) -> tuple[Snapshot, ...]:
         """Begins an episode; a snapshot for each player."""
@@ -162,6 +163,46 @@ class GameThread:
             raise GameHangs(
                 f"the game did not answer within {self._hang_s:g} s and was ended; try again, or another game or map"
             ) from None
+
+
+class OneSide:
+    """A game in which Khala plays one side; an async context manager around its thread."""
+
+    def __init__(self, thread: GameThread, executor: Executor, *, step_loops: int) -> None:
+        """Takes a game that is not entered yet, how to play commands, and how many loops pass between two decisions."""
+        self._thread = thread
+        self._executor = executor
+        self._step_loops = step_loops
+        self._now: Snapshot | None = None
+
+    async def __aenter__(self) -> Self:
+        """Starts the game."""
+        await self._thread.__aenter__()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Closes the game."""
+        await self._thread.__aexit__(kind, error, trace)
+
+    @property
+    def info(self) -> GameInfo:
+        """What plays."""
+        return self._thread.info
+
+    async def reset(self) -> Snapshot:
+        """Begins an episode."""
+        self._executor.begin()
+        (self._now,) = await self._thread.reset()
+        return self._now
+
+    async def act(self, commands: Sequence[Command]) -> Turn:
+        """Plays the commands of a joint action, and lets the game loops of a step pass."""
+        assert self._now is not None, "the game is reset before it is played"
+        (turn,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
+        self._now = turn.snapshot
+        return turn
 
 
 def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str, str] = os.environ) -> Path:

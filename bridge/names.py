@@ -1,6 +1,6 @@
-"""Names of the numbers in an observation: unit types, buffs, upgrades and orders, as PySC2 calls them.
+"""Names of the numbers that the game speaks in: unit types, buffs, upgrades, orders, abilities, as PySC2 has them.
 
-Names only; what a unit can do is told by `bridge.observe.knowledge`. A number that PySC2 does not know (the game
+Names only; what a unit can do is told by `bridge.knowledge`. A number that PySC2 does not know (the game
 is newer than it) gets a name made of the number, never an error.
 """
 
@@ -46,6 +46,6 @@ def order_name(ability: int) -> str:
     return _FORM.sub("", raw.name)
 
 
-def unit_types() -> frozenset[str]:
-    """Every name that `unit_name` can give to a unit that PySC2 knows."""
-    return frozenset(_UNITS.values())
+def ability_of(raw_function: str) -> int:
+    """Ability that a raw function of PySC2 stands for, by the name of the function, `Attack_unit`."""
+    return int(actions.RAW_FUNCTIONS[raw_function].ability_id)

@@ -11,16 +11,16 @@ import contextlib
 import hashlib
 import os
 import threading
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from absl import flags
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act.plan import Played, Step
-from bridge.compat import sc2_env
+from bridge.compat import maps, sc2_env
 from bridge.errors import GameError, GameMissing
-from bridge.game import GameCard, GameConfig, Turn, check_install
-from bridge.maps import pysc2_map
+from bridge.game import GameConfig, GameInfo, Turn, check_install
 from bridge.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bridge.act.plan import GameAction, Plan
+    from bridge.maps import MapSpec
     from protocol.messages import Outcome
 
 _OUTCOMES: dict[int, Outcome] = {sc_pb.Victory: "win", sc_pb.Defeat: "loss", sc_pb.Tie: "draw"}
@@ -54,7 +55,7 @@ class PySC2Game:
         self._env = _start(config)
         with _explained("the game could not be asked for its version"):
             ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
-        self._card = GameCard(
+        self._info = GameInfo(
             version=ping.game_version,
             data_version=ping.data_version,
             map_file=config.map.file,
@@ -62,9 +63,9 @@ class PySC2Game:
         )
 
     @property
-    def card(self) -> GameCard:
+    def info(self) -> GameInfo:
         """What plays."""
-        return self._card
+        return self._info
 
     def reset(self) -> tuple[Snapshot, ...]:
         """Begins an episode, and waits for the map's script to place its units."""
@@ -130,6 +131,22 @@ class PySC2Game:
             )
         self._ended = made[0].ended
         return tuple(made)
+
+
+class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
+    """A map as PySC2 takes it. The class has no file name, which keeps it out of PySC2's global table of maps."""
+
+    players = 2
+
+    def __init__(self, spec: MapSpec) -> None:
+        file = PurePosixPath(spec.file)
+        self._name = spec.name
+        self.directory = str(file.parent)
+        self.filename = file.name
+
+    @property
+    def name(self) -> str:
+        return self._name
 
 
 class _Player:
@@ -208,7 +225,7 @@ def _start(config: GameConfig) -> Any:
     try:
         with _sc2path(config.sc2path), _explained("the game could not be started"):
             env.__init__(
-                map_name=pysc2_map(config.map),
+                map_name=_Map(config.map),
                 players=players,
                 agent_interface_format=interface,
                 game_steps_per_episode=config.limit_loops,

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Literal, Self, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
-from bridge.act.catalog import Action, catalogue
+from bridge.catalog import Action, catalogue
+from bridge.knowledge import knowledge
 from bridge.maps import Difficulty, MapSpec, Race, known_maps
-from bridge.names import unit_types
 from protocol.errors import WrongKey
 from protocol.keys import check_name
 from protocol.messages import AgentCard, Clock, Frames, Frozen, TeamSpec
@@ -48,7 +48,7 @@ class TeamConfig(Frozen):
     @classmethod
     def _unit_types(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            _known(name, unit_types(), "unit type")
+            _known(name, knowledge(), "unit type")
         return names
 
 
@@ -76,7 +76,7 @@ class AgentConfig(Frozen):
     @classmethod
     def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
         for unit_type, names in actions.items():
-            _known(unit_type, unit_types(), "unit type")
+            _known(unit_type, knowledge(), "unit type")
             for name in names:
                 _known(name, catalogue(), "action")
                 if not catalogue()[name].fits(unit_type):
@@ -129,6 +129,8 @@ class TaskConfig(Frozen):
     executor: Literal["raw", "screen"] = "raw"
     clock: Clock = Clock()
     frames: Frames = Frames()
+    default_reply: str = ""
+    """What an agent is taken to have said that did not answer in time; empty: its units go on with what they do."""
     max_actions: int = Field(default=3, ge=1)
     """Actions that one team may have in one reply."""
     max_steps: int | None = Field(default=None, ge=1)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from s2clientprotocol import error_pb2
 
 from bridge.act.recognise import Refused, reject
-from bridge.names import order_name
+from bridge.names import ability_of, order_name
 from bridge.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -78,10 +78,14 @@ def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[Refus
     found: dict[int, Refusal] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
-        same = [i for i in suspects if order_name(commands[i].action.ability or 0) == order_name(error.ability_id)]
+        same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]
         for index in (same or suspects)[-1:]:
             found.setdefault(index, refuse(commands[index], words(error.result)))
     return tuple(found[index] for index in sorted(found))
+
+
+def _order(command: Command) -> str:
+    return order_name(ability_of(command.action.raw)) if command.action.raw else ""
 
 
 def words(result: int) -> str:

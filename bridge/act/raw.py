@@ -12,6 +12,7 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act.plan import Plan, Played, Step, listed, refused_by_game, written
+from bridge.names import ability_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,8 +37,8 @@ def unit_command(command: Command) -> sc_pb.Action:
     """A command in the words of the SC2 API."""
     action = sc_pb.Action()
     order = action.action_raw.unit_command
-    assert command.action.ability is not None  # a command comes of an action that orders something
-    order.ability_id = command.action.ability
+    assert command.action.raw is not None  # a command comes of an action that orders something
+    order.ability_id = ability_of(command.action.raw)
     order.unit_tags.extend(command.units)
     order.queue_command = command.queued
     if isinstance(command.target, int):

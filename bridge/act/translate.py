@@ -22,7 +22,7 @@ from bridge.names import unit_name
 from bridge.observe.sight import Sight, unmet
 
 if TYPE_CHECKING:
-    from bridge.act.catalog import Action
+    from bridge.catalog import Action
     from protocol.messages import Rejection
 
 _SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}

@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING
 
 from s2clientprotocol import raw_pb2
 
-from bridge.act.catalog import catalogue
+from bridge.catalog import catalogue
 from bridge.frames import Camera, MapFrame, WorldPoint
+from bridge.knowledge import is_armed
 from bridge.names import buff_name, order_name, unit_name, upgrade_name
 from bridge.observe.events import events
-from bridge.observe.knowledge import is_armed
 from bridge.snapshot import LOOPS_PER_S, Snapshot
 from protocol.messages import Resources, TeamView, UnitView, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.act.catalog import Action
+    from bridge.catalog import Action
     from bridge.observe.teams import Roster, Team
     from bridge.task import AgentConfig, TaskConfig
     from protocol.messages import ActionSpec, Alliance, Point

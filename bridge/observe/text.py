@@ -19,12 +19,12 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from bridge.frames import CAMERA_WIDTH
-from bridge.observe.knowledge import knowledge
+from bridge.knowledge import knowledge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from bridge.observe.knowledge import UnitType, Weapon
+    from bridge.knowledge import UnitType, Weapon
     from bridge.observe.sight import AgentSight
     from bridge.task import TaskConfig
     from protocol.messages import Event, Received, Rejection, TeamView, UnitView

@@ -2,18 +2,16 @@
 
 It says what an action is called, what it takes, who may use it and what PySC2 calls it. It decides nothing: whether
 a call fits it is the business of `bridge.act.recognise`, whether it may be done now that of `bridge.act.translate`.
-Ids of functions and abilities are looked up in PySC2 by name, so that a misspelt name is an error at import.
+It does not import PySC2, which takes seconds, so that tasks can be listed and checked quickly; that PySC2 has every
+function that is named here, and that both functions of an action are one ability, is tested.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import Any, Literal, Self, TypeAlias
-
-from pydantic import model_validator
+from typing import Literal, TypeAlias
 
 from bridge import data
-from bridge.compat import actions as pysc2_actions
 from protocol.messages import ActionSpec, Frozen
 
 ArgKind: TypeAlias = Literal["tag", "screen", "minimap"]
@@ -46,28 +44,6 @@ class Action(Frozen):
     """Name of PySC2's function for the screen executor."""
     queue: bool = False
     needs: Needs = Needs()
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if (self.raw is None) != (self.screen is None):
-            raise ValueError("an action has both a raw and a screen function, or none")
-        if self.subject == "unit" and self.args[:1] != ("tag",):
-            raise ValueError("the first argument has to be the tag of the unit")
-        if self.raw and self.screen:
-            raw, screen = pysc2_actions.RAW_FUNCTIONS[self.raw], pysc2_actions.FUNCTIONS[self.screen]
-            if raw.ability_id != screen.ability_id:
-                raise ValueError(f"{self.raw} and {self.screen} are different abilities")
-        return self
-
-    @property
-    def ability(self) -> int | None:
-        """Id of the ability that the raw interface is told."""
-        return None if self.raw is None else int(pysc2_actions.RAW_FUNCTIONS[self.raw].ability_id)
-
-    @property
-    def function(self) -> Any:
-        """PySC2's function for the screen; only for actions that order something."""
-        return pysc2_actions.FUNCTIONS[self.screen]
 
     @property
     def target_kind(self) -> ArgKind | None:
