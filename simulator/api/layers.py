@@ -21,17 +21,19 @@ from simulator.api.raster import Layer, draw_discs, sample
 from simulator.api.sight import Cloak, Display
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable
 
+    from google.protobuf.message import Message
     from numpy.typing import NDArray
     from s2clientprotocol import sc2api_pb2
 
+    from simulator.api.raster import Discs
     from simulator.api.sight import Sight
     from simulator.world import World
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
-    Grid = NDArray[np.bool_]
+    Ints = NDArray[np.int32]
 
 SCREEN_BITS = {
     "height_map": 8, "visibility_map": 8, "creep": 1, "power": 1, "player_id": 8, "unit_type": 32, "selected": 1,
@@ -44,6 +46,16 @@ MINIMAP_BITS = {
     "height_map": 8, "visibility_map": 8, "creep": 1, "camera": 1, "player_id": 8, "player_relative": 8,
     "selected": 1, "alerts": 1, "buildable": 1, "pathable": 1, "unit_type": 32,
 }  # fmt: skip
+VALUES = (
+    "player_id", "player_relative", "unit_type", "selected", "unit_hit_points", "unit_hit_points_ratio",
+    "unit_shields", "unit_shields_ratio", "unit_energy", "unit_energy_ratio", "hallucinations", "cloaked", "active",
+    "build_progress",
+)  # fmt: skip
+"""Layers that show a value of the topmost unit at each pixel."""
+
+BLANK = ("power", "effects", "blip", "buffs", "buff_duration", "placeholder")
+"""Screen layers of things that the world does not have yet."""
+
 CHEATING = frozenset({"unit_type"})
 """Minimap layers that are sent only when the client asks for cheating ones."""
 
@@ -65,52 +77,49 @@ class FeatureLayers:
 
     def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, screen: Screen, minimap: Minimap) -> None:
         self.screen, self.minimap = screen, minimap
-        hidden = set() if setup.allow_cheating_layers else CHEATING
-        self._screen = _layers(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
-        self._minimap = {
-            name: layer
-            for name, layer in _layers(
-                spatial_pb2.FeatureLayersMinimap, MINIMAP_BITS, minimap.columns, minimap.rows
-            ).items()
-            if name not in hidden
-        }
-        self._terrain: dict[str, tuple[tuple[float, float], Grid, list[bytes]]] = {}
+        hidden = frozenset() if setup.allow_cheating_layers else CHEATING
+        shown = {name: bits for name, bits in MINIMAP_BITS.items() if name not in hidden}
+        self._screen = _Image(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
+        self._minimap = _Image(spatial_pb2.FeatureLayersMinimap, shown, minimap.columns, minimap.rows)
 
     def encode(self, frame: Frame) -> list[bytes]:
         """The parts of an `ObservationFeatureLayer`."""
-        return wire.embed(1, self._encode_screen(frame)) + wire.embed(2, self._encode_minimap(frame))
+        values = unit_values(frame.sight, frame.selected)
+        return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
 
-    # screen -------------------------------------------------------------------------------------------------------
+    def _encode_screen(self, frame: Frame, values: Ints) -> list[bytes]:
+        screen, image = self.screen, self._screen
 
-    def _encode_screen(self, frame: Frame) -> Iterable[bytes]:
-        screen, layers = self.screen, self._screen
+        def axes() -> tuple[Floats, Floats]:
+            corner, pixels = np.zeros(1), np.arange(max(screen.columns, screen.rows), dtype=np.float64)
+            columns, _ = screen.to_world(pixels[: screen.columns], corner, frame.camera)
+            _, lines = screen.to_world(corner, pixels[: screen.rows], frame.camera)
+            return columns, lines
+
         x, y = screen.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1], frame.camera)
-        near = _near(x, y, frame.sight.radius / screen.scale, screen.columns, screen.rows)
-        centres = np.stack([x[near], y[near]], axis=1)
-        discs = draw_discs(centres, frame.sight.radius[near] / screen.scale, screen.columns, screen.rows)
-        columns, _ = screen.to_world(np.arange(screen.columns, dtype=np.float64), np.zeros(1), frame.camera)
-        _, lines = screen.to_world(np.zeros(1), np.arange(screen.rows, dtype=np.float64), frame.camera)
-        drawn = self._sample("screen", frame, layers, columns, lines)
-        values = unit_values(frame.sight, frame.selected, near)
-        drawn += [layers[name].encode_discs(discs, column) for name, column in values.items()]
-        drawn += [layers["unit_density"].encode(discs.density), layers["unit_density_aa"].encode(discs.smooth)]
-        blank = ("power", "effects", "blip", "buffs", "buff_duration", "placeholder")
-        return drawn + [layers[name].blank for name in blank]
+        radius = frame.sight.radius / screen.scale
+        near = _near(x, y, radius + 1, screen.columns, screen.rows)
+        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
+        layers = image.layers
+        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
+        parts += [layers["unit_density"].encode(discs.density), layers["unit_density_aa"].encode(discs.smooth)]
+        return parts + [layers[name].blank for name in BLANK]
 
-    # minimap ------------------------------------------------------------------------------------------------------
+    def _encode_minimap(self, frame: Frame, values: Ints) -> list[bytes]:
+        minimap, image = self.minimap, self._minimap
 
-    def _encode_minimap(self, frame: Frame) -> Iterable[bytes]:
-        minimap, layers = self.minimap, self._minimap
+        def axes() -> tuple[Floats, Floats]:
+            corner, pixels = np.zeros(1), np.arange(max(minimap.columns, minimap.rows), dtype=np.float64)
+            columns, _ = minimap.to_world(pixels[: minimap.columns], corner)
+            _, lines = minimap.to_world(corner, pixels[: minimap.rows])
+            return columns, lines
+
         x, y = minimap.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1])
-        near = np.flatnonzero(frame.sight.display != Display.HIDDEN)
-        centres = np.stack([x[near], y[near]], axis=1)
-        discs = draw_discs(centres, frame.sight.radius[near] / minimap.scale, minimap.columns, minimap.rows)
-        columns, _ = minimap.to_world(np.arange(minimap.columns, dtype=np.float64), np.zeros(1))
-        _, lines = minimap.to_world(np.zeros(1), np.arange(minimap.rows, dtype=np.float64))
-        drawn = self._sample("minimap", frame, layers, columns, lines)
-        values = unit_values(frame.sight, frame.selected, near)
-        drawn += [layers[name].encode_discs(discs, values[name]) for name in values if name in layers]
-        return [*drawn, self._camera(frame), self._alerts(frame)]
+        known = np.flatnonzero(frame.sight.display != Display.HIDDEN)
+        radius = frame.sight.radius[known] / minimap.scale
+        discs = draw_discs(np.stack([x[known], y[known]], axis=1), radius, minimap.columns, minimap.rows)
+        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, known])
+        return [*parts, self._camera(frame), self._alerts(frame)]
 
     def _camera(self, frame: Frame) -> bytes:
         view = self.screen.view(frame.camera)
@@ -118,80 +127,83 @@ class FeatureLayers:
         x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
         image = np.zeros((self.minimap.rows, self.minimap.columns), np.bool_)
         image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
-        return self._minimap["camera"].encode(image)
+        return self._minimap.layers["camera"].encode(image)
 
     def _alerts(self, frame: Frame) -> bytes:
-        layer = self._minimap["alerts"]
+        layer = self._minimap.layers["alerts"]
         if not len(frame.attacked):
             return layer.blank
         x, y = self.minimap.to_pixels(frame.attacked[:, 0], frame.attacked[:, 1])
         spots = draw_discs(np.stack([x, y], axis=1), np.zeros(len(x)), self.minimap.columns, self.minimap.rows)
-        return layer.encode_discs(spots, np.ones(len(x), np.bool_))
+        return layer.encode_pixels(spots.pixels, np.ones(len(spots.pixels), np.int32))
 
-    # terrain ------------------------------------------------------------------------------------------------------
 
-    def _sample(
-        self, image: str, frame: Frame, layers: dict[str, Layer], columns: Floats, lines: Floats
-    ) -> list[bytes]:
+class _Image:
+    """The layers of the screen or of the minimap, and how they are drawn alike."""
+
+    def __init__(self, message: type[Message], bits: dict[str, int], columns: int, rows: int) -> None:
+        fields = message.DESCRIPTOR.fields_by_name
+        self.layers = {name: Layer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
+        self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
+        self._camera: tuple[float, float] | None = None
+        self._walk: Bools | None = None
+        self._terrain: list[bytes] = []
+
+    def encode_units(self, discs: Discs, values: Ints) -> list[bytes]:
+        """The layers that show units, from the values [k, n] of the discs' rows."""
+        shown: list[bool] = np.any(values, axis=1).tolist()
+        spread = values[:, discs.rows]
+        return [
+            layer.encode_pixels(discs.pixels, spread[k]) if shown[k] else layer.blank for k, layer in self._of_units
+        ]
+
+    def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[bytes]:
         """Terrain and visibility; drawn again only when the camera moved, the ground changed, or fog may have."""
-        world = frame.world
+        world, layers = frame.world, self.layers
         terrain, visibility = world.map.terrain, world.visibility[frame.player]
-        camera, walk, drawn = self._terrain.get(image, (None, None, []))
-        if camera != frame.camera or walk is not world.ground.walk:
-            drawn = [
-                layers["height_map"].encode(sample(terrain.height, columns, lines)),
-                layers["pathable"].encode(sample(world.ground.walk, columns, lines)),
-                layers["buildable"].encode(sample(terrain.build, columns, lines)),
-                layers["creep"].encode(sample(terrain.creep, columns, lines)),
-                layers["visibility_map"].encode(sample(visibility, columns, lines)),
+        if self._camera != frame.camera or self._walk is not world.ground.walk:
+            x, y = axes()
+            self._camera, self._walk = frame.camera, world.ground.walk
+            self._terrain = [
+                layers["visibility_map"].encode(sample(visibility, x, y)),
+                layers["height_map"].encode(sample(terrain.height, x, y)),
+                layers["pathable"].encode(sample(world.ground.walk, x, y)),
+                layers["buildable"].encode(sample(terrain.build, x, y)),
+                layers["creep"].encode(sample(terrain.creep, x, y)),
             ]
-            self._terrain[image] = (frame.camera, world.ground.walk, drawn)
         elif world.fog:
-            drawn[-1] = layers["visibility_map"].encode(sample(visibility, columns, lines))
-        return list(drawn)
+            self._terrain[0] = layers["visibility_map"].encode(sample(visibility, *axes()))
+        return list(self._terrain)
 
 
-def unit_values(sight: Sight, selected: Bools, rows: NDArray[np.intp]) -> dict[str, NDArray[np.generic]]:
-    """The value of each drawn unit in each layer that shows units.
+def unit_values(sight: Sight, selected: Bools) -> Ints:
+    """[len(VALUES), n] value of each unit in each layer that shows units.
 
     Hit points, shields and energy are whole points, their ratios 0 to 255; the progress of a structure is 0 to 255
     while it is being built and 0 afterwards.
     """
-    life, shields, energy = sight.life[rows], sight.shields[rows], sight.energy[rows]
-    progress = sight.build_progress[rows]
-    cloak = sight.cloak[rows]
-    return {
-        "player_id": sight.owner[rows],
-        "player_relative": sight.alliance[rows],
-        "unit_type": sight.type_id[rows],
-        "selected": selected[rows],
-        "unit_hit_points": life.astype(np.int32),
-        "unit_hit_points_ratio": _ratio(life, sight.life_max[rows]),
-        "unit_shields": shields.astype(np.int32),
-        "unit_shields_ratio": _ratio(shields, sight.shields_max[rows]),
-        "unit_energy": energy.astype(np.int32),
-        "unit_energy_ratio": _ratio(energy, sight.energy_max[rows]),
-        "hallucinations": sight.hallucination[rows],
-        "cloaked": (cloak != Cloak.NOT_CLOAKED) & (cloak != Cloak.UNKNOWN),
-        "active": sight.active[rows],
-        "build_progress": np.where(progress < 1, progress * 255, 0).astype(np.uint8),
-    }
+    values = np.empty((len(VALUES), len(sight)), np.int32)
+    values[0] = sight.owner
+    values[1] = sight.alliance
+    values[2] = sight.type_id
+    values[3] = selected
+    values[4], values[5] = sight.life, _ratio(sight.life, sight.life_max)
+    values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
+    values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
+    values[10] = sight.hallucination
+    values[11] = (sight.cloak != Cloak.NOT_CLOAKED) & (sight.cloak != Cloak.UNKNOWN)
+    values[12] = sight.active
+    values[13] = (sight.build_progress < 1) * sight.build_progress * 255
+    return values
 
 
-def _ratio(part: Floats, whole: Floats) -> NDArray[np.uint8]:
-    ratio: NDArray[np.uint8] = np.divide(part * 255, whole, out=np.zeros_like(part), where=whole > 0).astype(np.uint8)
-    return ratio
+def _ratio(part: Floats, whole: Floats) -> Floats:
+    return np.minimum(part / np.maximum(whole, 1e-9), 1.0) * 255
 
 
-def _near(x: Floats, y: Floats, radius: Floats, columns: int, rows: int) -> NDArray[np.intp]:
-    margin = radius + 1
+def _near(x: Floats, y: Floats, margin: Floats, columns: int, rows: int) -> NDArray[np.intp]:
     inside = (x > -margin) & (x < columns + margin) & (y > -margin) & (y < rows + margin)
     return np.flatnonzero(inside)
-
-
-def _layers(message: type, bits: dict[str, int], columns: int, rows: int) -> dict[str, Layer]:
-    fields = message.DESCRIPTOR.fields_by_name  # type: ignore[attr-defined]  # of every message class
-    return {name: Layer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
 
 
 def screen_of(setup: sc2api_pb2.SpatialCameraSetup) -> Screen:

@@ -102,6 +102,7 @@ class Layer:
 
     def __init__(self, field: int, bits_per_pixel: int, columns: int, rows: int) -> None:
         self.bits_per_pixel = bits_per_pixel
+        self._dtype = _DTYPES[bits_per_pixel]
         self.area = columns * rows
         size = (self.area * bits_per_pixel + 7) // 8
         shape = wire.scalar(1, columns) + wire.scalar(2, rows)
@@ -113,12 +114,10 @@ class Layer:
         """The field for an image, flat or [y, x]."""
         if self.bits_per_pixel == 1:
             return self.head + np.packbits(image, axis=None).tobytes()
-        return self.head + image.astype(_DTYPES[self.bits_per_pixel], copy=False).tobytes()
+        return self.head + image.astype(self._dtype, copy=False).tobytes()
 
-    def encode_discs(self, discs: Discs, values: NDArray[Any]) -> bytes:
-        """The field for an image in which each disc has its value, and the rest is 0."""
-        if not values.any():
-            return self.blank
-        image = np.zeros(self.area, _DTYPES[self.bits_per_pixel])
-        image[discs.pixels] = values[discs.rows]
+    def encode_pixels(self, pixels: NDArray[np.intp], values: NDArray[np.int32]) -> bytes:
+        """The field for an image that is 0 but at these pixels; of two values for one pixel the later one counts."""
+        image = np.zeros(self.area, self._dtype)
+        image[pixels] = values
         return self.encode(image)

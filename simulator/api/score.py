@@ -6,14 +6,15 @@ player has plus the value of what he killed, which is an estimate. Values are th
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
+import numpy as np
 from s2clientprotocol import sc2api_pb2, score_pb2
 
 from simulator.orders import OrderKind
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from simulator.api.types import Types
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 FOOD_LIMIT = 200
+TOWN_HALL_MINERALS = 300
+"""From this price on, a structure that provides supply is a town hall: no Pylon, depot or extractor is."""
+
+CATEGORIES = ("army", "economy", "technology")
 
 
 class Holdings:
@@ -28,54 +33,41 @@ class Holdings:
 
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.player: Player = world.players[player]
-        self.types = types
         slots = world.units_of(player)
-        self.rows = world.type[slots]
-        self._idle = world.order_kind[slots] == OrderKind.IDLE
-        structure, worker = types.structure[self.rows], types.worker[self.rows]
-        self.worker: NDArray[np.bool_] = worker
-        self.units: NDArray[np.bool_] = ~structure
-        self.structures: NDArray[np.bool_] = structure
-        town_hall = structure & (types.provides[self.rows] > 0) & (types.minerals[self.rows] >= 300)
-        self.category = {
-            "army": self.units & ~worker,
-            "economy": worker | town_hall,
-            "technology": structure & ~town_hall,
-        }
-
-    def total(self, column: NDArray[np.float64], which: NDArray[np.bool_] | None = None) -> float:
-        """Sum of a column of the types over the player's units, or over some of them."""
-        rows = self.rows if which is None else self.rows[which]
-        return float(column[rows].sum())
+        rows = world.type[slots]
+        names, columns = _columns(types)
+        totals = np.bincount(rows, minlength=len(columns)) @ columns
+        self.totals: dict[str, float] = dict(zip(names, totals.tolist(), strict=True))
+        idle = (world.order_kind[slots] == OrderKind.IDLE) & types.worker[rows]
+        self.idle_workers = int(idle.sum())
 
     def common(self) -> sc2api_pb2.PlayerCommon:
         """The counters at the top of the player's screen; supply in whole points."""
-        types, player = self.types, self.player
-        food_used, food_workers = self.total(types.supply), self.total(types.supply, self.worker)
+        player, totals = self.player, self.totals
         common = sc2api_pb2.PlayerCommon(
             player_id=player.id,
             minerals=int(player.minerals),
             vespene=int(player.vespene),
-            food_cap=min(FOOD_LIMIT, int(self.total(types.provides))),
-            food_used=int(food_used),
-            food_army=int(food_used - food_workers),
-            food_workers=int(food_workers),
-            idle_worker_count=int((self.worker & self._idle).sum()),
-            army_count=int(types.army[self.rows].sum()),
-            warp_gate_count=int(types.warp_gate[self.rows].sum()),
+            food_cap=min(FOOD_LIMIT, int(totals["provides"])),
+            food_used=int(totals["supply"]),
+            food_army=int(totals["supply"] - totals["supply of workers"]),
+            food_workers=int(totals["supply of workers"]),
+            idle_worker_count=self.idle_workers,
+            army_count=int(totals["army"]),
+            warp_gate_count=int(totals["warp gates"]),
         )
         if player.race == "zerg":
-            common.larva_count = int(types.larva[self.rows].sum())
+            common.larva_count = int(totals["larvae"])
         return common
 
     def score(self) -> score_pb2.Score:
         """The score with its details."""
-        types, counted = self.types, self.player.score
+        counted, totals = self.player.score, self.totals
         details = score_pb2.ScoreDetails(
             idle_production_time=0,
             idle_worker_time=0,
-            total_value_units=self.total(types.score_make, self.units),
-            total_value_structures=self.total(types.score_make, self.structures),
+            total_value_units=totals["value of units"],
+            total_value_structures=totals["value of structures"],
             killed_value_units=counted.killed_value_units,
             killed_value_structures=counted.killed_value_structures,
             collected_minerals=0,
@@ -96,12 +88,9 @@ class Holdings:
             current_apm=0,
             current_effective_apm=0,
         )
-        for message, column in (
-            (details.food_used, types.supply),
-            (details.used_minerals, types.minerals),
-            (details.used_vespene, types.vespene),
-        ):
-            self._by_category(message, column)
+        self._by_category(details.food_used, "supply")
+        self._by_category(details.used_minerals, "minerals")
+        self._by_category(details.used_vespene, "vespene")
         _add(details.total_used_minerals, details.used_minerals, details.lost_minerals)
         _add(details.total_used_vespene, details.used_vespene, details.lost_vespene)
         total = (
@@ -112,11 +101,30 @@ class Holdings:
         )
         return score_pb2.Score(score_type=score_pb2.Score.Melee, score=int(total), score_details=details)
 
-    def _by_category(self, message: score_pb2.CategoryScoreDetails, column: NDArray[np.float64]) -> None:
+    def _by_category(self, message: score_pb2.CategoryScoreDetails, what: str) -> None:
         message.none = message.upgrade = 0
-        message.army, message.economy, message.technology = (
-            self.total(column, which) for which in self.category.values()
-        )
+        message.army, message.economy, message.technology = (self.totals[f"{what}, {c}"] for c in CATEGORIES)
+
+
+@functools.lru_cache(maxsize=4)
+def _columns(types: Types) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Names and values [rows, k] of what is summed over a player's units."""
+    town_hall = types.structure & (types.provides > 0) & (types.minerals >= TOWN_HALL_MINERALS)
+    economy = types.worker | town_hall
+    categories = (~types.structure & ~types.worker, economy, types.structure & ~town_hall)
+    columns: dict[str, NDArray[np.float64]] = {
+        "supply": types.supply,
+        "supply of workers": types.supply * types.worker,
+        "provides": types.provides,
+        "army": types.army.astype(np.float64),
+        "warp gates": types.warp_gate.astype(np.float64),
+        "larvae": types.larva.astype(np.float64),
+        "value of units": types.score_make * ~types.structure,
+        "value of structures": types.score_make * types.structure,
+    }
+    for name, column in (("supply", types.supply), ("minerals", types.minerals), ("vespene", types.vespene)):
+        columns |= {f"{name}, {c}": column * which for c, which in zip(CATEGORIES, categories, strict=True)}
+    return tuple(columns), np.stack(list(columns.values()), axis=1)
 
 
 def _spent(spent: Spent, resource: int) -> score_pb2.CategoryScoreDetails:
