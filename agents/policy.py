@@ -108,6 +108,7 @@ class FunctionPolicy:
 async def _in_thread(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """What `function` returns, from a thread that does not keep the process from ending."""
     future: Future[T] = Future()
+    future.set_running_or_notify_cancel()  # from now on it cannot be cancelled, as the thread cannot
     context = contextvars.copy_context()
 
     def run() -> None:
