@@ -9,7 +9,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.orders import ATTACK, HOLD_POSITION, MOVE, PATROL, SCAN_MOVE, Order, OrderKind
+from simulator.orders import (
+    ATTACK,
+    HOLD_POSITION,
+    LOOKS_AROUND,
+    MOVE,
+    NEEDS_TARGET,
+    PATROL,
+    SCAN_MOVE,
+    WALKS,
+    Order,
+    OrderKind,
+)
 from simulator.players import GameResult
 from simulator.systems.engagement import disengage, engage
 from simulator.world import NO_TAG, NOBODY
@@ -213,6 +224,11 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
     if order.kind is not OrderKind.ATTACK_UNIT or target == NOBODY or not engage(world, slot, target):
         disengage(world, slot)
+    world.walks[slot] = order.kind in WALKS
+    world.looks_around[slot] = order.kind in LOOKS_AROUND
+    world.holds[slot] = order.kind is OrderKind.HOLD
+    world.needs_target[slot] = order.kind in NEEDS_TARGET
+    world.scan_now = True
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0
     world.returning[slot] = world.nav_end[slot] = False

@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 
 def length(vector: Floats) -> Floats:
     """Euclidean length of each row of ``vector`` (..., 2)."""
-    x, y = vector[..., 0], vector[..., 1]
-    result: Floats = np.sqrt(x * x + y * y)
+    squared = vector * vector
+    result: Floats = np.sqrt(squared[..., 0] + squared[..., 1])
     return result
 
 
@@ -41,7 +41,7 @@ def turn_towards(current: Floats, wanted: Floats, cos_step: Floats, sin_step: Fl
     wx, wy = wanted[:, 0], wanted[:, 1]
     cos_error = cx * wx + cy * wy
     reached = cos_error >= cos_step
-    if reached.all():
+    if np.count_nonzero(reached) == len(reached):
         return wanted
     sine = np.where(cx * wy - cy * wx >= 0.0, sin_step, -sin_step)
     turned = np.empty_like(current)

@@ -24,6 +24,10 @@ class OrderKind(IntEnum):
     SCAN_MOVE = 7
 
 
+WALKS: Final = frozenset({OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL})
+LOOKS_AROUND: Final = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.HOLD, OrderKind.PATROL})
+NEEDS_TARGET: Final = frozenset({OrderKind.ATTACK_UNIT, OrderKind.FOLLOW})
+
 SMART: Final = 1
 STOP: Final = 4
 MOVE: Final = 16

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.arrays import which
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ Bools = NDArray[np.bool_]
 FIELDS_KEPT: Final = 2048
 SIDE_CLEARANCE: Final = 0.3
 SAMPLE_STEP: Final = 0.35
-LOOK_AHEAD: Final = (1, 2, 3, 4, 6, 8, 11, 15, 20, 26)
+LOOK_AHEAD: Final = (1, 2, 3, 5, 8, 12, 18, 26)
 NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
@@ -37,6 +38,7 @@ class Surface:
     def __init__(self, free: Grid) -> None:
         self.free = free
         self.height, self.width = free.shape
+        self._last = np.array([self.width - 1, self.height - 1])
         self.flat: Bools = free.ravel()
         padded = np.pad(free, 1)
         # free with all eight neighbours free: a body of at most one cell touches no wall from here
@@ -50,9 +52,10 @@ class Surface:
 
     def cell(self, points: Floats) -> Ints:
         """Cells under points (..., 2); points outside count as the nearest cell inside."""
-        x = np.clip(points[..., 0].astype(np.int64), 0, self.width - 1)
-        y = np.clip(points[..., 1].astype(np.int64), 0, self.height - 1)
-        result: Ints = y * self.width + x
+        at = points.astype(np.int64)
+        np.maximum(at, 0, out=at)
+        np.minimum(at, self._last, out=at)
+        result: Ints = at[..., 1] * self.width + at[..., 0]
         return result
 
     def centre(self, cells: Ints) -> Floats:
@@ -78,17 +81,16 @@ class Surface:
     def clear(self, start: Floats, end: Floats) -> Bools:
         """(k,) whether a body of ordinary width gets straight from ``start`` (k, 2) to ``end`` (k, 2)."""
         result = self._box_is_free(start, end)
-        unsure = np.flatnonzero(~result)
-        if unsure.size:
+        if np.count_nonzero(result) < len(result):
+            unsure = which(~result)
             result[unsure] = self._sampled(start[unsure], end[unsure])
         return result
 
     def _box_is_free(self, start: Floats, end: Floats) -> Bools:
         low = np.floor(np.minimum(start, end) - SIDE_CLEARANCE).astype(np.int64)
         high = np.floor(np.maximum(start, end) + SIDE_CLEARANCE).astype(np.int64) + 1
-        limits = np.array([self.width, self.height])
-        np.clip(low, 0, limits - 1, out=low)
-        np.clip(high, 1, limits, out=high)
+        np.maximum(low, 0, out=low)
+        np.minimum(high, self._last + 1, out=high)
         s = self._sums
         free = s[high[:, 1], high[:, 0]] - s[low[:, 1], high[:, 0]] - s[high[:, 1], low[:, 0]] + s[low[:, 1], low[:, 0]]
         size = high - low
@@ -116,7 +118,10 @@ class Surface:
         Each start must lie in the connected part of its goal.
         """
         here = self.cell(start)
-        steps = np.stack([self._follow(int(c), int(g)) for c, g in zip(here, goal_cell, strict=True)])
+        steps = np.empty((len(here), len(LOOK_AHEAD)), dtype=np.int64)
+        for goal in dict.fromkeys(goal_cell.tolist()):
+            mine = goal_cell == goal
+            steps[mine] = self._follow(here[mine], goal)
         ahead = self.centre(steps)  # (k, len(LOOK_AHEAD), 2)
         k, m = steps.shape
         seen = self.clear(np.repeat(start, m, axis=0), ahead.reshape(-1, 2)).reshape(k, m)
@@ -134,15 +139,16 @@ class Surface:
             return math.dist(start, goal)
         return float(self._field(b)[1][a])
 
-    def _follow(self, cell: int, goal: int) -> Ints:
+    def _follow(self, cells: Ints, goal: int) -> Ints:
+        """(k, len(LOOK_AHEAD)) the cells that lie so many steps on the way from each of ``cells``."""
         towards = self._field(goal)[0]
         steps, at = [], 0
         for wanted in LOOK_AHEAD:
             while at < wanted:
-                cell = int(towards[cell])
+                cells = towards.take(cells)
                 at += 1
-            steps.append(cell)
-        return np.array(steps)
+            steps.append(cells)
+        return np.stack(steps, axis=1)
 
     def _field(self, goal: int) -> tuple[Ints, Floats]:
         """For every cell the next cell towards ``goal`` (itself where there is no way) and the distance."""

@@ -22,6 +22,7 @@ and the reader; ``systems.triggers`` executes them and ``maps`` joins a scenario
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import yaml
@@ -164,6 +165,18 @@ class Scenario(_Model):
                     if isinstance(place, str) and place not in self.points:
                         raise ValueError(f"trigger {trigger.name!r} uses the point {place!r}, which is not in points")
         return self
+
+    @cached_property
+    def periods(self) -> tuple[int, ...]:
+        """The periods in game loops at which any trigger is due."""
+        times = [when for trigger in self.triggers for when in trigger.when]
+        return tuple(sorted({when.every_loops for when in times if isinstance(when, Every)}))
+
+    @cached_property
+    def moments(self) -> frozenset[int]:
+        """The single game loops at which any trigger is due."""
+        times = [when for trigger in self.triggers for when in trigger.when]
+        return frozenset(when.at_loop for when in times if isinstance(when, At))
 
     def place(self, place: Place) -> tuple[float, float]:
         """World coordinates of a named point or of a pair of numbers."""

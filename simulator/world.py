@@ -105,6 +105,10 @@ TRAITS: Final[tuple[tuple[str, type, int, float], ...]] = (
     ("air_scan", np.float64, 0, 0),
     ("acquires", np.bool_, 0, 0),
     ("targetable", np.bool_, 0, 0),
+    ("walks", np.bool_, 0, 0),
+    ("looks_around", np.bool_, 0, 0),
+    ("holds", np.bool_, 0, 0),
+    ("needs_target", np.bool_, 0, 0),
     ("gap", np.float64, 0, 0),
     ("in_reach", np.bool_, 0, 0),
     ("wants", np.bool_, 0, 0),
@@ -169,7 +173,7 @@ class World:
     returning: Bools  # (capacity,) an idle unit that will go back there after the fight
     weapon: Ints  # (capacity,) row of the weapon for that target, or -1
     reach: Floats  # (capacity,) its range, edge to edge
-    reach_min: Floats  # (capacity,) and the range below which it can't fire
+    reach_min: Floats  # (capacity,) and the range below which it can't fire, -inf without one
     slop: Floats  # (capacity,) how far beyond its range a started attack still takes effect
     aim_cos: Floats  # (capacity,) cosine of the largest angle between body and target, -1 for turrets
     cooldown: Floats  # (capacity,) loops until the next attack may start
@@ -201,6 +205,10 @@ class World:
     air_scan: Floats  # (capacity,)
     acquires: Bools  # (capacity,) it picks fights by itself
     targetable: Bools  # (capacity,) it may be a target at all
+    walks: Bools  # (capacity,) its order is to walk to a point
+    looks_around: Bools  # (capacity,) its order lets it pick fights
+    holds: Bools  # (capacity,) its order is to stay on the spot
+    needs_target: Bools  # (capacity,) its order ends with its target
     gap: Floats  # (capacity,) distance to its target this loop, edge to edge
     in_reach: Bools  # (capacity,) its target is within the weapon's reach this loop
     wants: Bools  # (capacity,) it wants to move this loop
@@ -249,8 +257,12 @@ class World:
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
         self.settled = -1  # the population among which no body touched another when all last stood still
-        self.pairs: tuple[Floats, Floats] | None = None  # collision.pair_table of this population
+        self.pairs: tuple[Floats, Floats, Floats] | None = None  # collision.pair_table of this population
+        self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.creep_counts = bool(game_map.terrain.creep.any())
+        self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
+        self.stirred = True  # somebody walked in the last loop
+        self.scan_now = True  # somebody lost a target or got an order since the last scan
         self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
         self.population = 0  # counts births and deaths, for what is worth remembering between them
         self._grow(64)
@@ -274,6 +286,7 @@ class World:
         self.cloaked[slot], self.burrowed[slot] = unit.cloaked, unit.burrowed
         self.born_loop[slot] = self.loop
         self.queue[slot] = []
+        self.looks_around[slot] = True
         self.refresh(slot)
         self.ground.block(slot, self.footprint_cells(slot))
         self._population_changed()
@@ -395,6 +408,10 @@ class World:
         self.live = np.flatnonzero(self.alive)
         self.population += 1
         self.pairs = None
+        self.scan_now = True
+        self.regenerating = tuple(
+            bool(rate[: self.top].any()) for rate in (self.shield_regen, self.life_regen, self.energy_regen)
+        )
 
     def _free_slot(self) -> int:
         free = np.flatnonzero(~self.alive[1 : self.top])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.stats import AIR_PLANE, GROUND_PLANE
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
     from simulator.geometry import Floats
     from simulator.world import Bools, Ints, World
 
-LOOKS_AROUND = np.zeros(len(OrderKind), dtype=np.bool_)
-LOOKS_AROUND[[OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.HOLD, OrderKind.PATROL]] = True
+IDLE = int(OrderKind.IDLE)
 PRIORITY_WEIGHT = 1000.0
 OUT_OF_SIGHT = -1e9
 
@@ -31,30 +31,36 @@ def choose_targets(world: World) -> None:
     """Answer attacks, give up lost causes, and let whoever is due look for a target."""
     if world.hurt:
         _answer(world)
-    n = world.top
-    due = world.acquires[:n] & (world.scan_loop[:n] <= world.loop) & LOOKS_AROUND[world.order_kind[:n]]
-    due &= ~world.in_reach[:n] & (world.windup[:n] < 0.0)
-    if not due.any():
-        return
-    _give_up(world, due)
     period = MECHANICS.scan_period
-    world.scan_loop[:n][due] = world.loop + period - world.loop % period
-    for player in range(1, len(world.players)):
-        seekers = np.flatnonzero(due & (world.owner[:n] == player))
-        if seekers.size:
-            _seek(world, player, seekers)
-
-
-def _give_up(world: World, due: Bools) -> None:
-    """Let go of targets that went out of sight, can't be reached by one who holds, or led too far away."""
+    if not world.scan_now and world.loop % period:
+        return
+    world.scan_now = False
     n = world.top
-    chasing = np.flatnonzero(due & (world.target[:n] != NOBODY))
+    due = world.acquires[:n] & world.looks_around[:n]
+    due &= ~world.in_reach[:n]
+    due &= world.scan_loop[:n] <= world.loop
+    due &= world.windup[:n] < 0.0
+    seekers = which(due)
+    if not seekers.size:
+        return
+    _give_up(world, seekers)
+    world.scan_loop[seekers] = world.loop + period - world.loop % period
+    owner = world.owner.take(seekers)
+    for player in range(1, len(world.players)):
+        mine = seekers[owner == player]
+        if mine.size:
+            _seek(world, player, mine)
+
+
+def _give_up(world: World, seekers: Ints) -> None:
+    """Let go of targets that went out of sight, can't be reached by one who holds, or led too far away."""
+    chasing = seekers[world.target.take(seekers) != NOBODY]
     if not chasing.size:
         return
     offset = world.pos[chasing] - world.guard[chasing]
-    idle = world.order_kind[chasing] == OrderKind.IDLE
+    idle = world.order_kind[chasing] == IDLE
     too_far = idle & (offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_radius**2)
-    lost = too_far | (world.order_kind[chasing] == OrderKind.HOLD) | ~_seen(world, chasing)
+    lost = too_far | world.holds[chasing] | ~_seen(world, chasing)
     for slot in chasing[lost].tolist():
         disengage(world, slot)
 
@@ -81,13 +87,13 @@ def _seek(world: World, player: int, seekers: Ints) -> None:
     closer = world.gap[seekers] - gap[rows, best]
     hand = _reaches(world, seekers, foes[best], gap[rows, best])
     better = found & ((now == NOBODY) | hand | (closer > MECHANICS.switch_gain)) & (foes[best] != now)
-    for i in np.flatnonzero(better).tolist():
+    for i in which(better).tolist():
         _take(world, int(seekers[i]), int(foes[best[i]]))
 
 
 def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     """(k, m) edge distances, and the worth of every foe to every seeker."""
-    at, there = world.pos[seekers], world.pos[foes]
+    at, there = world.pos.take(seekers, 0), world.pos.take(foes, 0)
     dx = at[:, 0, None] - there[:, 0]
     dy = at[:, 1, None] - there[:, 1]
     gap = np.sqrt(dx * dx + dy * dy) - world.radius[seekers, None] - world.radius[foes]
@@ -96,8 +102,8 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
         np.where(planes & GROUND_PLANE, world.ground_scan[seekers, None], -1.0),
         np.where(planes & AIR_PLANE, world.air_scan[seekers, None], -1.0),
     )
-    holding = world.order_kind[seekers] == OrderKind.HOLD
-    if holding.any():
+    holding = world.holds.take(seekers)
+    if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
     worth = np.where(gap <= sight, world.priority[foes] * PRIORITY_WEIGHT - gap, OUT_OF_SIGHT)
     return gap, worth
@@ -124,8 +130,7 @@ def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
 
 def _take(world: World, slot: int, target: int) -> None:
     """Start a fight by the unit's own choice; an idle one remembers where it stood."""
-    idle = world.order_kind[slot] == OrderKind.IDLE
-    if idle and world.target[slot] == NOBODY and not world.returning[slot]:
+    if world.order_kind[slot] == IDLE and world.target[slot] == NOBODY and not world.returning[slot]:
         world.guard[slot] = world.pos[slot]
         world.returning[slot] = True
     engage(world, slot, target)
@@ -155,6 +160,5 @@ def _friends_near(world: World, victim: int) -> list[int]:
 
 
 def _free_to_answer(world: World, slot: int) -> bool:
-    kind = int(world.order_kind[slot])
-    roams = kind in (OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.PATROL)
-    return bool(roams and world.acquires[slot] and world.target[slot] == NOBODY and world.step_max[slot] > 0.0)
+    roams = world.looks_around[slot] and not world.holds[slot] and world.step_max[slot] > 0.0
+    return bool(roams and world.acquires[slot] and world.target[slot] == NOBODY)

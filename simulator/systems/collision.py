@@ -8,13 +8,14 @@ holds, an idle unit before a friend that comes through, nobody before an enemy. 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simulator import geometry
+from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
-from simulator.orders import OrderKind
 from simulator.traits import Layer
 from simulator.world import NOBODY
 
@@ -23,113 +24,152 @@ if TYPE_CHECKING:
     from simulator.pathing import Surface
     from simulator.world import Bools, Ints, World
 
-CONTACT_SKIN = 0.3
+CONTACT_SKIN = 0.2
 OVERLAP_ALLOWED = 1e-3
+OVERLAP_PRESSED = 0.03
+SAME_POINT = 1e-9
 EDGE_MARGIN = 1e-6
+IMMOBILE_YIELDING = 1e-6
+LAYERS = tuple(Layer)
 WALL_NEIGHBOURS = np.array([(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)])
+EIGHT_DIRECTIONS = WALL_NEIGHBOURS / geometry.length(WALL_NEIGHBOURS.astype(np.float64))[:, None]
 
 
 def separate(world: World) -> None:
     """Carry out this loop's steps, push bodies apart and remember who could not get on."""
-    slots = world.live
-    before = world.pos[slots]
-    after = before + world.intended[slots]
-    stirred = bool(world.wants[slots].any())
-    if not stirred and world.settled == world.population:
+    if not world.stirred and world.settled == world.population:
         return
-    crowded = _push_apart(world, slots, after)
+    slots = world.live
+    before = world.pos.take(slots, 0)
+    after = before + world.intended.take(slots, 0) if world.stirred else before.copy()
+    crowded = _push_apart(world, slots, before, after)
     _keep_on_surfaces(world, slots, before, after)
     world.pos[slots] = after
-    world.settled = -1 if stirred or crowded else world.population
-    if stirred:
+    world.settled = -1 if world.stirred or crowded else world.population
+    if world.stirred:
         _note_blocked(world, slots, before, after)
 
 
-def _push_apart(world: World, slots: Ints, after: Floats) -> bool:
-    """Move overlapping bodies apart in place; returns whether anybody was touched."""
-    first, second, apart = _contacts(world, after)
-    if not first.size:
+def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> bool:
+    """Move overlapping bodies apart in place; returns whether anybody was touched.
+
+    Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
+    that a crowd does not press itself together.
+    """
+    pairs = _contacts(world, slots, after)
+    if pairs is None:
         return False
-    give_first, give_second = _shares(world, slots[first], slots[second])
-    start, touched = after.copy(), False
-    for _ in range(MECHANICS.push_iterations):
-        offset = after[first] - after[second]
-        distance = geometry.length(offset)
-        depth = apart - distance
-        if not (depth > OVERLAP_ALLOWED).any():
-            break
-        touched = True
-        np.maximum(depth, 0.0, out=depth)
-        normal = offset / np.maximum(distance, 1e-9)[:, None]
-        normal[distance < 1e-9] = _any_direction(first[distance < 1e-9], second[distance < 1e-9])
-        n = len(slots)
-        for axis in (0, 1):
-            push = normal[:, axis] * depth
-            after[:, axis] += np.bincount(first, push * give_first, n) - np.bincount(second, push * give_second, n)
-    if touched:
-        shift = after - start
-        far = geometry.length(shift)
-        scale = np.minimum(1.0, MECHANICS.push_limit / np.maximum(far, 1e-12))
-        after[:] = start + shift * scale[:, None]
-    return touched
+    start = after.copy()
+    deep = pairs.relax(after)
+    if deep.size:
+        pressed = np.concatenate([pairs.first[deep], pairs.second[deep]])
+        after[pressed] = start[pressed] = before[pressed]
+        pairs.relax(after)
+    shift = after - start
+    far = geometry.length(shift)
+    if far.max() > MECHANICS.push_limit:
+        shift *= np.minimum(1.0, MECHANICS.push_limit / np.maximum(far, 1e-12))[:, None]
+        np.add(start, shift, out=after)
+    return True
 
 
-def _contacts(world: World, at: Floats) -> tuple[Ints, Ints, Floats]:
-    """Pairs of bodies that touch or nearly do, as indices into ``live``, and how far apart they have to be."""
+@dataclass(slots=True)
+class _Pairs:
+    """Pairs of bodies near each other, (k,) each, as indices into the living slots."""
+
+    first: Ints
+    second: Ints
+    apart: Floats  # distance to keep
+    share_first: Floats  # part of an overlap that the first gives way
+    share_second: Floats
+
+    def relax(self, at: Floats) -> Ints:
+        """Push overlapping pairs apart a few times over, in place; returns the pairs that stay deep in each other."""
+        x, y = np.ascontiguousarray(at[:, 0]), np.ascontiguousarray(at[:, 1])
+        n = len(at)
+        first, second, apart = self.first, self.second, self.apart
+        for _ in range(MECHANICS.push_iterations):
+            dx, dy = x.take(first) - x.take(second), y.take(first) - y.take(second)
+            distance = np.sqrt(dx * dx + dy * dy)
+            depth = apart - distance
+            if not some(depth > OVERLAP_ALLOWED):
+                break
+            if distance.min() < SAME_POINT:
+                dx, dy, distance = self._part_same(dx, dy, distance)
+            push = np.maximum(depth, 0.0) / distance
+            push_first, push_second = push * self.share_first, push * self.share_second
+            x += np.bincount(first, dx * push_first, n) - np.bincount(second, dx * push_second, n)
+            y += np.bincount(first, dy * push_first, n) - np.bincount(second, dy * push_second, n)
+        else:
+            dx, dy = x.take(first) - x.take(second), y.take(first) - y.take(second)
+            depth = apart - np.sqrt(dx * dx + dy * dy)
+        at[:, 0], at[:, 1] = x, y
+        return which(depth > OVERLAP_PRESSED)
+
+    def _part_same(self, dx: Floats, dy: Floats, distance: Floats) -> tuple[Floats, Floats, Floats]:
+        """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
+        same = distance < SAME_POINT
+        direction = EIGHT_DIRECTIONS[(self.first * 3 + self.second) % 8]
+        dx, dy = np.where(same, direction[:, 0], dx), np.where(same, direction[:, 1], dy)
+        return dx, dy, np.where(same, 1.0, distance)
+
+
+def _contacts(world: World, slots: Ints, at: Floats) -> _Pairs | None:
+    """The pairs of bodies that touch or nearly do; None when no two touch."""
     if world.pairs is None:
         world.pairs = pair_table(world)
-    reach_squared, apart = world.pairs
+    touching, near, apart = world.pairs
     x, y = at[:, 0], at[:, 1]
-    dx, dy = x[:, None] - x, y[:, None] - y
-    dx *= dx
+    squared = x[:, None] - x
+    squared *= squared
+    dy = y[:, None] - y
     dy *= dy
-    dx += dy
-    first, second = np.nonzero(dx < reach_squared)
-    return first, second, apart[first, second]
+    squared += dy
+    if not some(squared < touching):
+        return None
+    first, second = np.nonzero(squared < near)
+    return _Pairs(first, second, apart[first, second], *_shares(world, slots.take(first), slots.take(second)))
 
 
-def pair_table(world: World) -> tuple[Floats, Floats]:
-    """For every pair of living units the squared distance worth looking at (-1: never) and the one to keep.
+def pair_table(world: World) -> tuple[Floats, Floats, Floats]:
+    """Three distances of every pair of living units: touching squared, worth looking at squared, and to be kept.
 
-    Only the upper half counts. Bodies collide when they share a layer; what stands on a footprint is a wall, not a
-    body.
+    The squared ones are -1 for pairs that never meet and in the lower half. Bodies collide when they share a layer;
+    what stands on a footprint is a wall, not a body.
     """
     slots = world.live
     bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
     radius = world.separation[slots]
     apart = radius[:, None] + radius
     meets = np.triu((bits[:, None] & bits) != 0, 1)
-    return np.where(meets, (apart + CONTACT_SKIN) ** 2, -1.0), apart
+    touching = np.where(meets, np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2, -1.0)
+    return touching, np.where(meets, (apart + CONTACT_SKIN) ** 2, -1.0), apart
 
 
 def _shares(world: World, first: Ints, second: Ints) -> tuple[Floats, Floats]:
     """How much of an overlap each of a pair gives way, adding up to 1."""
-    friends = world.owner[first] == world.owner[second]
-    a, b = _yielding(world, first, friends), _yielding(world, second, friends)
-    total = a + b
-    return a / total, b / total
+    friends = world.owner.take(first) == world.owner.take(second)
+    yielding, yielding_to_friend = _yielding(world)
+    a = np.where(friends, yielding_to_friend.take(first), yielding.take(first))
+    b = np.where(friends, yielding_to_friend.take(second), yielding.take(second))
+    a /= a + b
+    return a, 1.0 - a
 
 
-def _yielding(world: World, slots: Ints, to_friend: Bools) -> Floats:
-    walking = world.wants[slots]
-    idle = (world.order_kind[slots] != OrderKind.HOLD) & (world.target[slots] == NOBODY)
-    standing = np.where(idle & to_friend, MECHANICS.push_idle, MECHANICS.push_firm)
-    immobile = world.step_max[slots] <= 0.0
-    return np.where(walking, 1.0, np.where(immobile, 1e-6, standing))
-
-
-def _any_direction(first: Ints, second: Ints) -> Floats:
-    """Unit vectors for bodies on the very same point: one of eight, by their numbers."""
-    eight = WALL_NEIGHBOURS / geometry.length(WALL_NEIGHBOURS.astype(np.float64))[:, None]
-    result: Floats = eight[(first * 3 + second) % len(eight)]
-    return result
+def _yielding(world: World) -> tuple[Floats, Floats]:
+    """(top,) how easily each unit is pushed by an enemy, and by a friend."""
+    n = world.top
+    firm = np.where(world.wants[:n], 1.0, MECHANICS.push_firm)
+    firm[world.step_max[:n] <= 0.0] = IMMOBILE_YIELDING
+    idle = (world.target[:n] == NOBODY) & ~world.holds[:n] & (firm == MECHANICS.push_firm)
+    return firm, np.where(idle, MECHANICS.push_idle, firm)
 
 
 def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:
-    layers = world.layer[slots]
-    moved = np.logical_or.reduce(before != after, axis=1)
-    for layer in Layer:
-        mine = np.flatnonzero(moved & (layers == layer))
+    layers = world.layer.take(slots)
+    moved = (before[:, 0] != after[:, 0]) | (before[:, 1] != after[:, 1])
+    for layer in LAYERS:
+        mine = which(moved & (layers == layer))
         if not mine.size:
             continue
         if layer is Layer.AIR:
@@ -137,9 +177,7 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
         surface = world.ground.surface(layer)
-        width, height = world.map.terrain.size
-        after[mine] = np.clip(after[mine], 0.0, (width - EDGE_MARGIN, height - EDGE_MARGIN))
-        near = mine[~surface.open[surface.cell(after[mine])]]
+        near = mine[~surface.open.take(surface.cell(after.take(mine, 0)))]
         if near.size:
             after[near] = _off_walls(surface, before[near], after[near], world.clearance[slots[near]])
 
@@ -192,16 +230,17 @@ def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
 
 def _note_blocked(world: World, slots: Ints, before: Floats, after: Floats) -> None:
     """Count the loops in which walkers made no headway, and send those that are stuck around the obstacle."""
-    intended = world.intended[slots]
-    wish = intended[:, 0] ** 2 + intended[:, 1] ** 2
+    intended = world.intended.take(slots, 0)
     real = after - before
-    made = real[:, 0] * intended[:, 0] + real[:, 1] * intended[:, 1]
-    walking = wish > 0.0
-    hindered = walking & (made < MECHANICS.blocked_share * wish)
-    blocked = world.blocked[slots]
-    blocked = np.where(hindered, blocked + 1, np.maximum(blocked - 2, 0))
-    world.blocked[slots] = np.where(walking, blocked, 0)
-    stuck = np.flatnonzero(hindered & (blocked % MECHANICS.detour_after == 0))
+    squared, along = intended * intended, real * intended
+    wish = squared[:, 0] + squared[:, 1]
+    hindered = along[:, 0] + along[:, 1] < MECHANICS.blocked_share * wish
+    blocked = world.blocked.take(slots)
+    if not some(hindered) and not np.count_nonzero(blocked):
+        return
+    blocked = np.where(hindered, blocked + 1, np.maximum(blocked - 2, 0)) * (wish > 0.0)
+    world.blocked[slots] = blocked
+    stuck = which(hindered & (blocked % MECHANICS.detour_after == 0))
     if stuck.size:
         _send_around(world, slots[stuck], intended[stuck], (real - intended)[stuck])
 

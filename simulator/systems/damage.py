@@ -7,10 +7,13 @@ fraction before armor. The formula's source is in ``data/SOURCES.md``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from simulator import geometry
+from simulator.arrays import some
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.systems import weapons
@@ -18,56 +21,73 @@ from simulator.world import NOBODY
 
 if TYPE_CHECKING:
     from simulator.records import Affects, Sweep
-    from simulator.shots import Missiles, PendingHits
     from simulator.stats import Damage
     from simulator.world import Ints, World
 
 BEHIND = 1e-9
 
 
+class Shot(NamedTuple):
+    """One row of ``shots`` as Python values."""
+
+    source: int
+    owner: int
+    target: int
+    weapon: int
+    hit: int
+    start: tuple[float, float]
+    goal: tuple[float, float]
+
+
+def shot_of(row: np.void) -> Shot:
+    """The shot in a row of either table of ``shots``."""
+    source, owner, target, weapon, hit = (int(row[name]) for name in Shot._fields[:5])
+    start, goal = row["start"].tolist(), row["goal"].tolist()
+    return Shot(source, owner, target, weapon, hit, (start[0], start[1]), (goal[0], goal[1]))
+
+
 def deal_pending(world: World) -> None:
-    """Let every hit that is due happen, in the order of being fired."""
+    """Let every hit that is due happen, in the order of being fired; those of a dead attacker are lost."""
     pending = world.pending
     if not len(pending):
         return
-    due = pending.due <= world.loop
-    if not due.any():
+    due = pending.rows["due"] <= world.loop
+    if not some(due):
         return
     alive = pending.target != NOBODY
-    pending.goal[alive] = world.pos[pending.target[alive]]
-    for shot in np.flatnonzero(due).tolist():
-        hit = world.catalog.weapons[int(pending.weapon[shot])].hits[int(pending.hit[shot])]
-        orphan = pending.source[shot] == NOBODY
-        if orphan:
+    pending.rows["goal"] = np.where(alive[:, None], world.pos.take(pending.target, 0), pending.goal)
+    rows = pending.rows[due]
+    pending.keep(~due)
+    for row, begun, single in zip(rows, rows["due"].tolist(), rows["single"].tolist(), strict=True):
+        shot = shot_of(row)
+        if shot.source == NOBODY:
             continue
-        if hit.missile_speed_n is not None and not pending.single[shot]:
-            weapons.launch(world, shot)
+        hit = world.catalog.weapons[shot.weapon].hits[shot.hit]
+        if single:
+            _hit_target(world, shot, world.stats.damage[shot.owner][shot.weapon][shot.hit])
+        elif hit.missile_speed_n is not None:
+            weapons.launch(world, shot, hit)
+        elif hit.sweep is not None:
+            _sweep(world, shot, hit.sweep, begun)
         else:
-            hit_with(world, pending, shot)
-    late = len(due)  # sweeps lay their single hits behind the rows looked at
-    keep = np.ones(len(pending), dtype=np.bool_)
-    keep[:late] = ~due
-    pending.keep(keep)
+            hit_with(world, shot)
 
 
-def hit_with(world: World, shots: Missiles | PendingHits, shot: int) -> None:
-    """Carry out one hit: on its target, on the ring around it, or along a sweep."""
-    source, owner, target = int(shots.source[shot]), int(shots.owner[shot]), int(shots.target[shot])
-    row, index = int(shots.weapon[shot]), int(shots.hit[shot])
-    damage = world.stats.damage[owner][row][index]
-    hit = damage.hit
-    single = shots is world.pending and bool(world.pending.single[shot])
-    if hit.sweep is not None and not single:
-        _sweep(world, world.pending, shot, hit.sweep)
-        return
-    if hit.area and not single:
-        _splash(world, shots, shot, damage)
-        if not hit.area_affects.not_target:
+def hit_with(world: World, shot: Shot) -> None:
+    """Carry out one hit: on its target, and in the rings around it."""
+    damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
+    if damage.hit.area:
+        _splash(world, shot, damage)
+        if not damage.hit.area_affects.not_target:
             return
-    if target != NOBODY:
-        strike(world, source, owner, target, damage)
-    if hit.kills_self and source != NOBODY:
-        world.life[source] = 0.0
+    _hit_target(world, shot, damage)
+    if damage.hit.kills_self and shot.source != NOBODY:
+        world.life[shot.source] = 0.0
+
+
+def _hit_target(world: World, shot: Shot, damage: Damage) -> None:
+    if shot.target != NOBODY:
+        strike(world, shot.source, shot.owner, shot.target, damage)
 
 
 def strike(world: World, source: int, owner: int, victim: int, damage: Damage, fraction: float = 1.0) -> None:
@@ -98,18 +118,17 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
         world.hurt.append((victim, source))
 
 
-def _splash(world: World, shots: Missiles | PendingHits, shot: int, damage: Damage) -> None:
+def _splash(world: World, shot: Shot, damage: Damage) -> None:
     """Damage everybody in the rings around the impact, each with the fraction of the innermost ring it is in."""
     hit = damage.hit
-    source, owner, target = int(shots.source[shot]), int(shots.owner[shot]), int(shots.target[shot])
-    near = _affected(world, hit.area_affects, source, owner, target)
-    offset = world.pos[near] - shots.goal[shot]
+    near = _affected(world, hit.area_affects, shot)
+    offset = world.pos[near] - shot.goal
     edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
-    forward = shots.goal[shot] - shots.start[shot]
+    forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
     for slot, distance, (x, y) in zip(near.tolist(), edge.tolist(), offset.tolist(), strict=True):
         for ring in hit.area:
-            if distance <= ring.radius and _in_arc(x, y, forward[0], forward[1], ring.arc_deg):
-                strike(world, source, owner, slot, damage, ring.fraction)
+            if distance <= ring.radius and _in_arc(x, y, *forward, ring.arc_deg):
+                strike(world, shot.source, shot.owner, slot, damage, ring.fraction)
                 break
 
 
@@ -122,46 +141,43 @@ def _in_arc(x: float, y: float, forward_x: float, forward_y: float, arc_deg: flo
     return bool(along >= np.cos(np.radians(arc_deg / 2.0)) * lengths - BEHIND)
 
 
-def _sweep(world: World, pending: PendingHits, shot: int, sweep: Sweep) -> None:
+def _sweep(world: World, shot: Shot, sweep: Sweep, begun: float) -> None:
     """Lay a single hit for everybody on the line, at the delay of the first point that touches it.
 
-    Whom the line touches is decided once, when it begins.
+    Whom the line touches is decided once, when it begins at the (fractional) loop ``begun``.
     """
-    source, owner, target = int(pending.source[shot]), int(pending.owner[shot]), int(pending.target[shot])
-    goal, start = pending.goal[shot], pending.start[shot]
-    forward = goal - start
-    distance = float(np.sqrt(forward[0] ** 2 + forward[1] ** 2))
-    fx, fy = (forward / distance).tolist() if distance > BEHIND else (0.0, -1.0)
-    near = _affected(world, sweep.affects, source, owner, target)
+    forward_x, forward_y = shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1]
+    distance = math.sqrt(forward_x * forward_x + forward_y * forward_y)
+    fx, fy = (forward_x / distance, forward_y / distance) if distance > BEHIND else (0.0, -1.0)
+    near = _affected(world, sweep.affects, shot)
     points = np.array(sweep.points)
     across, along = points[:, 1], points[:, 2]
-    at = goal + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
+    at = shot.goal + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
     offset = world.pos[near][:, None, :] - at
-    touched = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2) <= sweep.radius + world.radius[near][:, None]
-    hits = np.flatnonzero(touched.any(axis=1))
+    touched = geometry.length(offset) <= sweep.radius + world.radius[near][:, None]
+    hits = touched.any(axis=1).nonzero()[0]
     if hits.size:
         first = np.argmax(touched[hits], axis=1)
-        begun = pending.due[shot] - points[0, 0]
-        pending.append(
+        world.pending.append(
             len(hits),
-            source=source,
-            owner=owner,
+            source=shot.source,
+            owner=shot.owner,
             target=near[hits],
-            weapon=pending.weapon[shot],
-            hit=pending.hit[shot],
-            due=begun + points[first, 0],
-            single=True,
+            weapon=shot.weapon,
+            hit=shot.hit,
+            start=shot.start,
             goal=world.pos[near[hits]],
-            start=start,
+            due=begun - points[0, 0] + points[first, 0],
+            single=True,
         )
 
 
-def _affected(world: World, affects: Affects, source: int, owner: int, target: int) -> Ints:
+def _affected(world: World, affects: Affects, shot: Shot) -> Ints:
     """Living units that a splash or a sweep may touch."""
     slots = world.live
     chosen = world.targetable[slots] & (world.life[slots] > 0.0)
     if not affects.allies:
-        chosen &= world.owner[slots] != owner
+        chosen &= world.owner[slots] != shot.owner
     if affects.plane != "any":
         bit = GROUND_PLANE if affects.plane == "ground" else AIR_PLANE
         chosen &= (world.plane_bits[slots] & bit) != 0
@@ -170,8 +186,8 @@ def _affected(world: World, affects: Affects, source: int, owner: int, target: i
     if affects.excluding == "structure":
         chosen &= ~world.walled[slots]
     if affects.not_self:
-        chosen &= slots != source
+        chosen &= slots != shot.source
     if affects.not_target:
-        chosen &= slots != target
+        chosen &= slots != shot.target
     found: Ints = slots[chosen]
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from simulator.arrays import some
 from simulator.world import NOBODY, Death
 
 if TYPE_CHECKING:
@@ -17,8 +18,10 @@ NO_KILLER = -1
 def bury(world: World) -> None:
     """Remove every unit whose life is used up, in the order of slots."""
     slots = world.live
-    dead = slots[world.life[slots] <= 0.0]
-    for slot in dead.tolist():
+    dead = world.life.take(slots) <= 0.0
+    if not some(dead):
+        return
+    for slot in slots[dead].tolist():
         attacker = int(world.attacker[slot])
         killer = int(world.owner[attacker]) if attacker != NOBODY else NO_KILLER
         owner, unit = int(world.owner[slot]), world.unit_type(slot)

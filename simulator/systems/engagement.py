@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.stats import GROUND_PLANE
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
-    from simulator.world import Bools, World
+    from simulator.world import Ints, World
 
 WIDEST_AIM_DEG = 180.0
 EDGE_TOLERANCE = 1e-9
 FOLLOW_GAP = 0.5
+FOLLOW = int(OrderKind.FOLLOW)
 
 
 def engage(world: World, slot: int, target: int) -> bool:
@@ -38,7 +40,7 @@ def engage(world: World, slot: int, target: int) -> bool:
     world.target[slot] = target
     world.weapon[slot] = row
     world.reach[slot] = world.stats.range[world.owner[slot], row]
-    world.reach_min[slot] = weapon.min_range
+    world.reach_min[slot] = weapon.min_range or -math.inf
     world.slop[slot] = weapon.slop
     turns = weapon.turret_deg_n is None and not world.unit_type(slot).unturnable
     angle = min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)
@@ -53,6 +55,7 @@ def disengage(world: World, slot: int) -> None:
     world.target[slot] = NOBODY
     world.weapon[slot] = -1
     world.nav_loop[slot] = 0
+    world.scan_now = True
 
 
 def drop_attack(world: World, slot: int) -> None:
@@ -65,63 +68,67 @@ def drop_attack(world: World, slot: int) -> None:
 def measure(world: World) -> None:
     """Measure the distance of every fight and say who wants to walk where."""
     n = world.top
-    kind, target = world.order_kind[:n], world.target[:n]
-    fighting = target != NOBODY
-    goal = world.goal[:n]
-    np.copyto(goal, world.order_point[:n])
-    wants = (kind == OrderKind.MOVE) | (kind == OrderKind.ATTACK_MOVE)
-    stop_at = world.stop_at[:n]
-    stop_at.fill(0.0)
-    if (kind >= OrderKind.PATROL).any():
-        wants |= kind >= OrderKind.PATROL
-    if (kind == OrderKind.FOLLOW).any():
-        wants |= _follow(world)
-    if world.returning[:n].any():
-        wants |= _go_back(world)
+    target = world.target[:n]
+    fighters = world.fighters = which(target >= 0)
+    wants = world.wants[:n]
+    np.copyto(wants, world.walks[:n])
+    np.copyto(world.goal[:n], world.order_point[:n])
+    world.stop_at[:n] = 0.0
     world.in_reach[:n] = False
-    if fighting.any():
-        _close_in(world)
-        np.copyto(wants, (world.gap[:n] > world.reach[:n]) & (kind != OrderKind.HOLD), where=fighting)
-    wants &= (world.windup[:n] < 0.0) & (world.backswing[:n] <= 0.0) & (world.step_max[:n] > 0.0)
-    world.wants[:n] = wants
+    if some(world.needs_target[:n]):
+        _follow(world)
+    if some(world.returning[:n]):
+        _go_back(world)
+    if fighters.size:
+        _close_in(world, fighters)
+    if some(wants):
+        wants &= world.windup[:n] < 0.0
+        wants &= world.backswing[:n] <= 0.0
+        wants &= world.step_max[:n] > 0.0
 
 
-def _close_in(world: World) -> None:
+def _close_in(world: World, slots: Ints) -> None:
     """Distances, goals and reach of the units that fight."""
-    slots = np.flatnonzero(world.target[: world.top] != NOBODY)
-    target = world.target[slots]
-    goal = world.pos[target]
-    offset = goal - world.pos[slots]
-    bodies = world.radius[slots] + world.radius[target]
-    gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - bodies
-    reach = world.reach[slots]
-    allowed = reach + np.where(world.windup[slots] >= 0.0, world.slop[slots], EDGE_TOLERANCE)
+    target = world.target.take(slots)
+    goal = world.pos.take(target, 0)
+    offset = goal - world.pos.take(slots, 0)
+    offset *= offset
+    bodies = world.radius.take(slots) + world.radius.take(target)
+    gap = np.sqrt(offset[:, 0] + offset[:, 1]) - bodies
+    reach = world.reach.take(slots)
+    swinging = world.windup.take(slots) >= 0.0
+    allowed = reach + EDGE_TOLERANCE
+    beyond = gap > allowed
+    near = ~beyond
+    if some(swinging):
+        near |= swinging & (gap <= reach + world.slop.take(slots))
+    near &= gap >= world.reach_min.take(slots)
     world.gap[slots] = gap
-    world.in_reach[slots] = (gap <= allowed) & (gap >= world.reach_min[slots])
+    world.in_reach[slots] = near
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
+    world.wants[slots] = beyond & ~world.holds[slots]
 
 
-def _follow(world: World) -> Bools:
-    """(top,) units that follow another one and are not beside it yet."""
+def _follow(world: World) -> None:
+    """Units that follow another one walk until they are beside it."""
     n = world.top
-    following: Bools = (world.order_kind[:n] == OrderKind.FOLLOW) & (world.order_target[:n] != NOBODY)
-    slots = np.flatnonzero(following)
-    leader = world.order_target[slots]
-    offset = world.pos[leader] - world.pos[slots]
-    world.goal[slots] = world.pos[leader]
-    world.stop_at[slots] = world.separation[slots] + world.separation[leader] + FOLLOW_GAP
-    following[slots] = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) > world.stop_at[slots] + FOLLOW_GAP
-    return following
+    slots = which((world.order_kind[:n] == FOLLOW) & (world.order_target[:n] >= 0))
+    if slots.size:
+        leader = world.order_target[slots]
+        offset = world.pos[leader] - world.pos[slots]
+        stop_at = world.separation[slots] + world.separation[leader] + FOLLOW_GAP
+        world.goal[slots] = world.pos[leader]
+        world.stop_at[slots] = stop_at
+        world.wants[slots] = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) > stop_at + FOLLOW_GAP
 
 
-def _go_back(world: World) -> Bools:
-    """(top,) idle units that are away from where they stood before a fight; the others forget that place."""
+def _go_back(world: World) -> None:
+    """Idle units return to where they stood before a fight, and forget that place when they are there."""
     n = world.top
-    back = world.returning[:n] & (world.target[:n] == NOBODY) & (world.order_kind[:n] == OrderKind.IDLE)
-    offset = world.guard[:n] - world.pos[:n]
-    away = offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.guard_slack**2
-    world.returning[:n] &= ~(back & ~away)
-    going: Bools = back & away
-    world.goal[:n][going] = world.guard[:n][going]
-    return going
+    slots = which(world.returning[:n] & (world.target[:n] == NOBODY))
+    if slots.size:
+        offset = world.guard[slots] - world.pos[slots]
+        away = offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.guard_slack**2
+        world.returning[slots] = world.wants[slots] = away
+        world.goal[slots] = world.guard[slots]

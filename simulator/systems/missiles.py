@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator import geometry
+from simulator.arrays import some, which
 from simulator.systems import damage
 from simulator.world import NOBODY
 
@@ -19,16 +20,17 @@ def fly(world: World) -> None:
     missiles = world.missiles
     if not len(missiles):
         return
-    homing = missiles.target != NOBODY
-    missiles.goal[homing] = world.pos[missiles.target[homing]]
-    body = np.where(homing, world.radius[missiles.target], 0.0)
-    missiles.step = np.minimum(missiles.step + missiles.step_gain, missiles.step_max)
-    offset = missiles.goal - missiles.pos
+    shots = missiles.rows
+    target = shots["target"]
+    homing = target != NOBODY
+    body = world.radius.take(target) * homing
+    shots["goal"] = np.where(homing[:, None], world.pos.take(target, 0), shots["goal"])
+    step = shots["step"] = np.minimum(shots["step"] + shots["gain"], shots["top"])
+    offset = shots["goal"] - shots["pos"]
     distance = geometry.length(offset)
-    arriving = distance - body <= missiles.step
-    share = np.where(arriving, 1.0, missiles.step / np.maximum(distance, 1e-12))
-    missiles.pos = missiles.pos + offset * share[:, None]
-    if arriving.any():
-        for shot in np.flatnonzero(arriving).tolist():
-            damage.hit_with(world, missiles, shot)
+    arriving = distance - body <= step
+    shots["pos"] += offset * (step / np.maximum(distance, 1e-12))[:, None]
+    if some(arriving):
+        for shot in which(arriving).tolist():
+            damage.hit_with(world, damage.shot_of(shots[shot]))
         missiles.keep(~arriving)

@@ -1,6 +1,7 @@
 """Movement: steps towards the next corner, acceleration, turning, and detours around bodies.
 
-Moves everybody as if alone; ``collision`` then pushes bodies apart and off the walls and tells who was blocked.
+Everybody steps as if alone; ``collision`` then carries the steps out, pushes bodies apart and off the walls, and
+notes who was blocked.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator import geometry
-from simulator.world import NOBODY
+from simulator.arrays import some, which
 
 if TYPE_CHECKING:
     from simulator.geometry import Floats
@@ -22,51 +23,57 @@ DETOUR_SIN = math.sin(math.radians(70.0))
 
 
 def move(world: World) -> None:
-    """Walk one loop and turn; writes ``pos``, ``speed``, ``heading`` and this loop's ``intended`` step."""
+    """Choose this loop's steps and turn; writes ``intended``, ``speed`` and ``heading``."""
     n = world.top
-    world.intended[:n] = 0.0
-    walkers = np.flatnonzero(world.wants[:n])
-    if walkers.size:
-        _walk(world, walkers)
-    standing = world.speed[:n] > 0.0
-    standing[walkers] = False
-    world.speed[:n][standing] = 0.0
+    wants = world.wants[:n]
+    if some(wants):
+        world.speed[:n] *= wants
+        world.intended[:n] = 0.0
+        _walk(world, which(wants))
+        world.stirred = True
+    elif world.stirred:
+        world.speed[:n] = 0.0
+        world.intended[:n] = 0.0
+        world.stirred = False
     _face_targets(world)
 
 
 def _walk(world: World, walkers: Ints) -> None:
-    pos = world.pos[walkers]
-    offset = world.nav_point[walkers] - pos
+    pos = world.pos.take(walkers, 0)
+    offset = world.nav_point.take(walkers, 0) - pos
     distance = geometry.length(offset)
     direction = offset / np.maximum(distance, 1e-12)[:, None]
-    straight = world.nav_straight[walkers]
-    left = np.where(straight, np.maximum(distance - world.stop_at[walkers], 0.0), distance)
-    speed = np.minimum(world.speed[walkers] + world.step_gain[walkers], _top_speed(world, walkers, pos))
-    step = np.minimum(speed, left)
+    speed = np.minimum(world.speed.take(walkers) + world.step_gain.take(walkers), _top_speed(world, walkers, pos))
+    left = distance - world.stop_at.take(walkers) * world.nav_straight.take(walkers)
+    step = np.minimum(speed, np.maximum(left, 0.0))
     direction = _turned_aside(world, walkers, direction)
     world.speed[walkers] = speed
     world.intended[walkers] = direction * step[:, None]
+    facing = world.heading.take(walkers, 0)
     moving = step > 0.0
-    facing = geometry.turn_towards(world.heading[walkers], direction, world.turn_cos[walkers], world.turn_sin[walkers])
-    world.heading[walkers[moving]] = facing[moving]
+    if np.count_nonzero(moving) < len(moving):
+        direction = np.where(moving[:, None], direction, facing)
+    world.heading[walkers] = geometry.turn_towards(
+        facing, direction, world.turn_cos.take(walkers), world.turn_sin.take(walkers)
+    )
 
 
 def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
-    speed = world.step_max[walkers]
+    speed = world.step_max.take(walkers)
     if world.creep_counts:
         width, height = world.map.terrain.size
         x = np.clip(pos[:, 0].astype(np.int64), 0, width - 1)
         y = np.clip(pos[:, 1].astype(np.int64), 0, height - 1)
-        speed = np.where(world.map.terrain.creep[y, x], speed * world.creep_factor[walkers], speed)
+        speed = np.where(world.map.terrain.creep[y, x], speed * world.creep_factor.take(walkers), speed)
     return speed
 
 
 def _turned_aside(world: World, walkers: Ints, direction: Floats) -> Floats:
     """Directions of walkers on a detour, turned to their side."""
-    side = world.detour[walkers]
-    if not side.any():
+    side = world.detour.take(walkers)
+    if not np.count_nonzero(side):
         return direction
-    over = (side != 0) & (world.detour_loop[walkers] <= world.loop)
+    over = (side != 0) & (world.detour_loop.take(walkers) <= world.loop)
     world.detour[walkers[over]] = 0
     side = np.where(over, 0, side)
     aside = np.empty_like(direction)
@@ -77,12 +84,15 @@ def _turned_aside(world: World, walkers: Ints, direction: Floats) -> Floats:
 
 def _face_targets(world: World) -> None:
     """Turn those who stand and fight towards their target; what can't turn keeps its heading."""
-    n = world.top
-    turning = np.flatnonzero((world.target[:n] != NOBODY) & ~world.wants[:n] & (world.aim_cos[:n] > -1.0))
-    if not turning.size:
+    fighters = world.fighters
+    if not fighters.size:
         return
-    offset = world.pos[world.target[turning]] - world.pos[turning]
+    turning = (world.aim_cos.take(fighters) > -1.0) & ~world.wants.take(fighters)
+    if not some(turning):
+        return
+    slots = fighters[turning]
+    offset = world.pos.take(world.target.take(slots), 0) - world.pos.take(slots, 0)
     wanted = offset / np.maximum(geometry.length(offset), 1e-12)[:, None]
-    world.heading[turning] = geometry.turn_towards(
-        world.heading[turning], wanted, world.turn_cos[turning], world.turn_sin[turning]
+    world.heading[slots] = geometry.turn_towards(
+        world.heading.take(slots, 0), wanted, world.turn_cos.take(slots), world.turn_sin.take(slots)
     )

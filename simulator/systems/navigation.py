@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.traits import Layer
 
@@ -17,25 +18,29 @@ if TYPE_CHECKING:
     from simulator.world import Ints, World
 
 CORNER_REACHED = 0.4
+LAYERS = tuple(Layer)
 
 
 def find_ways(world: World) -> None:
     """Write ``nav_point`` of every unit that wants to move; ways are looked over every few loops."""
     n = world.top
-    np.copyto(world.nav_point[:n], world.goal[:n], where=world.nav_straight[:n, None])
-    walkers = np.flatnonzero(world.wants[:n])
+    walkers = which(world.wants[:n])
     if not walkers.size:
         return
-    due = world.nav_loop[walkers] <= world.loop
-    crooked = ~world.nav_straight[walkers] & ~due
-    if crooked.any():
+    straight = world.nav_straight.take(walkers)
+    world.nav_point[walkers] = np.where(
+        straight[:, None], world.goal.take(walkers, 0), world.nav_point.take(walkers, 0)
+    )
+    due = world.nav_loop.take(walkers) <= world.loop
+    crooked = ~(straight | due)
+    if some(crooked):
         offset = world.nav_point[walkers] - world.pos[walkers]
         due |= crooked & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
-    if not due.any():
+    if not some(due):
         return
     walkers = walkers[due]
-    layers = world.layer[walkers]
-    for layer in Layer:
+    layers = world.layer.take(walkers)
+    for layer in LAYERS:
         on_layer = walkers[layers == layer]
         if on_layer.size:
             _look_over(world, on_layer, layer)

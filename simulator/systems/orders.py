@@ -4,66 +4,62 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from simulator import commands
+from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
-from simulator.world import NO_TAG, NOBODY, Bools, Ints
+from simulator.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
     from simulator.world import World
 
-WALKS = (OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL)
 PACKED_AFTER_LOOPS = 5
 
 
 def carry_out(world: World) -> None:
     """End every order whose point is reached or whose target is gone, and begin what waits behind it."""
     n = world.top
-    kind = world.order_kind[:n]
-    if not kind.any():
-        return
-    lost = (world.order_target[:n] == NOBODY) & ((kind == OrderKind.ATTACK_UNIT) | (kind == OrderKind.FOLLOW))
-    finished: Ints = np.flatnonzero(lost | _arrived(world))
-    for slot in finished.tolist():
+    finished = which(world.needs_target[:n] & (world.order_target[:n] == NOBODY)).tolist()
+    finished += _arrived(world)
+    for slot in finished:
         _next(world, slot)
 
 
-def _arrived(world: World) -> Bools:
-    """(top,) walks that have reached their point, or as near as the crowd there lets them."""
+def _arrived(world: World) -> list[int]:
+    """Slots whose walk has reached its point, or as near as the crowd there or the terrain lets them."""
     n = world.top
-    kind = world.order_kind[:n]
-    walking = np.isin(kind, WALKS) & (world.target[:n] == NOBODY)
-    if not walking.any():
-        return np.zeros(n, dtype=np.bool_)
-    offset = world.order_point[:n] - world.pos[:n]
-    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    arrived: Bools = walking & ((distance <= MECHANICS.arrival_radius) | world.nav_end[:n])
-    stuck = np.flatnonzero(walking & ~arrived & (world.blocked[:n] >= PACKED_AFTER_LOOPS))
-    for slot in stuck.tolist():
-        arrived[slot] = _packed(world, slot, float(distance[slot]))
-    return arrived
+    walkers = which(world.walks[:n] & (world.target[:n] == NOBODY))
+    if not walkers.size:
+        return []
+    offset = world.order_point.take(walkers, 0) - world.pos.take(walkers, 0)
+    offset *= offset
+    squared = offset[:, 0] + offset[:, 1]
+    there = squared <= MECHANICS.arrival_radius**2
+    there |= world.nav_end.take(walkers)
+    stuck = world.blocked.take(walkers) >= PACKED_AFTER_LOOPS
+    if some(stuck):
+        for i in which(stuck & ~there).tolist():
+            there[i] = _packed(world, int(walkers[i]), float(squared[i]))
+    return walkers[there].tolist() if some(there) else []
 
 
-def _packed(world: World, slot: int, distance: float) -> bool:
+def _packed(world: World, slot: int, squared: float) -> bool:
     """Whether friends' bodies fill the ground between a blocked unit and its goal."""
     friends = world.units_of(int(world.owner[slot]))
     friends = friends[(world.layer_bits[friends] & world.layer_bits[slot] != 0) & (friends != slot)]
     offset = world.pos[friends] - world.order_point[slot]
-    inside = offset[:, 0] ** 2 + offset[:, 1] ** 2 < distance**2
+    inside = offset[:, 0] ** 2 + offset[:, 1] ** 2 < squared
     area = float((world.separation[friends[inside]] ** 2).sum())
-    return area >= MECHANICS.crowd_share * distance**2
+    return area >= MECHANICS.crowd_share * squared
 
 
 def _next(world: World, slot: int) -> None:
     """Begin the next order of a unit; a patrol turns round, targets that are gone are skipped."""
     waiting = world.queue[slot]
     if world.order_kind[slot] == OrderKind.PATROL and not waiting:
-        world.order_point[slot], world.order_origin[slot] = (
-            world.order_origin[slot].copy(),
-            world.order_point[slot].copy(),
-        )
+        here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
+        world.order_point[slot], world.order_origin[slot] = there, here
+        world.nav_end[slot] = False
         world.nav_loop[slot] = world.blocked[slot] = 0
         return
     order: Order | None = None

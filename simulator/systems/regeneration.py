@@ -6,22 +6,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.arrays import some, which
+
 if TYPE_CHECKING:
+    from simulator.geometry import Floats
     from simulator.world import World
 
 
 def regenerate(world: World) -> None:
     """Give every unit this loop's shields, life and energy, up to what its type holds."""
+    shields, life, energy = world.regenerating
+    if shields:
+        _regain(world, world.shields, world.shields_max, world.shield_regen, world.shield_delay)
+    if life:
+        _regain(world, world.life, world.life_max, world.life_regen, world.life_delay)
+    if energy:
+        _regain(world, world.energy, world.energy_max, world.energy_regen, None)
+
+
+def _regain(world: World, amount: Floats, most: Floats, rate: Floats, delay: Floats | None) -> None:
     n = world.top
-    for amount, most, rate, delay in (
-        (world.shields[:n], world.shields_max[:n], world.shield_regen[:n], world.shield_delay[:n]),
-        (world.life[:n], world.life_max[:n], world.life_regen[:n], world.life_delay[:n]),
-        (world.energy[:n], world.energy_max[:n], world.energy_regen[:n], None),
-    ):
-        below = (amount < most) & (rate > 0.0)
-        if not below.any():
-            continue
-        if delay is not None:
-            below &= world.loop - world.damaged_loop[:n] > delay
-        below &= world.life[:n] > 0.0
-        amount[below] = np.minimum(amount[below] + rate[below], most[below])
+    below = amount[:n] < most[:n]
+    if delay is not None and some(below):
+        below &= world.damaged_loop[:n] < world.loop - delay[:n]
+    if not some(below):
+        return
+    slots = which(below & (world.life[:n] > 0.0))
+    amount[slots] = np.minimum(amount.take(slots) + rate.take(slots), most.take(slots))

@@ -33,9 +33,9 @@ def run(world: World) -> None:
     """Run the triggers that are due at this loop, in the scenario's order, until one ends the game."""
     died = world.deaths_seen < len(world.deaths)
     world.deaths_seen = len(world.deaths)
-    due = [t for t in world.map.scenario.triggers if _is_due(t, world.loop, died)]
-    if due:
-        _run(world, due)
+    scenario = world.map.scenario
+    if died or world.loop in scenario.moments or any(world.loop % period == 0 for period in scenario.periods):
+        _run(world, [t for t in scenario.triggers if _is_due(t, world.loop, died)])
 
 
 def _is_due(trigger: Trigger, loop: int, died: bool) -> bool:

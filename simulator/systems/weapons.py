@@ -7,17 +7,19 @@ and ``missiles``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator import geometry
+from simulator.arrays import some, which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.stats import GROUND_PLANE, INSTANT_ACCELERATION_N
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
-    from simulator.geometry import Floats
     from simulator.records import Hit, Weapon
+    from simulator.systems.damage import Shot
     from simulator.world import Bools, Ints, World
 
 NOT_STARTED = -1.0
@@ -27,45 +29,44 @@ def fire(world: World) -> None:
     """Start attacks, let those whose damage point has come take effect, and count down."""
     n = world.top
     cooldown, windup, backswing = world.cooldown[:n], world.windup[:n], world.backswing[:n]
-    counting = cooldown > 0.0
-    cooldown -= counting
-    np.maximum(backswing - 1.0, 0.0, out=backswing)
-    fighting = world.target[:n] != NOBODY
-    if not fighting.any():
-        np.maximum(cooldown, 0.0, out=cooldown)
-        return
-    started = windup >= 0.0
-    windup -= started
-    _drop_lost(world, started & fighting & ~world.in_reach[:n])
-    ready = fighting & world.in_reach[:n] & (cooldown <= 0.0) & ~started
-    starting = np.flatnonzero(ready)
-    if starting.size:
-        starting = starting[_aimed(world, starting)]
-        _start(world, starting)
-    idle = cooldown < 0.0
-    if idle.any():
-        cooldown[idle] = 0.0
-    effective = np.flatnonzero((windup <= 0.0) & (windup > NOT_STARTED))
-    if effective.size:
-        _take_effect(world, effective)
+    cooldown -= cooldown > 0.0
+    backswing -= backswing > 0.0
+    fighters = world.fighters
+    if fighters.size:
+        started = windup >= 0.0
+        if some(started):
+            windup -= started
+            _drop_lost(world, which(started & ~world.in_reach[:n]))
+        ready = world.in_reach.take(fighters)
+        ready &= cooldown.take(fighters) <= 0.0
+        ready &= ~started.take(fighters)
+        if some(ready):
+            starting = fighters[ready]
+            _start(world, starting[_aimed(world, starting)])
+        effective = which((windup <= 0.0) & (windup > NOT_STARTED))
+        if effective.size:
+            _take_effect(world, effective)
+    np.maximum(cooldown, 0.0, out=cooldown)  # a fraction is carried over only into the very next attack
 
 
-def _drop_lost(world: World, lost: Bools) -> None:
+def _drop_lost(world: World, lost: Ints) -> None:
     """Attacks whose target got away before the damage point leave no cooldown."""
-    if lost.any():
-        world.windup[: world.top][lost] = NOT_STARTED
-        world.cooldown[: world.top][lost] = 0.0
+    if lost.size:
+        world.windup[lost] = NOT_STARTED
+        world.cooldown[lost] = 0.0
 
 
 def _aimed(world: World, slots: Ints) -> Bools:
     """Whether each unit faces its target within its weapon's arc; turrets always do."""
-    needs = world.aim_cos[slots] > -1.0
-    if not needs.any():
-        return ~needs
-    offset = world.pos[world.target[slots]] - world.pos[slots]
-    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    along = offset[:, 0] * world.heading[slots, 0] + offset[:, 1] * world.heading[slots, 1]
-    aimed: Bools = ~needs | (along >= world.aim_cos[slots] * distance)
+    least = world.aim_cos.take(slots)
+    turret = least <= -1.0
+    if np.count_nonzero(turret) == len(turret):
+        return turret
+    offset = world.pos.take(world.target.take(slots), 0) - world.pos.take(slots, 0)
+    facing = world.heading.take(slots, 0)
+    distance = geometry.length(offset)
+    along = offset[:, 0] * facing[:, 0] + offset[:, 1] * facing[:, 1]
+    aimed: Bools = turret | (along >= least * distance)
     return aimed
 
 
@@ -139,26 +140,22 @@ def _condition(world: World, name: str, target: Ints) -> Bools:
     return np.zeros(len(target), dtype=np.bool_)
 
 
-def launch(world: World, shot: int) -> None:
-    """Send the missile of a pending hit on its way."""
-    pending = world.pending
-    hit = world.catalog.weapons[int(pending.weapon[shot])].hits[int(pending.hit[shot])]
-    gain_n = hit.missile_acceleration_n
+def launch(world: World, shot: Shot, hit: Hit) -> None:
+    """Send the missile of a hit on its way."""
     top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
+    gain_n = hit.missile_acceleration_n
     instant = gain_n is None or gain_n >= INSTANT_ACCELERATION_N
-    gain = np.inf if instant or gain_n is None else gain_n / LOOPS_PER_NORMAL_SECOND**2
-    start: Floats = pending.start[shot]
     world.missiles.append(
         1,
-        source=pending.source[shot],
-        owner=pending.owner[shot],
-        target=pending.target[shot],
-        weapon=pending.weapon[shot],
-        hit=pending.hit[shot],
-        pos=start,
-        start=start,
-        goal=pending.goal[shot],
+        source=shot.source,
+        owner=shot.owner,
+        target=shot.target,
+        weapon=shot.weapon,
+        hit=shot.hit,
+        start=shot.start,
+        goal=shot.goal,
+        pos=shot.start,
         step=top if instant else 0.0,
-        step_max=top,
-        step_gain=gain,
+        top=top,
+        gain=math.inf if gain_n is None or instant else gain_n / LOOPS_PER_NORMAL_SECOND**2,
     )

@@ -1,0 +1,24 @@
+"""Array shorthands for short arrays, where a call costs more than its work.
+
+A loop of a ten-unit battle is some hundred array calls; ``flatnonzero`` and ``any`` go through several Python layers
+and cost three to ten times what these do.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def which(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Indices at which a one-dimensional mask is true, ascending."""
+    return mask.nonzero()[0]
+
+
+def some(mask: NDArray[np.bool_]) -> bool:
+    """Whether the mask is true anywhere."""
+    return bool(np.count_nonzero(mask))
