@@ -1,0 +1,129 @@
+"""Games without a game: units, snapshots and tasks made by hand, and golden files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc_pb
+
+from bridge.knowledge import knowledge
+from bridge.snapshot import Snapshot
+from bridge.task import TaskConfig
+from protocol.configfile import load
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+GOLDEN = Path(__file__).parent / "golden"
+TASKS = Path(__file__).resolve().parents[2] / "configs" / "tasks"
+
+
+def make_unit(tag: int, name: str, x: float, y: float, **fields: Any) -> raw_pb2.Unit:
+    """A unit of one's own at full health, except for what is given."""
+    known = knowledge().get(name)
+    alliance = {"own": raw_pb2.Self, "ally": raw_pb2.Ally, "enemy": raw_pb2.Enemy, "neutral": raw_pb2.Neutral}
+    unit = raw_pb2.Unit(
+        tag=tag,
+        unit_type=known.id if known else fields.pop("unit_type"),
+        alliance=alliance[fields.pop("alliance", "own")],
+        display_type=raw_pb2.Visible,
+        cloak=raw_pb2.NotCloaked,
+        health=known.health if known else 1,
+        health_max=known.health if known else 1,
+        shield=known.shield if known else 0,
+        shield_max=known.shield if known else 0,
+        build_progress=1.0,
+    )
+    unit.pos.x, unit.pos.y, unit.pos.z = x, y, 10.0
+    orders = fields.pop("orders", ())
+    for name_, value in fields.items():
+        if isinstance(value, tuple):
+            getattr(unit, name_).extend(value)
+        else:
+            setattr(unit, name_, value)
+    for ability in orders:
+        unit.orders.add(ability_id=ability)
+    return unit
+
+
+def make_snapshot(
+    units: Iterable[raw_pb2.Unit],
+    *,
+    loop: int = 224,
+    size: tuple[int, int] = (32, 32),
+    camera: tuple[float, float] = (16, 16),
+    upgrades: Iterable[int] = (),
+    player: dict[str, int] | None = None,
+    **fields: Any,
+) -> Snapshot:
+    """What a player sees: these units on a map of this size."""
+    response = sc_pb.ResponseObservation()
+    observation = response.observation
+    observation.game_loop = loop
+    observation.player_common.player_id = 1
+    for name, value in (player or {}).items():
+        setattr(observation.player_common, name, value)
+    observation.raw_data.units.extend(units)
+    observation.raw_data.player.upgrade_ids.extend(upgrades)
+    observation.raw_data.player.camera.x, observation.raw_data.player.camera.y = camera
+    info = sc_pb.ResponseGameInfo()
+    info.start_raw.map_size.x, info.start_raw.map_size.y = size
+    info.start_raw.playable_area.p1.x, info.start_raw.playable_area.p1.y = size
+    layers = info.options.feature_layer
+    layers.width = 24
+    layers.resolution.x = layers.resolution.y = 128
+    layers.minimap_resolution.x = layers.minimap_resolution.y = 64
+    return Snapshot(response=response, info=info, **fields)
+
+
+@pytest.fixture
+def unit() -> Callable[..., raw_pb2.Unit]:
+    return make_unit
+
+
+@pytest.fixture
+def snapshot() -> Callable[..., Snapshot]:
+    return make_snapshot
+
+
+@pytest.fixture
+def task() -> Callable[..., TaskConfig]:
+    """A shipped task by name, with other fields where some are given."""
+
+    def get(name: str = "2s3z", **changed: Any) -> TaskConfig:
+        return load(TASKS / "llm_smac" / f"{name}.yaml", TaskConfig).model_copy(update=changed)
+
+    return get
+
+
+@pytest.fixture
+def golden() -> Callable[[str, str], None]:
+    """Compares a text with a golden file; `GOLDEN=write` in the environment writes the file instead."""
+
+    def check(name: str, text: str) -> None:
+        path = GOLDEN / name
+        if os.environ.get("GOLDEN") == "write":
+            path.write_text(text, encoding="utf-8")
+        assert text == path.read_text(encoding="utf-8")
+
+    return check
+
+
+@pytest.fixture
+def battle() -> list[raw_pb2.Unit]:
+    """A 2s3z in the middle of its fight: every kind of line that a text can have is in it."""
+    return [
+        make_unit(0x100040001, "Stalker", 10, 16, weapon_cooldown=14.0, orders=(3674,)),
+        make_unit(0x100080001, "Stalker", 11.5, 17, health=61, shield=0, energy=0),
+        make_unit(0x1000C0001, "Zealot", 14, 16, shield=12.4),
+        make_unit(0x100100001, "Zealot", 14.5, 15),
+        make_unit(0x100140001, "Zealot", 31, 2, buff_ids=(5,)),
+        make_unit(0x100180001, "Zealot", 15, 16.5, alliance="enemy", shield=0, health=0.4),
+        make_unit(0x1001C0001, "Zealot", 15.2, 15, alliance="enemy", cloak=raw_pb2.CloakedDetected),
+        make_unit(0x100200001, "Stalker", 20, 16, alliance="enemy", is_hallucination=True),
+        make_unit(0x100240001, "MineralField", 12, 12, alliance="neutral", unit_type=341),
+    ]

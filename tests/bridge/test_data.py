@@ -1,0 +1,116 @@
+"""The data files fit PySC2 and each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge import data
+from bridge.catalog import catalogue, catalogue_sha256
+from bridge.compat import actions, units, upgrades
+from bridge.knowledge import RACES, is_armed, knowledge
+from bridge.maps import known_maps
+
+NUMBERS = {member.name: int(member) for race in (units.Protoss, units.Terran, units.Zerg) for member in race}
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_the_functions_of_an_action_are_one_ability_of_pysc2(name: str) -> None:
+    action = catalogue()[name]
+    if action.raw is None or action.screen is None:
+        assert (action.raw, action.screen, action.args) == (None, None, ())
+        return
+    raw, screen = actions.RAW_FUNCTIONS[action.raw], actions.FUNCTIONS[action.screen]
+    assert raw.ability_id == screen.ability_id
+    assert {argument.name for argument in screen.args} >= {"queued"}
+    targets = {"tag": "target_unit_tag", "screen": "world", "minimap": "world", None: None}
+    assert [a.name for a in raw.args[2:]] == ([targets[action.target_kind]] if action.target_kind else [])
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_an_action_speaks_of_things_that_exist(name: str) -> None:
+    action = catalogue()[name]
+    assert action.name == name
+    assert set(action.units) <= set(knowledge())
+    assert action.needs.upgrade is None or action.needs.upgrade in upgrades.Upgrades.__members__
+    assert action.subject == "team" or action.args[0] == "tag"
+    assert action.about.endswith(".")
+
+
+def test_the_catalogue_has_the_basic_and_smac_actions_and_those_of_stalkers() -> None:
+    assert {name: action.args for name, action in catalogue().items()} == {
+        "No_Operation": (),
+        "Hold_Position": (),
+        "Stop": (),
+        "Move_Screen": ("screen",),
+        "Move_Minimap": ("minimap",),
+        "Attack_Unit": ("tag",),
+        "Select_Unit_Move_Screen": ("tag", "screen"),
+        "Select_Unit_Move_Minimap": ("tag", "minimap"),
+        "Select_Unit_Attack_Unit": ("tag", "tag"),
+        "Ability_Blink_Screen": ("screen",),
+        "Select_Unit_Blink_Screen": ("tag", "screen"),
+    }
+    assert len(catalogue_sha256()) == 64
+
+
+def test_every_known_type_has_the_name_and_number_of_pysc2() -> None:
+    assert {name: kind.id for name, kind in knowledge().items()} == {name: NUMBERS[name] for name in knowledge()}
+
+
+def test_what_is_known_is_complete_enough_to_speak_of() -> None:
+    for name, kind in knowledge().items():
+        assert kind.about.endswith("."), name
+        assert kind.health > 0, name
+        assert all(weapon.period_s > 0 and weapon.damage > 0 for weapon in kind.weapons), name
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "value"),
+    [  # of 4.10, where the paper's own table or other versions differ
+        ("Zealot", "shield", 50),
+        ("Stalker", "speed", 4.13),
+        ("Colossus", "vespene", 200),
+        ("Archon", "minerals", 175),  # between its cheapest and its dearest pair of Templar
+        ("Marauder", "health", 125),
+        ("Zergling", "minerals", 25),
+        ("SpineCrawler", "health", 300),
+        ("Queen", "minerals", 150),
+    ],
+)
+def test_numbers_are_those_of_4_10(name: str, field: str, value: float) -> None:
+    assert getattr(knowledge()[name], field) == value
+
+
+def test_a_type_without_a_weapon_is_unarmed_and_an_unknown_one_is_not() -> None:
+    assert not is_armed("Observer")
+    assert is_armed("Zealot")
+    assert is_armed("Something of a later version")
+
+
+def test_damage_per_second_counts_hits_and_period() -> None:
+    (blades,) = knowledge()["Zealot"].weapons
+    assert blades.per_second == pytest.approx(8 * 2 / 0.86)
+
+
+def test_the_nine_battles_are_known() -> None:
+    assert list(known_maps()) == [
+        "2s3z",
+        "3s5z",
+        "1c3s5z",
+        "3s5z_vs_3s6z",
+        "3s_vs_3z",
+        "3s_vs_4z",
+        "3s_vs_5z",
+        "2c_vs_64zg",
+        "2s_vs_1sc",
+    ]
+    assert all(spec.file == f"llm_smac/{name}.SC2Map" for name, spec in known_maps().items())
+
+
+def test_the_sources_of_every_data_file_are_told() -> None:
+    sources = data.path("SOURCES.md").read_text(encoding="utf-8")
+    files = [path for path in Path(data.path(".")).rglob("*.yaml") if path.parent.name != "knowledge"]
+    assert {path.name for path in files} <= {word.strip("`") for word in sources.split()}
+    assert {path.stem for path in data.path("knowledge").iterdir()} == set(RACES)
