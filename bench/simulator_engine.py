@@ -17,13 +17,13 @@ from rich.table import Table
 
 from simulator import commands
 from simulator.maps import load_map, map_names
-from simulator.systems.placement import free_place
+from simulator.systems.placement import free_places
+from simulator.systems.triggers import players_of
 from simulator.tick import advance, new_game
+from simulator.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from simulator.world import World
 
 LOOPS_PER_STEP = 8
 ARMY_SIZES = (10, 20, 50, 100, 200, 400)
@@ -39,13 +39,16 @@ def battle(name: str, seed: int) -> World:
 
 def armies(units: int, seed: int) -> World:
     """Two armies of Marines, Zealots and Stalkers on an open map, each on attack-move to the other's place."""
-    world = new_game(load_map("llm_smac/3s_vs_3z"), seed=seed)
-    commands.debug_kill(world, world.tag[world.live].tolist())
+    field = load_map("llm_smac/3s_vs_3z")
+    world = World(field, players_of(field), seed=seed)  # without the map's own script, which would end it
     homes = {1: (9.0, 16.0), 2: (23.0, 16.0)}
-    for i in range(units):
-        kind = world.catalog.unit(("Marine", "Zealot", "Marine", "Stalker")[i // 2 % 4])
-        player = 1 + i % 2
-        world.spawn(kind, player, free_place(world, kind, homes[player]))
+    shares = {"Marine": units // 4, "Zealot": (units // 2 - units // 4) // 2}
+    shares["Stalker"] = units // 2 - sum(shares.values())
+    for player, home in homes.items():
+        for name, count in shares.items():
+            kind = world.catalog.unit(name)
+            for place in free_places(world, kind, home, count):
+                world.spawn(kind, player, place)
     for player, enemy in ((1, 2), (2, 1)):
         commands.attack_move(world, world.units_of(player).tolist(), homes[enemy])
     return world

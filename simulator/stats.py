@@ -48,7 +48,7 @@ class Damage:
         return self.amount + max((value for bit, value in self.bonus if attributes & bit), default=0.0)
 
 
-def bits(names: Iterable[str], order: tuple[str, ...]) -> int:
+def bit_set(names: Iterable[str], order: tuple[str, ...]) -> int:
     """The bit set of ``names``, bit i for ``order[i]``."""
     return sum(1 << order.index(name) for name in set(names))
 
@@ -75,8 +75,8 @@ class Stats:
         self.scan: Floats = np.zeros(shape_w)  # edge to edge
         self.period: Floats = np.zeros(shape_w)  # loops
         self.damage: list[list[tuple[Damage, ...]]] = [[() for _ in catalog.weapons] for _ in range(players)]
-        self.attribute_bits: NDArray[np.int64] = np.array([bits(u.attributes, ATTRIBUTES) for u in catalog.units])
-        self.layer_bits: NDArray[np.int64] = np.array([bits(u.collide, LAYERS) for u in catalog.units])
+        self.attribute_bits: NDArray[np.int64] = np.array([bit_set(u.attributes, ATTRIBUTES) for u in catalog.units])
+        self.layer_bits: NDArray[np.int64] = np.array([bit_set(u.collide, LAYERS) for u in catalog.units])
         self.plane_bits: NDArray[np.int64] = np.array([_plane_bits(u) for u in catalog.units])
         for player in range(players):
             self.apply(player, ())

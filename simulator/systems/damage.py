@@ -22,7 +22,7 @@ from simulator.world import NOBODY
 if TYPE_CHECKING:
     from simulator.records import Affects, Sweep
     from simulator.stats import Damage
-    from simulator.world import Ints, World
+    from simulator.world import Bools, Ints, World
 
 BEHIND = 1e-9
 
@@ -154,8 +154,8 @@ def _sweep(world: World, shot: Shot, sweep: Sweep, begun: float) -> None:
     across, along = points[:, 1], points[:, 2]
     at = shot.goal + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
     offset = world.pos[near][:, None, :] - at
-    touched = geometry.length(offset) <= sweep.radius + world.radius[near][:, None]
-    hits = touched.any(axis=1).nonzero()[0]
+    touched: Bools = geometry.length(offset) <= sweep.radius + world.radius[near][:, None]
+    hits: Ints = np.flatnonzero(touched.any(axis=1))
     if hits.size:
         first = np.argmax(touched[hits], axis=1)
         world.pending.append(

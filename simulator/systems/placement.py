@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator.stats import LAYERS
+from simulator.stats import LAYERS, bit_set
 from simulator.traits import Layer, layer_of
 
 if TYPE_CHECKING:
@@ -20,32 +20,44 @@ if TYPE_CHECKING:
     from simulator.world import Bools, World
 
 CANDIDATE_STEP = 0.25
-SEARCH_RADIUS = 12.0
+SEARCH_RADII = (3.0, 6.0, 12.0)
 BODY_GAP = 0.02
 
 
-def free_place(world: World, unit: UnitType, point: tuple[float, float]) -> tuple[float, float]:
-    """The place nearest to ``point`` where ``unit`` touches no body and no wall; ``point`` if there is none.
+def free_places(world: World, unit: UnitType, point: tuple[float, float], count: int) -> list[tuple[float, float]]:
+    """The places nearest to ``point`` where ``count`` new units touch no body and no wall, nor each other.
 
-    Structures are put on the cell grid, where their footprint fits it.
+    Units that find no place within the search radius stand on ``point``. Structures are put on the cell grid, where
+    their footprint fits it, and all on the same place.
     """
     footprint = world.catalog.footprints.get(unit.footprint)
     if footprint is not None and footprint.cells:
-        return snapped(point, footprint.size)
-    at = np.array(point) + _offsets()
-    free = _on_surface(world, unit, at)
-    bodies = world.live
-    bits = sum(1 << LAYERS.index(name) for name in unit.collide)
-    bodies = bodies[(world.layer_bits[bodies] & bits) != 0]
-    if bodies.size:
-        apart = world.separation[bodies] + unit.separation + BODY_GAP
-        for i in np.flatnonzero(free).tolist():
-            offset = world.pos[bodies] - at[i]
-            if (offset[:, 0] ** 2 + offset[:, 1] ** 2 >= apart**2).all():
-                return float(at[i, 0]), float(at[i, 1])
-        return point
-    first = np.flatnonzero(free)
-    return (float(at[first[0], 0]), float(at[first[0], 1])) if first.size else point
+        return [snapped(point, footprint.size)] * count
+    places: list[tuple[float, float]] = []
+    for radius in SEARCH_RADII:
+        places = _places_within(world, unit, point, count, radius)
+        if len(places) == count:
+            return places
+    return places + [point] * (count - len(places))
+
+
+def _places_within(
+    world: World, unit: UnitType, point: tuple[float, float], count: int, radius: float
+) -> list[tuple[float, float]]:
+    at = np.array(point) + _offsets(radius)
+    at = at[_on_surface(world, unit, at)]
+    bits = bit_set(unit.collide, LAYERS)
+    bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
+    apart = world.separation[bodies] + unit.separation + BODY_GAP
+    offset = at[:, None, :] - world.pos[bodies]
+    at = at[(offset[..., 0] ** 2 + offset[..., 1] ** 2 >= apart**2).all(axis=1)]
+    places: list[tuple[float, float]] = []
+    own = (2.0 * unit.separation + BODY_GAP) ** 2
+    while len(at) and len(places) < count:
+        x, y = at[0].tolist()
+        places.append((x, y))
+        at = at[1:] if bits == 0 else at[(at[:, 0] - x) ** 2 + (at[:, 1] - y) ** 2 >= own]
+    return places
 
 
 def snapped(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
@@ -64,13 +76,13 @@ def _on_surface(world: World, unit: UnitType, at: Floats) -> Bools:
     return inside & surface.flat[surface.cell(at)]
 
 
-@lru_cache(maxsize=1)
-def _offsets() -> Floats:
+@lru_cache(maxsize=len(SEARCH_RADII))
+def _offsets(radius: float) -> Floats:
     """Candidate offsets, nearest first; equally near ones from the east counter-clockwise."""
-    side = np.arange(-SEARCH_RADIUS, SEARCH_RADIUS + CANDIDATE_STEP / 2.0, CANDIDATE_STEP)
+    side = np.arange(-radius, radius + CANDIDATE_STEP / 2.0, CANDIDATE_STEP)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     squared = x * x + y * y
     quarter = np.where(y >= 0.0, np.where(x > 0.0, 0, 1), np.where(x < 0.0, 2, 3))
     order = np.lexsort((x, y, quarter, squared))
-    order = order[squared[order] <= SEARCH_RADIUS**2]
+    order = order[squared[order] <= radius**2]
     return np.stack([x[order], y[order]], axis=1)

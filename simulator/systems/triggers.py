@@ -9,7 +9,7 @@ import numpy as np
 from simulator import commands
 from simulator.players import GameResult, PlayerSetup
 from simulator.scenario import At, Create, Every, Order, Result
-from simulator.systems.placement import free_place
+from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
     from simulator.maps import GameMap
@@ -76,8 +76,8 @@ def _act(world: World, action: Action) -> None:
 def _create(world: World, spec: CreateSpec) -> None:
     unit = world.catalog.unit(spec.unit)
     point = world.map.scenario.place(spec.at)
-    for _ in range(spec.count):
-        world.spawn(unit, spec.player, free_place(world, unit, point), spec.facing)
+    for place in free_places(world, unit, point, spec.count):
+        world.spawn(unit, spec.player, place, spec.facing)
 
 
 def _order(world: World, spec: OrderSpec) -> None:
