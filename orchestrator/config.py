@@ -32,6 +32,8 @@ class MatchConfig(Frozen):
     task: TaskConfig
     run: str
     """Its name on the bus, in the recording and in every table."""
+    game: str = "StarCraft II"
+    """What plays; the simulator speaks the game's protocol so well that only whoever starts it knows."""
     seed: int = Field(default=1, ge=0, lt=2**31)
     """Of the first episode; each further one adds 1."""
     episodes: int = Field(default=1, ge=1)

@@ -68,7 +68,7 @@ class Progress:
         if self._screen.is_terminal and self._report is not None:
             self._live.update(self._picture(self._report))
         elif isinstance(message, Report) and message.step % 20 == 0:
-            self._screen.print(f"step {message.step}, {_clock(message.game_loop)}")
+            self._screen.print(f"step {message.step}, {clock(message.game_loop)}")
 
     def _add(self, report: Report) -> None:
         self._report = report
@@ -86,7 +86,7 @@ class Progress:
         for agent in report.agents:
             rows.add_row(*self._row(agent))
         steps = f" of {self._max_steps}" if self._max_steps else ""
-        line = f"step {report.step}{steps}   game {_clock(report.game_loop)}   score {report.score:g}"
+        line = f"step {report.step}{steps}   game {clock(report.game_loop)}   score {report.score:g}"
         title = f"{self._run.task} · {self._run.run}" if self._run else ""
         return Panel(Group(Text(line), rows), title=title, border_style="blue")
 
@@ -123,7 +123,7 @@ def table(result: Result) -> Panel:
         f"{kd}  (killed {_losses(result.killed.units, result.killed.value)}, "
         f"lost {_losses(result.lost.units, result.lost.value)})",
     )
-    rows.add_row("steps", f"{result.steps}, {_clock(result.game_loop)} of game in {result.wall_s:.1f} s")
+    rows.add_row("steps", f"{result.steps}, {clock(result.game_loop)} of game in {result.wall_s:.1f} s")
     if result.latency_p50_s is not None and result.latency_p95_s is not None:
         milliseconds = f"median {result.latency_p50_s * 1000:.0f} ms, 95 % below {result.latency_p95_s * 1000:.0f} ms"
         rows.add_row("latency", milliseconds)
@@ -148,6 +148,7 @@ def _losses(units: int, value: float) -> str:
     return f"{units} unit(s) worth {value:g}"
 
 
-def _clock(game_loop: int) -> str:
+def clock(game_loop: int) -> str:
+    """Minutes and seconds of the game."""
     seconds = int(game_loop / LOOPS_PER_S)
     return f"{seconds // 60}:{seconds % 60:02d}"

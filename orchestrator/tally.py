@@ -46,23 +46,23 @@ class Tally:
                 self._latencies_s.append(agent.latency_s)
         self._note(after)
 
-    def result(self, run: str, episode: int, *, wall_s: float, cause: str | None = None) -> Result:
+    def result(self, run: str, episode: int, *, wall_s: float) -> Result:
         """The account at the end of the episode.
 
         Args:
             run: name of the run.
             episode: its number, from 0.
             wall_s: time it took.
-            cause: why it ended, if the game itself does not say.
         """
         outcome = self._last.outcome or "draw"
+        cause = CAUSES[outcome] if self._last.outcome else "step limit"
         killed = Casualties(units=self._dead[raw_pb2.Enemy], value=self._value("killed"))
         lost = Casualties(units=self._dead[raw_pb2.Self], value=self._value("lost"))
         return Result(
             run=run,
             episode=episode,
             outcome=outcome,
-            cause=cause or CAUSES[outcome],
+            cause=cause,
             steps=self._steps,
             game_loop=self._last.game_loop,
             game_s=self._last.game_loop / LOOPS_PER_S,

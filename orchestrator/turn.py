@@ -19,7 +19,7 @@ from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
 from protocol.errors import PeerError, WrongKey
 from protocol.keys import Topic, agent_key, every_agent, parse
-from protocol.messages import AgentStatus, Message, Observation, Reply
+from protocol.messages import AgentStatus, Message, Observation, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,6 +51,11 @@ class Answer:
     def text(self) -> str | None:
         """The words of the reply."""
         return self.reply.text if self.reply else None
+
+    @property
+    def usage(self) -> Usage:
+        """What the reply took."""
+        return self.reply.usage if self.reply else Usage()
 
 
 @dataclass(frozen=True, slots=True)

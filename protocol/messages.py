@@ -392,7 +392,7 @@ class Run(Wire):
     seed: int
     episodes: int
     game: str
-    """Version of the game that plays, `simulator 0.1.0 (data 4.10.0.75689)` or `StarCraft II 4.10.0.75689`."""
+    """What plays and its version, `StarCraft II 4.10.0.75689` or `Khala simulator 0.1.0, as 4.10.0.75689`."""
     executor: Literal["raw", "screen"]
     clock: Clock
     agents: tuple[AgentCard, ...]

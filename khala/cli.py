@@ -1,0 +1,276 @@
+"""The command line: mounts what the packages define, adds what needs all of them, and prints errors as one sentence."""
+
+import asyncio
+import json
+import logging
+import signal
+import sys
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+import agents.cli
+import orchestrator.cli
+import simulator.cli
+import simulator.install
+from khala import __version__
+from orchestrator import show
+from orchestrator.cli import Insecure, Json, Listen
+from orchestrator.config import MatchConfig, change, load_task, new_run_name
+from protocol.bus.config import BusConfig
+from protocol.errors import ConfigError, KhalaError
+from protocol.keys import check_name
+from protocol.messages import Result, Wire
+
+T = TypeVar("T")
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells expect it."""
+
+app = typer.Typer(
+    name="khala",
+    help="Teams of LLM agents play StarCraft II together over a message bus.",
+    epilog="Begin with: khala run 2s3z_pair",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+)
+
+RUN_EPILOG = """
+Examples:\n
+    khala run 2s3z\n
+    khala run 2s3z_pair --model deepseek --episodes 5\n
+    khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
+    khala run my_task.yaml --policy my_agent:decide --json
+"""
+HOST_EPILOG = """
+Examples:\n
+    khala host 2s3z_pair --run first --connect tcp/10.0.0.5:7447\n
+    khala host 2s3z_pair --run first --listen tcp/0.0.0.0:7447 --insecure
+"""
+
+Task = Annotated[str, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")]
+Game = Annotated[
+    str,
+    typer.Option(help="What plays: simulator, starcraft2 (by SC2PATH), or a directory of either.", metavar="GAME"),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Of the first episode; each further one adds 1.")]
+Episodes = Annotated[int, typer.Option(min=1, help="How many are played.")]
+RunName = Annotated[
+    str | None,
+    typer.Option(envvar="KHALA_RUN", help="Name of the run.", show_default="task, time, digits", metavar="NAME"),
+]
+MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
+StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
+MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after so many steps.")]
+ExecutorName = Annotated[str | None, typer.Option(help="raw or screen; see docs/design/turn.md.", metavar="EXECUTOR")]
+Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
+Out = Annotated[Path, typer.Option(help="Directory that gets a directory for the run.", metavar="DIR")]
+
+
+def run(
+    task: Task,
+    *,
+    model: Annotated[
+        str, typer.Option(help="Model to ask: scripted, openai, deepseek, …, or a YAML file.", metavar="NAME")
+    ] = "scripted",
+    model_name: Annotated[
+        str | None,
+        typer.Option(help="Another model there; scripted has focus-fire, random-legal, silent."),
+    ] = None,
+    base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
+    policy: Annotated[
+        str | None, typer.Option(help="Decide without a model, by your own code.", metavar="MODULE:NAME")
+    ] = None,
+    budget_usd: Annotated[float | None, typer.Option(min=0, help="What all agents together may spend.")] = None,
+    latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
+    game: Game = "simulator",
+    seed: Seed = 1,
+    episodes: Episodes = 1,
+    executor: ExecutorName = None,
+    max_wait: MaxWait = None,
+    step_loops: StepLoops = None,
+    max_steps: MaxSteps = None,
+    run: RunName = None,
+    assemble: Assemble = 60.0,
+    out: Out = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """Play a task on this machine: game, host, agents and, if need be, the scripted model.
+
+    Agents are processes of their own and talk to the host over the bus, as they would from other machines. Everything
+    that is said goes into a recording, see `khala replay`.
+    """
+    from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+
+    config = _config(
+        task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
+        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps,
+    )  # fmt: skip
+    minds = Minds(model, model_name, base_url, policy, budget_usd, latency)
+    _until_interrupted(config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch))
+
+
+def host(
+    task: Task,
+    *,
+    run: RunName = None,
+    connect: Annotated[
+        list[str] | None, typer.Option(help="Endpoint of the router.", show_default="tcp/127.0.0.1:7447")
+    ] = None,
+    listen: Listen = None,
+    insecure: Insecure = False,
+    game: Game = "simulator",
+    seed: Seed = 1,
+    episodes: Episodes = 1,
+    executor: ExecutorName = None,
+    max_wait: MaxWait = None,
+    step_loops: StepLoops = None,
+    max_steps: MaxSteps = None,
+    assemble: Assemble = 60.0,
+    out: Out = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """Play a task with agents that join over the bus, from this machine or from others.
+
+    With --listen the host is its own router; with --connect it uses one, see `khala router`.
+    """
+    from khala.local import play_hosted  # noqa: PLC0415
+
+    config = _config(
+        task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
+        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps,
+    )  # fmt: skip
+    bus = _bus(connect, listen, insecure=insecure)
+    _until_interrupted(
+        config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch)
+    )
+
+
+def doctor(*, as_json: Json = False) -> None:
+    """Look at this machine as a match would, and say what to do."""
+    from khala.doctor import examine  # noqa: PLC0415
+
+    findings = list(examine())
+    wrong = any(finding.state == "wrong" for finding in findings)
+    if as_json:
+        typer.echo(json.dumps({"ok": not wrong, "findings": [finding.as_dict() for finding in findings]}))
+    else:
+        marks = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "wrong": "[red]wrong[/]"}
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for finding in findings:
+            table.add_row(marks[finding.state], finding.name, finding.found, f"[dim]{escape(finding.advice)}[/]")
+        Console().print(table)
+    raise typer.Exit(1 if wrong else 0)
+
+
+def version(value: bool) -> None:  # typer calls it with the flag
+    """Prints the version and ends."""
+    if value:
+        typer.echo(f"khala {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def front_door(
+    *,
+    version: Annotated[  # noqa: ARG001  # handled by its callback
+        bool, typer.Option("--version", callback=version, is_eager=True, help="Print the version and end.")
+    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log what happens, on stderr.")] = False,
+) -> None:
+    """Sets up logging before any command."""
+    logging.basicConfig(
+        level=logging.INFO if verbose else logging.ERROR,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )
+    logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
+
+
+for command, epilog in (
+    (run, RUN_EPILOG),
+    (host, HOST_EPILOG),
+    (agents.cli.agent, agents.cli.AGENT_EPILOG),
+    (agents.cli.llm, agents.cli.LLM_EPILOG),
+    (orchestrator.cli.router, orchestrator.cli.ROUTER_EPILOG),
+    (orchestrator.cli.replay, orchestrator.cli.REPLAY_EPILOG),
+    (orchestrator.cli.tasks, None),
+    (doctor, None),
+):
+    app.command(epilog=epilog)(command)
+app.add_typer(simulator.cli.app, name="sc2")
+
+
+def main() -> None:
+    """Runs the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
+    try:
+        app(standalone_mode=True)
+    except* (KhalaError, simulator.install.InstallError) as group:
+        for error in _leaves(group):
+            sys.stderr.write(f"khala: {error}\n")
+        sys.exit(1)
+
+
+def _leaves(group: BaseExceptionGroup[Any]) -> Iterator[BaseException]:
+    for error in group.exceptions:
+        if isinstance(error, BaseExceptionGroup):
+            yield from _leaves(error)
+        else:
+            yield error
+
+
+def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
+    """The match that the options describe; its recording is in a directory of its own below `out`."""
+    match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
+    loaded = change(load_task(task), **given)
+    name = check_name(run or new_run_name(loaded.name), "run")
+    return MatchConfig(task=loaded, run=name, record=out / name / "recording.mcap", **match)
+
+
+def _bus(connect: list[str] | None, listen: list[str] | None, *, insecure: bool) -> BusConfig:
+    if connect and listen:
+        raise ConfigError("a host has a router or is one: give --connect or --listen, not both")
+    mode: Literal["router", "client"] = "router" if listen else "client"
+    return BusConfig(mode=mode, connect=tuple(connect or ()), listen=tuple(listen or ()), insecure=insecure)
+
+
+def _until_interrupted(
+    config: MatchConfig, as_json: bool, play: Callable[[Callable[[Wire], None]], Coroutine[Any, Any, list[Result]]]
+) -> None:
+    """Plays with a live picture, prints the results, and ends in order on SIGINT and SIGTERM."""
+    screen = show.console()
+    with show.Progress(screen, config.task.max_steps) as progress:
+        results = asyncio.run(_cancelled_by_signals(play(progress)))
+    if results is None:
+        screen.print(f"interrupted; what was played is in {config.record}")
+        raise typer.Exit(INTERRUPTED)
+    screen.print(f"recorded in {config.record}; `khala replay {config.record}` tells it")
+    if as_json:
+        plain = [result.model_dump(mode="json") for result in results]
+        typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
+
+
+async def _cancelled_by_signals(work: Coroutine[Any, Any, T]) -> T | None:
+    """What `work` returns, or None if a signal ended it."""
+    task = asyncio.ensure_future(work)
+    told = asyncio.Event()
+
+    def tell() -> None:
+        told.set()
+        task.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, tell)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        if told.is_set():
+            return None
+        raise

@@ -1,0 +1,37 @@
+"""Which game plays: the simulator, laid out where a user keeps caches, or the StarCraft II of this machine."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bridge.errors import GameMissing
+from bridge.game import find_sc2
+from khala import __version__
+from simulator.install import InstallError, install, is_installed
+
+
+def cache() -> Path:
+    """Where the simulator is laid out: `$KHALA_CACHE`, or the user's cache directory."""
+    if given := os.environ.get("KHALA_CACHE"):
+        return Path(given).expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "khala"
+
+
+def find(source: str) -> tuple[Path, str]:
+    """The directory for SC2PATH, and the name for the run card.
+
+    Args:
+        source: `simulator`, `starcraft2`, or a directory with either in it.
+
+    Raises:
+        GameMissing: it is not there, or the simulator cannot be laid out; the text says what to do.
+    """
+    if source == "simulator":
+        try:
+            path = find_sc2(source, simulator=install(cache() / "StarCraftII"))
+        except InstallError as error:
+            raise GameMissing(f"the simulator cannot be laid out: {error}; KHALA_CACHE names another place") from None
+    else:
+        path = find_sc2(source)
+    return path, f"Khala simulator {__version__}, as" if is_installed(path) else "StarCraft II"

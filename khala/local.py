@@ -1,0 +1,154 @@
+"""Everything of a match on this machine: the one place that knows all packages.
+
+The host runs in this process, in a thread of it the game's PySC2, and it is its own router. Agents are processes of
+their own, joined to it over Zenoh, as they would be from another machine; so is the scripted model's endpoint.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bridge.act import executor_of
+from bridge.game import GameConfig, GameThread, OneSide
+from bridge.pysc2_game import PySC2Game
+from khala import games
+from khala.children import Children
+from orchestrator.host import host
+from protocol.bus.config import BusConfig
+from protocol.bus.zenoh import open_bus
+from protocol.errors import RecordingError
+from protocol.messages import Report
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Sequence
+    from pathlib import Path
+    from typing import Any
+
+    from orchestrator.config import MatchConfig
+    from protocol.bus.zenoh import ZenohBus
+    from protocol.messages import Result, Wire
+
+SCRIPTED = "scripted"
+"""The model whose endpoint is started along with a match."""
+MAX_PROCESSES = 4
+"""Agents get a process each up to here, and share them beyond: a Python process costs half a second and 60 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Minds:
+    """How the agents of a local match decide; see `khala agent --help`."""
+
+    model: str = SCRIPTED
+    model_name: str | None = None
+    base_url: str | None = None
+    policy: str | None = None
+    budget_usd: float | None = None
+    latency_s: float = 0.0
+    """Of the scripted endpoint, if it is started."""
+
+    @property
+    def needs_endpoint(self) -> bool:
+        """Whether the scripted endpoint has to be started."""
+        return self.policy is None and self.base_url is None and self.model == SCRIPTED
+
+
+async def play(
+    config: MatchConfig, minds: Minds, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
+) -> list[Result]:
+    """Plays a match with everything it needs on this machine.
+
+    Args:
+        config: what is played.
+        minds: how its agents decide.
+        directory: is made, and gets the logs of the processes.
+        game: `simulator`, `starcraft2`, or a directory.
+        watch: is called with the run card, every report and every result.
+
+    Raises:
+        KhalaError: something the user can mend; the text says what.
+    """
+    config, sc2path = _prepared(config, directory, game)
+    async with contextlib.AsyncExitStack() as stack:
+        bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+        stack.push_async_callback(bus.close)
+        children = await stack.enter_async_context(Children(directory))
+        await _start_agents(children, config, minds, bus)
+        side = await stack.enter_async_context(one_side(config, sc2path))
+        begun = asyncio.Event()
+
+        def see(message: Wire) -> None:
+            if isinstance(message, Report):
+                begun.set()
+            watch(message)
+
+        return await _unless_one_dies(host(config, side, bus, watch=see), children, begun)
+
+
+async def play_hosted(
+    config: MatchConfig, bus: BusConfig, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
+) -> list[Result]:
+    """Plays a match whose agents come over the bus; arguments and errors as in `play`."""
+    config, sc2path = _prepared(config, directory, game)
+    async with contextlib.AsyncExitStack() as stack:
+        session = await open_bus(bus)
+        stack.push_async_callback(session.close)
+        side = await stack.enter_async_context(one_side(config, sc2path))
+        return await host(config, side, session, watch=watch)
+
+
+def one_side(config: MatchConfig, sc2path: Path) -> OneSide:
+    """The game of a match, not started yet."""
+    task = config.task
+    started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed)
+    return OneSide(GameThread(lambda: PySC2Game(started)), executor_of(task), step_loops=task.clock.step_loops)
+
+
+def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:
+    """Which agents share a process: as evenly as their number allows, neighbours apart."""
+    return [list(agents[first::processes]) for first in range(min(processes, len(agents)))]
+
+
+async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> None:
+    base_url = minds.base_url
+    if minds.needs_endpoint:
+        ready = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(minds.latency_s))
+        base_url = ready["base_url"]
+    options = ["--run", config.run, "--side", config.task.side, "--connect", bus.endpoints[0]]
+    options += ["--policy", minds.policy] if minds.policy else ["--model", minds.model]
+    for option, value in (("--base-url", base_url), ("--model-name", minds.model_name)):
+        options += [option, value] if value and not minds.policy else []
+    groups = shares([agent.name for agent in config.task.agents])
+    for number, names in enumerate(groups):
+        budget = ["--budget-usd", str(minds.budget_usd / len(groups))] if minds.budget_usd is not None else []
+        await children.start(f"agents-{number}", "agent", *names, *options, *budget)
+
+
+async def _unless_one_dies(
+    match: Coroutine[Any, Any, list[Result]], children: Children, begun: asyncio.Event
+) -> list[Result]:
+    """The results of the match; a child that fails before the first step ends it, a later one is the match's affair."""
+    playing = asyncio.create_task(match)
+    failing = asyncio.create_task(children.first_failure())
+    beginning = asyncio.create_task(begun.wait())
+    try:
+        await asyncio.wait({playing, failing, beginning}, return_when=asyncio.FIRST_COMPLETED)
+        if failing.done() and not begun.is_set() and not playing.done():
+            raise failing.result()
+        return await playing
+    finally:
+        for task in (playing, failing, beginning):
+            task.cancel()
+        await asyncio.wait({playing, failing, beginning})
+
+
+def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
+    """The match with the name of its game, and where that is; the directory is there then."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{directory} cannot be made: {error.strerror}; --out names another place") from None
+    sc2path, name = games.find(game)
+    return config.model_copy(update={"game": name}), sc2path

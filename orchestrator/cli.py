@@ -1,0 +1,133 @@
+"""The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala.cli` mounts.
+
+What goes wrong on the user's side is raised as a `protocol.errors.KhalaError` of one sentence; printing it is the
+front door's part.
+"""
+
+import asyncio
+import json
+import signal
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from orchestrator import show
+from orchestrator.config import load_task, task_files
+from protocol.bus.config import BusConfig
+from protocol.messages import Wire
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
+Listen = Annotated[
+    list[str] | None,
+    typer.Option(help="Endpoint to listen on; may be given several times.", show_default="tcp/127.0.0.1:7447"),
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Listen without TLS where other machines can connect: your own network only.")
+]
+
+ROUTER_EPILOG = """
+Examples:\n
+    khala router\n
+    khala router --listen tcp/0.0.0.0:7447 --insecure\n
+    khala router --check --connect tcp/10.0.0.5:7447
+"""
+REPLAY_EPILOG = """
+Examples:\n
+    khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
+    khala replay recording.mcap --agent Stalkers --steps 10-20 --text
+"""
+
+
+def router(
+    *,
+    listen: Listen = None,
+    insecure: Insecure = False,
+    check: Annotated[bool, typer.Option("--check", help="Ask whether a router answers, and end.")] = False,
+    connect: Annotated[
+        str, typer.Option(help="With --check: the endpoint to ask.", metavar="ENDPOINT")
+    ] = "tcp/127.0.0.1:7447",
+    as_json: Json = False,
+) -> None:
+    """Join hosts and agents: a Zenoh router, until Ctrl-C.
+
+    It is needed when host and agents are on several machines; `khala run` has one of its own. A zenohd of the same
+    version works as well.
+    """
+    if check:
+        routers = asyncio.run(_probe(connect))
+        _out({"endpoint": connect, "routers": routers}, f"a router answers at {connect}", as_json=as_json)
+    else:
+        asyncio.run(_route(BusConfig(mode="router", listen=tuple(listen or ()), insecure=insecure), as_json=as_json))
+
+
+def tasks(*, as_json: Json = False) -> None:
+    """List what can be played."""
+    found = [load_task(str(path)) for path in task_files()]
+    if as_json:
+        rows = [
+            {"name": t.name, "map": t.map, "agents": [a.name for a in t.agents], "description": t.description}
+            for t in found
+        ]
+        typer.echo(json.dumps({"tasks": rows}))
+        return
+    table = Table(box=None, pad_edge=False)
+    for column in ("task", "agents", "about"):
+        table.add_column(column)
+    for task in found:
+        table.add_row(task.name, ", ".join(agent.name for agent in task.agents), task.description)
+    Console().print(table)
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(help="A recording, such as `khala run` leaves behind.")],
+    *,
+    agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
+    steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
+    text: Annotated[bool, typer.Option("--text", help="Observations and replies word for word.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Tell what was said and done in a recorded run."""
+    from orchestrator.tell import Selection, summary, tell  # noqa: PLC0415  # zstd and mcap are not needed for --help
+
+    selection = Selection.of(agent, steps)
+    if as_json:
+        typer.echo(json.dumps(summary(file, selection)))
+        return
+    console = Console(highlight=False)
+    for part in tell(file, selection, whole=text):
+        console.print(part)
+
+
+async def _probe(endpoint: str) -> list[str]:
+    from protocol.bus.zenoh import probe  # noqa: PLC0415  # loads the native library, which --help need not wait for
+
+    return list(await probe(BusConfig(connect=(endpoint,), connect_timeout_s=2.0)))
+
+
+async def _route(config: BusConfig, *, as_json: bool) -> None:
+    from protocol.bus.zenoh import open_bus  # noqa: PLC0415
+
+    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    bus = await open_bus(config)
+    try:
+        _out({"endpoints": bus.endpoints}, f"router at {', '.join(bus.endpoints)}; Ctrl-C ends it", as_json=as_json)
+        await stop.wait()
+    finally:
+        await bus.close()
+
+
+def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(data))
+    else:
+        show.console().print(sentence)
+
+
+def plain(messages: list[Wire]) -> list[dict[str, Any]]:
+    """Messages as JSON objects."""
+    return [message.model_dump(mode="json") for message in messages]

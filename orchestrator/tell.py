@@ -1,0 +1,123 @@
+"""Tells a recording to a person: what was seen, said and done, step by step.
+
+It reads the file once, in its order, and holds no more than one step of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+from rich.text import Text
+
+from orchestrator.show import STATUS, card, clock, table
+from protocol.errors import ConfigError
+from protocol.messages import AgentReport, Message, Observation, Reply, Report, Result, Run
+from protocol.recording import read
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from rich.console import RenderableType
+
+    from protocol.messages import Wire
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which part of a recording is told."""
+
+    agent: str | None = None
+    first: int = 0
+    last: int | None = None
+
+    @classmethod
+    def of(cls, agent: str | None, steps: str | None) -> Self:
+        """Of what stands on the command line; `steps` is `7`, `10-20`, `10-` or `-20`.
+
+        Raises:
+            ConfigError: `steps` is none of these.
+        """
+        if steps is None:
+            return cls(agent)
+        found = re.fullmatch(r"(\d*)(-?)(\d*)", steps)
+        if not found or not steps.strip("-"):
+            raise ConfigError(f"{steps!r} names no steps: write 7, 10-20, 10- or -20", source="--steps")
+        first, dash, last = found.groups()
+        end = last if dash else first
+        return cls(agent, int(first or 0), int(end) if end else None)
+
+    def holds(self, step: int, agent: str | None = None) -> bool:
+        """Whether a step is in it, and an agent, if one is given."""
+        in_time = step >= self.first and (self.last is None or step <= self.last)
+        return in_time and (agent is None or self.agent in {None, agent})
+
+
+def tell(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[RenderableType]:
+    """Yields what is to be printed of a recording, in its order.
+
+    Args:
+        path: the recording.
+        selection: which part.
+        whole: observations and replies word for word, besides what became of them.
+
+    Raises:
+        RecordingError: the file is no recording.
+    """
+    for recorded in read(path):
+        match recorded.message:
+            case Run() as run:
+                yield card(run)
+            case Result() as result:
+                yield table(result)
+            case Observation() as seen if whole and selection.holds(seen.step, seen.agent):
+                yield _words(f"step {seen.step}, {seen.agent} sees", seen.text, "cyan")
+            case Reply() as reply if whole and selection.holds(reply.step, reply.agent):
+                yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
+            case Message() as said if selection.holds(said.step, said.agent):
+                yield Text.assemble((f"  {said.agent} → {said.recipient}: ", "magenta"), " ".join(said.text.split()))
+            case Report() as report if selection.holds(report.step):
+                yield from _report(report, selection)
+
+
+def summary(path: Path, selection: Selection) -> dict[str, Any]:
+    """The run card, the results and the reports of a recording, as JSON data."""
+    found: dict[str, list[Wire]] = {"run": [], "result": [], "report": []}
+    topics: Counter[str] = Counter()
+    for recorded in read(path):
+        message = recorded.message
+        topics[recorded.key] += 1
+        if isinstance(message, Run | Result) or (isinstance(message, Report) and selection.holds(message.step)):
+            found[message.kind].append(message)
+    plain = {kind: [message.model_dump(mode="json") for message in messages] for kind, messages in found.items()}
+    return {
+        "run": plain["run"][0] if plain["run"] else None,
+        "results": plain["result"],
+        "reports": plain["report"],
+        "samples": dict(sorted(topics.items())),
+    }
+
+
+def _report(report: Report, selection: Selection) -> Iterator[Text]:
+    yield Text(f"step {report.step}  {clock(report.game_loop)}  score {report.score:g}", "bold")
+    for agent in report.agents:
+        if selection.holds(report.step, agent.agent):
+            yield from _agent(agent)
+
+
+def _agent(agent: AgentReport) -> Iterator[Text]:
+    latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
+    ignored = f", {agent.ignored} ignored" if agent.ignored else ""
+    detail = f" ({agent.detail})" if agent.detail else ""
+    yield Text.assemble(f"  {agent.agent}: ", (agent.status, STATUS[agent.status]), f"{detail}{latency}{ignored}")
+    yield from (Text(f"    {call}", "green") for call in agent.accepted)
+    for fault in agent.rejections:
+        yield Text.assemble((f"    {fault.text}", "red"), f"  {fault.reason}: {fault.message}")
+
+
+def _words(title: str, text: str, style: str) -> Text:
+    body = "\n".join(f"  │ {line}" for line in text.splitlines())
+    return Text.assemble((title, f"bold {style}"), "\n", (body, "dim"))
