@@ -13,11 +13,11 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from orchestrator import show
 from orchestrator.config import load_task, task_files
 from protocol.bus.config import BusConfig
-from protocol.messages import Wire
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
 Listen = Annotated[
@@ -98,7 +98,7 @@ def replay(
         return
     console = Console(highlight=False)
     for part in tell(file, selection, whole=text):
-        console.print(part)
+        console.print(part, soft_wrap=isinstance(part, Text))
 
 
 async def _probe(endpoint: str) -> list[str]:
@@ -126,8 +126,3 @@ def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:
         typer.echo(json.dumps(data))
     else:
         show.console().print(sentence)
-
-
-def plain(messages: list[Wire]) -> list[dict[str, Any]]:
-    """Messages as JSON objects."""
-    return [message.model_dump(mode="json") for message in messages]

@@ -28,11 +28,6 @@ class Post:
     received: Mapping[Seat, tuple[Received, ...]] = field(default_factory=dict)
     rejections: Mapping[Seat, tuple[Rejection, ...]] = field(default_factory=dict)
 
-    @property
-    def all(self) -> tuple[Received, ...]:
-        """Every message once for each that received it."""
-        return tuple(message for messages in self.received.values() for message in messages)
-
 
 class Mailbox:
     """Sorts messages into boxes; knows who listens to which channel."""

@@ -15,7 +15,7 @@ from bridge.observe import Feedback
 from orchestrator.brief import briefing
 from orchestrator.roster import Seat
 from orchestrator.tally import Tally
-from protocol.messages import AgentReport, Observation, Report, Timings
+from protocol.messages import AgentReport, Observation, Received, Report, Timings
 from protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Match:
             game_s=watch.lap(),
         )
         heard = self._feedback(joint, turn, post)
-        return self._report(at, answers, heard, post, turn, timings), turn.snapshot, heard
+        return self._report(at, answers, heard, turn, timings), turn.snapshot, heard
 
     async def _begin(self, episode: int) -> None:
         self.observer.begin()
@@ -163,7 +163,7 @@ class Match:
         return feedback
 
     def _report(
-        self, at: At, answers: Answers, feedback: Mapping[str, Feedback], post: Post, turn: Turn, timings: Timings
+        self, at: At, answers: Answers, feedback: Mapping[str, Feedback], turn: Turn, timings: Timings
     ) -> Report:
         agents = tuple(
             AgentReport(
@@ -185,7 +185,7 @@ class Match:
             step=at.step,
             game_loop=turn.snapshot.game_loop,
             agents=agents,
-            messages=post.all,
+            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in answers.messages),
             functions=turn.played.functions,
             env_steps=turn.env_steps,
             score=float(turn.snapshot.response.observation.score.score),

@@ -438,7 +438,7 @@ class Report(Wire):
     game_loop: int = Field(ge=0)
     agents: tuple[AgentReport, ...]
     messages: tuple[Received, ...] = ()
-    """What the mailbox put into the observations of the next step."""
+    """What the mailbox took in this step, in order of arrival; what it could deliver stands in the next observations."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0
