@@ -61,6 +61,9 @@ async def retried(
     def is_late(state: RetryCallState) -> bool:
         return deadline is not None and now() + state.upcoming_sleep >= deadline
 
+    async def once() -> T:  # tenacity awaits what it can see to be a coroutine function, and nothing else
+        return await attempt()
+
     attempts = stop_after_attempt(rule.tries)
     loop = AsyncRetrying(
         sleep=asyncio.sleep,
@@ -69,7 +72,7 @@ async def retried(
         stop=lambda state: attempts(state) or is_late(state),
         reraise=True,
     )
-    return await loop(attempt)
+    return await loop(once)
 
 
 def _may_succeed_later(error: BaseException) -> bool:

@@ -1,0 +1,381 @@
+"""The HTTP clients against real servers: what is sent, what is read, and what every fault becomes."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import random
+import socket
+from typing import TYPE_CHECKING, Any, Self
+
+import pytest
+from aiohttp import web
+from pydantic import SecretStr
+
+from agents.llm.anthropic import Anthropic
+from agents.llm.client import (
+    Completion,
+    LLMError,
+    MalformedCompletion,
+    OutOfMoney,
+    Refused,
+    Request,
+    TryTimeout,
+    Unavailable,
+    Unreachable,
+)
+from agents.llm.openai_compatible import OpenAICompatible
+from agents.llm.pricing import Prices
+from agents.llm.profiles import PROFILES, Profile
+from agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
+from agents.scripted.faults import Faults
+from protocol.messages import ChatMessage, Usage
+
+if TYPE_CHECKING:
+    from agents.llm.client import LLMClient
+
+PROMPT = (
+    ChatMessage(role="system", content="You are an agent."),
+    ChatMessage(role="user", content="Game\n    Time: 0:07\n"),
+)
+PRICES = Prices(prompt=1.0, completion=10.0, cached=0.1)
+
+
+def client(base_url: str, **changes: Any) -> OpenAICompatible:
+    options: dict[str, Any] = {"model": "silent", "base_url": base_url, "prices": PRICES}
+    return OpenAICompatible(PROFILES["scripted"], **(options | changes))
+
+
+async def ask(model: LLMClient, timeout_s: float = 10.0) -> Completion:
+    try:
+        return await model.complete(Request(PROMPT, timeout_s=timeout_s))
+    finally:
+        await model.close()
+
+
+# --- the scripted endpoint and its faults -------------------------------------------------------------
+
+
+async def test_a_completion_comes_with_its_usage_and_price() -> None:
+    async with Endpoint() as endpoint:
+        completion = await ask(client(endpoint.base_url))
+    assert completion.text.startswith("Analysis: 0 team(s) of mine")
+    prompt = sum(count_tokens(message.content) for message in PROMPT)
+    said = count_tokens(completion.text)
+    assert (completion.usage.prompt_tokens, completion.usage.completion_tokens) == (prompt, said)
+    assert completion.usage.cost_usd == pytest.approx((prompt + 10 * said) / 1e6)
+
+
+FAULTS = [
+    ("429", Unavailable, "http 429"),
+    ("quota", OutOfMoney, "http 429"),
+    ("500", Unavailable, "http 500"),
+    ("503", Unavailable, "http 503"),
+    ("529", Unavailable, "http 529"),
+    ("400", Refused, "http 400"),
+    ("garbage", MalformedCompletion, "malformed"),
+    ("half", Unreachable, "connection"),
+    ("reset", Unreachable, "connection"),
+    ("drip", TryTimeout, "timeout"),
+    ("stall", TryTimeout, "timeout"),
+]
+
+
+@pytest.mark.parametrize(("fault", "kind", "status"), FAULTS, ids=[fault for fault, _, _ in FAULTS])
+async def test_a_fault_of_the_endpoint_is_this_error(fault: str, kind: type[LLMError], status: str) -> None:
+    async with Endpoint(Behaviour(faults=Faults({fault: 1.0}), drip_s=0.2)) as endpoint:
+        with pytest.raises(LLMError) as caught:
+            await ask(client(endpoint.base_url), timeout_s=0.3)
+    assert (type(caught.value), caught.value.status) == (kind, status)
+    assert "http://127.0.0.1" in str(caught.value), "an error says which endpoint it speaks of"
+
+
+async def test_nonsense_is_a_completion_like_any_other() -> None:
+    async with Endpoint(Behaviour(faults=Faults({"nonsense": 1.0}))) as endpoint:
+        assert (await ask(client(endpoint.base_url))).text == NONSENSE
+
+
+@pytest.mark.parametrize(("status", "asked_s"), [("429", 7.5), ("503", 7.5), ("500", None)])
+async def test_retry_after_reaches_the_error(status: str, asked_s: float | None) -> None:
+    async with Endpoint(Behaviour(faults=Faults({status: 1.0}), retry_after_s=7.5)) as endpoint:
+        with pytest.raises(Unavailable) as caught:
+            await ask(client(endpoint.base_url))
+    assert caught.value.retry_after_s == asked_s
+
+
+async def test_nobody_at_the_address_is_unreachable() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and not listening
+        port = taken.getsockname()[1]
+        with pytest.raises(Unreachable, match=f"http://127.0.0.1:{port}/v1 cannot be reached"):
+            await ask(client(f"http://127.0.0.1:{port}/v1"))
+
+
+async def test_an_unknown_model_is_refused_with_the_words_of_the_endpoint() -> None:
+    async with Endpoint() as endpoint:
+        with pytest.raises(Refused, match=r"http 404: there is no model 'gpt', there are silent, random-legal"):
+            await ask(client(endpoint.base_url, model="gpt"))
+
+
+async def test_calls_that_are_cancelled_at_any_moment_never_spoil_later_ones() -> None:
+    rng = random.Random(5)
+    async with Endpoint(Behaviour(latency_s=0.02)) as endpoint:
+        models = [client(endpoint.base_url) for _ in range(8)]
+
+        async def hurried(model: OpenAICompatible) -> None:
+            for _ in range(50):
+                try:
+                    async with asyncio.timeout(rng.uniform(0.0, 0.03)):
+                        await model.complete(Request(PROMPT))
+                except TimeoutError:
+                    continue
+
+        await asyncio.gather(*(hurried(model) for model in models))
+        later = await asyncio.gather(*(model.complete(Request(PROMPT, timeout_s=5.0)) for model in models))
+        assert len(later) == 8
+        await asyncio.gather(*(model.refresh() for model in models))
+        again = await asyncio.gather(*(model.complete(Request(PROMPT, timeout_s=5.0)) for model in models))
+        assert len(again) == 8
+        await asyncio.gather(*(model.close() for model in models))
+
+
+async def test_a_refreshed_client_makes_its_first_request_on_a_connection_that_is_there() -> None:
+    async with Recorder() as server:
+        model = client(server.base_url)
+        await model.refresh()
+        for _ in range(2):
+            await model.complete(Request(PROMPT, timeout_s=5.0))
+        await model.close()
+    assert [path for path, _, _ in server.requests] == ["/v1/models", "/v1/chat/completions", "/v1/chat/completions"]
+    assert len(server.peers) == 1
+
+
+async def test_refreshing_raises_nothing_when_nobody_is_there() -> None:
+    model = client("http://127.0.0.1:9/v1")
+    await model.refresh()
+    await model.close()
+    await model.close()
+
+
+# --- what is sent and read ----------------------------------------------------------------------------
+
+
+class Recorder:
+    """A server that writes down what it is asked, and answers what it is told to."""
+
+    def __init__(self, answer: Any = None, status: int = 200) -> None:
+        self.requests: list[tuple[str, dict[str, str], Any]] = []
+        self.peers: set[Any] = set()
+        self._answer = GOOD if answer is None else answer
+        self._status = status
+        self._runner: web.AppRunner | None = None
+        self.base_url = ""
+
+    async def __aenter__(self) -> Self:
+        application = web.Application()
+        application.router.add_route("*", "/{path:.*}", self._note)
+        self._runner = web.AppRunner(application, shutdown_timeout=0.1)
+        await self._runner.setup()
+        await web.TCPSite(self._runner, "127.0.0.1", 0).start()
+        self.base_url = f"http://127.0.0.1:{self._runner.addresses[0][1]}/v1"
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        assert self._runner is not None
+        await self._runner.cleanup()
+
+    async def _note(self, request: web.Request) -> web.Response:
+        body = await request.read()
+        headers = {name.lower(): value for name, value in request.headers.items()}
+        self.requests.append((request.path, headers, json.loads(body) if body else None))
+        assert request.transport is not None
+        self.peers.add(request.transport.get_extra_info("peername"))
+        answer = self._answer if isinstance(self._answer, bytes) else json.dumps(self._answer).encode()
+        return web.Response(status=self._status, body=answer, content_type="application/json")
+
+
+GOOD: Any = {
+    "choices": [{"message": {"role": "assistant", "content": "Analysis: go."}, "finish_reason": "stop"}],
+    "usage": {"prompt_tokens": 1000, "completion_tokens": 100},
+}
+
+SENT = [
+    (PROFILES["openai"], {"max_completion_tokens": 50, "temperature": 0.5, "seed": 3}, "system"),
+    (PROFILES["openai-reasoning"], {"max_completion_tokens": 50, "seed": 3}, "developer"),
+    (PROFILES["deepseek"], {"max_tokens": 50, "temperature": 0.5}, "system"),
+    (PROFILES["vllm"], {"max_tokens": 50, "temperature": 0.5, "seed": 3}, "system"),
+    (Profile(system_role="user"), {"max_tokens": 50, "temperature": 0.5, "seed": 3}, "user"),
+]
+
+
+@pytest.mark.parametrize(("profile", "params", "role"), SENT)
+async def test_a_request_is_sent_as_the_profile_says(profile: Profile, params: dict[str, Any], role: str) -> None:
+    async with Recorder() as server:
+        model = OpenAICompatible(
+            profile,
+            model="m",
+            base_url=server.base_url + "/",
+            prices=PRICES,
+            key=SecretStr("sk-test-0123456789"),
+            max_tokens=50,
+            temperature=0.5,
+            seed=3,
+            extra={"thinking": {"type": "disabled"}, "top_p": 0.9},
+        )
+        await ask(model)
+    ((path, headers, body),) = server.requests
+    assert (path, headers["authorization"]) == ("/v1/chat/completions", "Bearer sk-test-0123456789")
+    assert body == {
+        "model": "m",
+        **params,
+        "thinking": {"type": "disabled"},
+        "top_p": 0.9,
+        "messages": [
+            {"role": role, "content": PROMPT[0].content},
+            {"role": "user", "content": PROMPT[1].content},
+        ],
+    }
+    assert model.params == {**params, "top_p": 0.9}, "what is recorded"
+
+
+async def test_no_key_sends_no_authorization() -> None:
+    async with Recorder() as server:
+        await ask(client(server.base_url))
+    assert "authorization" not in server.requests[0][1]
+
+
+def with_message(**message: Any) -> dict[str, Any]:
+    return {"choices": [{"message": {"role": "assistant", **message}}]}
+
+
+TEXTS = [
+    (with_message(content="text"), "text"),
+    (with_message(content=[{"type": "text", "text": "a"}, {"type": "image"}, {"type": "text", "text": "b"}]), "ab"),
+    (with_message(content="said", reasoning_content="thought"), "said"),
+    (with_message(content=None, refusal="I will not."), "I will not."),
+    (with_message(content=None), ""),
+    (with_message(), ""),
+]
+
+
+@pytest.mark.parametrize(("answer", "text"), TEXTS)
+async def test_the_words_are_found_in_every_form_of_an_answer(answer: Any, text: str) -> None:
+    async with Recorder(answer) as server:
+        completion = await ask(client(server.base_url))
+    assert completion.text == text
+    assert completion.usage == Usage(requests=1, unknown_requests=1), "an answer without usage is unknown, not free"
+
+
+USAGES = [
+    ("openai", {"prompt_tokens": 1000, "completion_tokens": 100}, (1000, 100, 0, 0, 0.002)),
+    (
+        "openai",
+        {
+            "prompt_tokens": 1000,
+            "completion_tokens": 100,
+            "prompt_tokens_details": {"cached_tokens": 400},
+            "completion_tokens_details": {"reasoning_tokens": 60},
+        },
+        (1000, 100, 400, 60, 0.00164),
+    ),
+    (
+        "deepseek",
+        {"prompt_tokens": 1000, "completion_tokens": 100, "prompt_cache_hit_tokens": 1000},
+        (1000, 100, 1000, 0, 0.0011),
+    ),
+    ("openai", {"prompt_tokens": 10, "completion_tokens": 1, "prompt_tokens_details": None}, (10, 1, 0, 0, 0.00002)),
+]
+
+
+@pytest.mark.parametrize(("profile", "said", "expected"), USAGES)
+async def test_usage_is_read_where_the_endpoint_puts_it(profile: Any, said: Any, expected: tuple[Any, ...]) -> None:
+    async with Recorder({**GOOD, "usage": said}) as server:
+        model = OpenAICompatible(PROFILES[profile], model="m", base_url=server.base_url, prices=PRICES)
+        usage = (await ask(model)).usage
+    found = (usage.prompt_tokens, usage.completion_tokens, usage.cached_tokens, usage.reasoning_tokens)
+    assert found == expected[:4]
+    assert usage.cost_usd == pytest.approx(expected[4])
+
+
+BAD_ANSWERS = [
+    (b"", MalformedCompletion, "answered with no chat completion: ''"),
+    (b"<html>", MalformedCompletion, "answered with no chat completion: '<html>'"),
+    ({"choices": []}, MalformedCompletion, "answered with no chat completion"),
+    ({"choices": [{"message": {"content": 3}}]}, MalformedCompletion, "answered with no chat completion"),
+    ({"error": {"code": 503, "message": "no capacity"}}, Unavailable, "answered http 503: no capacity"),
+    ({"error": {"code": 402, "message": "no credits"}}, OutOfMoney, "answered http 402: no credits"),
+]
+
+
+@pytest.mark.parametrize(("answer", "kind", "words"), BAD_ANSWERS)
+async def test_an_ok_that_holds_no_completion_is_an_error(answer: Any, kind: type[LLMError], words: str) -> None:
+    async with Recorder(answer) as server:
+        with pytest.raises(kind) as caught:
+            await ask(client(server.base_url))
+    assert words in str(caught.value)
+
+
+REFUSALS = [
+    (400, {"error": {"message": "bad\n  temperature", "code": "x"}}, "answered http 400: bad temperature"),
+    (401, {"error": "no"}, "answered http 401: no; is the key right, and may it use this model?"),
+    (402, b"", "answered http 402; the account has no money or quota left"),
+    (418, b"I am a teapot" + b"!" * 300, "answered http 418: I am a teapot" + "!" * 186 + "…"),
+    (500, {"detail": "?"}, 'answered http 500: {"detail": "?"}'),
+]
+
+
+@pytest.mark.parametrize(("status", "answer", "words"), REFUSALS)
+async def test_an_error_quotes_what_the_endpoint_said_on_one_line(status: int, answer: Any, words: str) -> None:
+    async with Recorder(answer, status) as server:
+        with pytest.raises(LLMError) as caught:
+            await ask(client(server.base_url))
+        assert str(caught.value) == f"{server.base_url} {words}"
+
+
+# --- Anthropic ----------------------------------------------------------------------------------------
+
+
+async def test_anthropic_is_spoken_to_in_its_own_words() -> None:
+    answer = {
+        "content": [
+            {"type": "thinking", "thinking": "hm"},
+            {"type": "text", "text": "Analysis: "},
+            {"type": "text", "text": "go."},
+        ],
+        "stop_reason": "end_turn",
+        "usage": {"input_tokens": 600, "output_tokens": 100, "cache_read_input_tokens": 400},
+    }
+    async with Recorder(answer) as server:
+        model = Anthropic(
+            model="claude", prices=PRICES, key=SecretStr("sk-ant-0123"), base_url=server.base_url, temperature=0.1
+        )
+        completion = await ask(model)
+    ((path, headers, body),) = server.requests
+    assert (path, headers["x-api-key"], headers["anthropic-version"]) == ("/v1/messages", "sk-ant-0123", "2023-06-01")
+    assert "authorization" not in headers
+    assert body == {
+        "model": "claude",
+        "max_tokens": 1024,
+        "temperature": 0.1,
+        "system": PROMPT[0].content,
+        "messages": [{"role": "user", "content": PROMPT[1].content}],
+    }
+    assert (completion.text, completion.finish) == ("Analysis: go.", "end_turn")
+    usage = completion.usage
+    assert (usage.prompt_tokens, usage.completion_tokens, usage.cached_tokens) == (1000, 100, 400)
+    assert usage.cost_usd == pytest.approx(0.00164)
+
+
+ANTHROPIC_FAULTS = [
+    (529, {"type": "error", "error": {"type": "overloaded_error", "message": "Overloaded"}}, Unavailable),
+    (429, {"type": "error", "error": {"type": "enforced_spend_limit_reached", "message": "Spent"}}, OutOfMoney),
+    (400, {"type": "error", "error": {"type": "invalid_request_error", "message": "max_tokens"}}, Refused),
+    (200, {"type": "message"}, MalformedCompletion),
+]
+
+
+@pytest.mark.parametrize(("status", "answer", "kind"), ANTHROPIC_FAULTS)
+async def test_a_fault_of_anthropic_is_this_error(status: int, answer: Any, kind: type[LLMError]) -> None:
+    async with Recorder(answer, status) as server:
+        with pytest.raises(kind):
+            await ask(Anthropic(model="claude", prices=PRICES, key=SecretStr("sk-ant-0123"), base_url=server.base_url))

@@ -1,0 +1,142 @@
+"""Limits that agents share: who waits how long, and what is refused."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from agents.llm.pricing import Prices
+from protocol.messages import Usage
+
+CLOCK = "jumps"
+PRICES = Prices(prompt=1000.0, completion=2000.0)  # a thousandth and two of a dollar a token
+ONE = Usage(requests=1, prompt_tokens=100, completion_tokens=100, cost_usd=0.3)
+
+
+async def use(
+    limits: Limits, *, tokens: int = 100, takes_s: float = 0.0, usage: Usage | None = ONE, deadline: float | None = None
+) -> float:
+    """Makes one request; returns when it was let in."""
+    async with limits.admit(tokens=tokens, deadline=deadline) as ticket:
+        admitted = asyncio.get_running_loop().time()
+        await asyncio.sleep(takes_s)
+        if usage:
+            ticket.settle(usage)
+    return admitted
+
+
+async def test_no_more_requests_are_in_flight_than_allowed_and_the_first_come_goes_first() -> None:
+    limits = Limits(LimitRules(in_flight=2))
+    assert await asyncio.gather(*(use(limits, takes_s=1) for _ in range(5))) == [0, 0, 1, 1, 2]
+
+
+async def test_a_place_is_given_back_by_a_request_that_fails_or_is_cancelled() -> None:
+    limits = Limits(LimitRules(in_flight=1))
+    with pytest.raises(ZeroDivisionError):
+        async with limits.admit(tokens=1, deadline=None):
+            _ = 1 / 0
+    stuck = asyncio.create_task(use(limits, takes_s=1000))
+    waiting = asyncio.create_task(use(limits))
+    await asyncio.sleep(1)
+    waiting.cancel()
+    stuck.cancel()
+    await asyncio.gather(stuck, waiting, return_exceptions=True)
+    assert await use(limits) == 1
+
+
+async def test_a_minutes_worth_of_requests_goes_at_once_and_the_rest_evenly() -> None:
+    limits = Limits(LimitRules(requests_per_minute=6))
+    assert await asyncio.gather(*(use(limits) for _ in range(9))) == [0, 0, 0, 0, 0, 0, 10, 20, 30]
+    await asyncio.sleep(600)
+    admitted = await asyncio.gather(*(use(limits) for _ in range(7)))
+    assert [at - admitted[0] for at in admitted] == [0, 0, 0, 0, 0, 0, 10]
+
+
+async def test_tokens_are_counted_as_estimated_and_corrected_by_what_was_used() -> None:
+    limits = Limits(LimitRules(tokens_per_minute=600))
+    await use(limits, tokens=100)  # 100 were estimated, 200 used
+    assert await use(limits, tokens=500) == 10, "600 - 200 were left, and 10 flow in each second"
+
+
+async def test_a_request_that_nobody_settled_counts_with_its_prompt() -> None:
+    limits = Limits(LimitRules(tokens_per_minute=600), prices=PRICES, budget=(budget := Budget(1.0)))
+    await use(limits, tokens=300, usage=None)
+    assert budget.spent_usd == pytest.approx(0.3)
+    assert await use(limits, tokens=600) == 30
+
+
+async def test_a_turn_that_would_come_after_the_deadline_is_refused_at_once_and_costs_no_turn() -> None:
+    limits = Limits(LimitRules(requests_per_minute=1))
+    await use(limits)
+    for _ in range(2):
+        with pytest.raises(LimitExceeded):
+            await use(limits, deadline=30)
+    with pytest.raises(LimitExceeded) as caught:
+        await use(limits, deadline=30)
+    assert (caught.value.type, caught.value.limit, caught.value.value) == ("requests_per_minute", 1, 2)
+    assert await use(limits, deadline=61) == 60
+
+
+async def test_who_stops_waiting_gives_its_turn_to_the_next() -> None:
+    limits = Limits(LimitRules(requests_per_minute=1, tokens_per_minute=6000))
+    await use(limits)
+    impatient = asyncio.create_task(use(limits))
+    await asyncio.sleep(10)
+    impatient.cancel()
+    await asyncio.gather(impatient, return_exceptions=True)
+    assert await use(limits) == 60
+
+
+async def test_the_request_is_given_back_when_there_are_no_tokens_for_it() -> None:
+    limits = Limits(LimitRules(requests_per_minute=2, tokens_per_minute=100))
+    await use(limits, usage=Usage(requests=1, prompt_tokens=100, completion_tokens=0))
+    with pytest.raises(LimitExceeded, match="tokens_per_minute"):
+        await use(limits, deadline=1)
+    assert await use(limits, tokens=0, deadline=1) == 0
+
+
+async def test_nothing_is_asked_when_the_money_is_used_up() -> None:
+    budget = Budget(0.5, source="the budget of this process")
+    limits = Limits(prices=PRICES, budget=budget)
+    await use(limits)
+    await use(limits)
+    with pytest.raises(LimitExceeded) as caught:
+        await use(limits)
+    error = caught.value
+    assert (error.type, error.limit, error.source) == ("budget_usd", 0.5, "the budget of this process")
+    assert error.value == pytest.approx(0.6)
+    assert (error.status, error.retryable) == ("budget", False)
+    assert str(error) == "the limit budget_usd = 0.5 of the budget of this process is reached (0.6)"
+
+
+async def test_who_waited_while_the_money_went_is_refused_too() -> None:
+    limits = Limits(LimitRules(in_flight=1), prices=PRICES, budget=Budget(0.3))
+    outcomes = await asyncio.gather(use(limits, takes_s=1), use(limits), return_exceptions=True)
+    assert outcomes[0] == 0
+    assert isinstance(outcomes[1], LimitExceeded)
+
+
+async def test_a_budget_is_shared_by_endpoints_and_a_rate_is_not() -> None:
+    budget = Budget(0.3)
+    first = Limits(LimitRules(requests_per_minute=1), budget=budget)
+    second = Limits(LimitRules(requests_per_minute=1), budget=budget)
+    assert await use(first) == 0
+    with pytest.raises(LimitExceeded, match="budget_usd"):
+        await use(second)
+
+
+@pytest.mark.parametrize(
+    ("prices", "cost"),
+    [
+        (Prices(), None),
+        (Prices(prompt=1), None),
+        (Prices(prompt=1, completion=4), 0.0018),
+        (Prices(prompt=1, completion=4, cached=0.1), 0.00144),
+        (Prices(prompt=0, completion=0), 0.0),
+    ],
+)
+def test_a_price_is_known_only_if_all_of_it_is(prices: Prices, cost: float | None) -> None:
+    found = prices.cost_usd(prompt=1000, completion=200, cached=400)
+    assert found == (None if cost is None else pytest.approx(cost))

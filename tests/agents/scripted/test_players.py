@@ -1,0 +1,118 @@
+"""Scripted players on a golden observation: what they read, and what they answer."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from agents.scripted.players import PLAYERS, focus_fire, in_reach, random_legal, silent
+from agents.scripted.reading import Action, Situation, Unit, read
+from protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+OBSERVATION = (Path(__file__).parent / "observation.txt").read_text(encoding="utf-8")
+
+
+def quiet() -> random.Random:
+    """A generator whose first roll is no message."""
+    return random.Random(2)
+
+
+def test_an_observation_is_read_as_it_stands() -> None:
+    situation = read(OBSERVATION)
+    assert list(situation.teams) == ["Zealot-1", "Stalker-1", "Stalker-2"]
+    zealots, stalkers, others = situation.teams.values()
+    assert zealots.own == [Unit("0x100040001", 12, 12, 150, float("inf"))]
+    assert [unit.tag for unit in zealots.allies] == ["0x100080001"]
+    assert zealots.enemies == [
+        Unit("0x100140001", 13.5, 12, 112, 1.5),
+        Unit("0x100180001", 16, 12, 41, 4.12),
+        Unit("0x1001c0001", 23, 12, 3, 11),
+    ]
+    assert [(unit.x, unit.y) for unit in stalkers.own] == [(12, 12), (27.5, -1)]
+    assert (stalkers.bounds, others.bounds) == ((3.5, 24, 0, 24), (0, 24, 0, 24))
+    assert zealots.actions == [Action("Attack_Unit", ("tag",))]
+    assert others.actions == [Action("Attack_Unit", ("tag",)), Action("Move_Screen", ("screen",))]
+    assert situation.max_actions == 2
+    assert situation.correspondents == ["Scout", "Commander"]
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", "What is 2 + 2?", "Team \n    Your units:\n        nothing"])
+def test_a_text_that_is_no_observation_is_an_empty_situation(text: str) -> None:
+    assert read(text) == Situation()
+
+
+def test_the_enemies_in_reach_are_those_about_as_near_as_the_nearest() -> None:
+    zealots, stalkers, others = read(OBSERVATION).teams.values()
+    assert [unit.tag for unit in in_reach(zealots)] == ["0x100140001", "0x100180001"]
+    assert [unit.tag for unit in in_reach(stalkers)] == ["0x100180001"]
+    assert in_reach(others) == []
+
+
+FOCUS_FIRE = """\
+Analysis: 0x100180001 is the weakest enemy in reach, with 41 left. All fire on it.
+Actions:
+    Team Zealot-1:
+        <Attack_Unit(0x100180001)>
+    Team Stalker-1:
+        <Attack_Unit(0x100180001)>
+    Team Stalker-2:
+        <Move_Screen([5.0, 5.0])>
+"""
+
+
+def test_focus_fire_attacks_the_weakest_enemy_that_most_teams_reach() -> None:
+    assert focus_fire(OBSERVATION, quiet()) == FOCUS_FIRE
+
+
+def test_focus_fire_tells_the_others_now_and_then() -> None:
+    said = [focus_fire(OBSERVATION, random.Random(seed)).removeprefix(FOCUS_FIRE) for seed in range(400)]
+    message = "Communications:\n    <MessageTo(Scout, '''We fire on 0x100180001.''')>\n"
+    assert set(said) == {"", message}
+    assert 60 < said.count(message) < 140
+
+
+def test_focus_fire_walks_to_the_middle_when_nobody_is_in_sight() -> None:
+    text = "Team A\n    Your units:\n        Stalker | tag 0x1 | screen [12, 12] | health 1/1\n\n"
+    text += "Valid actions\n    Team A: <Move_Minimap(minimap)>\n"
+    assert focus_fire(text, quiet()).endswith("    Team A:\n        <Move_Minimap([32.0, 32.0])>\n")
+
+
+def test_silent_orders_nothing() -> None:
+    assert silent(OBSERVATION, quiet()) == "Analysis: 3 team(s) of mine, 3 enemy unit(s) in sight. I watch.\n"
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_random_legal_orders_what_is_valid_with_arguments_that_are_there(seed: int) -> None:
+    situation = read(OBSERVATION)
+    speech = parse(random_legal(OBSERVATION, random.Random(seed)))
+    assert speech.faults == ()
+    assert {call.team for call in speech.calls} == set(situation.teams)
+    for call in speech.calls:
+        team = situation.teams[call.team or ""]
+        assert call.name in {action.name for action in team.actions}
+        (argument,) = call.args
+        if call.name == "Attack_Unit":
+            assert argument in {unit.tag for unit in team.enemies}
+        else:
+            assert isinstance(argument, tuple)
+            x, y = argument
+            assert team.bounds[0] < x < team.bounds[1]
+            assert team.bounds[2] < y < team.bounds[3]
+
+
+def test_random_legal_selects_an_own_unit_first() -> None:
+    text = OBSERVATION.replace("Zealot-1: <Attack_Unit(tag)>", "Zealot-1: <Select_Unit_Attack_Unit(tag, tag)>")
+    (call, *_) = parse(random_legal(text, quiet())).calls
+    assert call.args[0] == "0x100040001"
+    assert call.args[1] in {"0x100140001", "0x100180001", "0x1001c0001"}
+
+
+@pytest.mark.parametrize("player", PLAYERS.values(), ids=PLAYERS)
+def test_the_same_prompt_gets_the_same_reply(player: Callable[[str, random.Random], str]) -> None:
+    assert player(OBSERVATION, random.Random("x")) == player(OBSERVATION, random.Random("x"))
