@@ -1,0 +1,183 @@
+"""The policy that asks a model: tries, limits, memory, what is traced, and its replay."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from agents.build import replay_policies
+from agents.llm.client import LLMError, Unavailable, Unreachable
+from agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from agents.llm.pricing import Prices
+from agents.llm.replay import NotRecorded
+from agents.llm.retry import RetryRule
+from agents.llm_policy import LLMPolicy
+from agents.memory import LastSteps
+from protocol.codec import decode_as, encode
+from protocol.messages import Exchange, Usage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from protocol.messages import Briefing, Observation
+
+CLOCK = "jumps"
+BUSY = Unavailable("busy", status="http 429")
+NO_JITTER = RetryRule(jitter_s=0)
+
+
+def traced(model: Any, **options: Any) -> tuple[LLMPolicy, list[Exchange]]:
+    policy = LLMPolicy(model, rng=random.Random(0), **({"retry": NO_JITTER} | options))
+    exchanges: list[Exchange] = []
+    policy.trace = exchanges.append
+    return policy, exchanges
+
+
+async def test_every_try_is_traced_with_its_times_and_what_it_took(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    policy, exchanges = traced(listed_model(BUSY, 2.0, Unreachable("torn"), 1.5, "Analysis: go."))
+    assert await policy.decide(briefing(), observation(step=4, within_s=60.0)) == "Analysis: go."
+    found = [(e.attempt, e.status, e.completion, e.started_s, e.latency_s) for e in exchanges]
+    assert found == [
+        (1, "http 429", None, 0, 0),
+        (2, "connection", None, 1, 2),
+        (3, "ok", "Analysis: go.", 5, 1.5),
+    ]
+    assert [e.usage for e in exchanges] == [
+        Usage(requests=1),
+        Usage(requests=1, unknown_requests=1),
+        Usage(requests=1, prompt_tokens=100, completion_tokens=10, cost_usd=0.5),
+    ]
+    assert {(e.agent, e.step, e.model, e.endpoint) for e in exchanges} == {
+        ("Stalkers", 4, "listed", "http://listed/v1")
+    }
+    assert exchanges[0].prompt[-1].content == "step 4"
+
+
+async def test_a_try_gets_its_own_time_and_never_more_than_is_left(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    model = listed_model(BUSY, BUSY, BUSY, "good")
+    policy, _ = traced(model, try_timeout_s=6.0)
+    await policy.decide(briefing(), observation(within_s=10.0))
+    assert [request.timeout_s for _, request in model.requests] == [6.0, 6.0, 6.0, 2.5]
+
+
+async def test_no_try_is_begun_that_cannot_end_before_the_deadline(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    model = listed_model(*[BUSY] * 9)
+    policy, exchanges = traced(model, retry=RetryRule(tries=9, jitter_s=0))
+    with pytest.raises(Unavailable):
+        await policy.decide(briefing(), observation(within_s=4.0))
+    assert model.times_s == [0, 1, 3]
+    assert len(exchanges) == 3
+
+
+async def test_time_in_the_queue_of_the_limits_is_told_apart_from_the_request(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    limits = Limits(LimitRules(in_flight=1))
+    policies = [traced(listed_model(3.0, "good"), limits=limits) for _ in range(2)]
+    await asyncio.gather(*(policy.decide(briefing(), observation()) for policy, _ in policies))
+    assert [(e.waited_s, e.started_s, e.latency_s) for _, (e,) in policies] == [(0, 0, 3), (3, 3, 3)]
+
+
+async def test_a_spent_budget_stops_requests_before_they_are_made(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    limits = Limits(prices=Prices(prompt=1, completion=1), budget=Budget(1.0))
+    model = listed_model("one", "two", "three")
+    policy, exchanges = traced(model, limits=limits)
+    for step in range(2):
+        await policy.decide(briefing(), observation(step))
+    with pytest.raises(LimitExceeded, match="budget_usd = 1"):
+        await policy.decide(briefing(), observation(2))
+    assert len(model.requests) == len(exchanges) == 2
+
+
+async def test_memory_is_of_one_episode_and_of_answered_steps_only(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    model = listed_model("one", Unavailable("x", status="http 500"), "three", "four")
+    policy, _ = traced(model, memory=LastSteps(5), retry=RetryRule(tries=1))
+    await policy.prepare(briefing())
+    await policy.decide(briefing(), observation(0))
+    with pytest.raises(LLMError):
+        await policy.decide(briefing(), observation(1))
+    await policy.decide(briefing(), observation(2))
+    assert [message.content for message in model.requests[2][1].messages[3:]] == ["step 0", "one", "step 2"]
+    await policy.prepare(briefing(episode=1))
+    await policy.decide(briefing(episode=1), observation(0, episode=1))
+    assert [message.content for message in model.requests[3][1].messages[3:]] == ["step 0"]
+
+
+# --- replay ---------------------------------------------------------------------------------------------
+
+
+async def test_recorded_exchanges_give_the_recorded_replies_without_a_wait(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    policy, exchanges = traced(listed_model(BUSY, 4.0, "first", Unreachable("x"), Unreachable("x"), 2.0, "second"))
+    said = [await policy.decide(briefing(), observation(step, within_s=None)) for step in range(2)]
+    recorded = [decode_as(Exchange, encode(exchange)) for exchange in exchanges]
+    began = asyncio.get_running_loop().time()
+    replayed = replay_policies(recorded)["Stalkers"]
+    again: list[Exchange] = []
+    replayed.trace = again.append
+    assert [await replayed.decide(briefing(), observation(step, within_s=None)) for step in range(2)] == said
+    assert asyncio.get_running_loop().time() == began
+    assert [(e.status, e.completion, e.usage) for e in again] == [(e.status, e.completion, e.usage) for e in exchanges]
+
+
+FINAL = ["http 429", "http 500", "connection", "timeout", "malformed"]
+
+
+@pytest.mark.parametrize("status", FINAL)
+async def test_a_failure_that_was_final_is_final_again(
+    status: str, listed_model: Callable[..., Any], briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
+) -> None:  # fmt: skip
+    failure = LLMError("final", status=status)
+    policy, exchanges = traced(listed_model(failure))
+    with pytest.raises(LLMError):
+        await policy.decide(briefing(), observation())
+    (replayed,) = replay_policies(exchanges).values()
+    with pytest.raises(LLMError) as caught:
+        await replayed.decide(briefing(), observation())
+    assert (caught.value.status, caught.value.retryable) == (status, False)
+
+
+async def test_a_request_that_the_deadline_cut_off_is_a_timeout_again(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    policy, exchanges = traced(listed_model(60.0, "never"))
+    deciding = asyncio.create_task(policy.decide(briefing(), observation()))
+    await asyncio.sleep(5)
+    deciding.cancel()
+    await asyncio.wait({deciding})
+    assert [e.status for e in exchanges] == ["cancelled"]
+    (replayed,) = replay_policies(exchanges).values()
+    with pytest.raises(LLMError) as caught:
+        await replayed.decide(briefing(), observation())
+    assert caught.value.status == "timeout"
+
+
+async def test_a_replay_says_what_differs_from_the_recording(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    policy, exchanges = traced(listed_model("one"))
+    await policy.decide(briefing(), observation(0, text="Game\n    Time: 0:07"))
+    (replayed,) = replay_policies(exchanges).values()
+    where = "of Stalkers in episode 0, step 0"
+    with pytest.raises(NotRecorded) as caught:
+        await replayed.decide(briefing(), observation(0, text="Game\n    Time: 0:08"))
+    assert str(caught.value) == (
+        f"the prompt {where} is not the recorded one: message 3, line 2 was '    Time: 0:07', and is '    Time: 0:08'"
+    )
+    with pytest.raises(NotRecorded, match="no request 1 of Stalkers in episode 0, step 9 was recorded"):
+        await replayed.decide(briefing(), observation(9))

@@ -1,0 +1,138 @@
+"""A key is read from the environment, and is in nothing that leaves the process except the request itself."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from aiohttp import web
+
+from agents.build import Workshop, client_for
+from agents.config import ModelConfig, WorkerSpec
+from agents.secret import MASK, read_key, scrub
+from agents.worker import run_worker
+from protocol.bus import Delivery
+from protocol.errors import ConfigError
+from protocol.keys import everything
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+    from pathlib import Path
+
+    from protocol.bus.memory import MemoryBroker
+    from protocol.messages import Briefing, Observation
+
+KEY = "sk-very-secret-0123456789abcdef"
+
+
+def test_a_key_is_read_from_its_variable_or_from_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    file.write_text(f"{KEY}\n", encoding="utf-8")
+    assert read_key("K", {"K": KEY}).get_secret_value() == KEY
+    assert read_key("K", {"K_FILE": str(file)}).get_secret_value() == KEY
+    assert read_key("K", {"K": "other-key", "K_FILE": "/nowhere"}).get_secret_value() == "other-key"
+
+
+BAD_KEYS = [
+    ({}, "no key: set the environment variable K, or let K_FILE name a file that holds it"),
+    ({"K": "  "}, "no key: set the environment variable K, or let K_FILE name a file that holds it"),
+    ({"K": "two words"}, "K: the key has blanks, line breaks or other characters that no key has"),
+    ({"K": "kéy"}, "K: the key has blanks, line breaks or other characters that no key has"),
+    ({"K_FILE": "/nowhere/key"}, "K_FILE: the file '/nowhere/key' cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("environ", "text"), BAD_KEYS)
+def test_a_key_that_is_none_is_one_clear_sentence_without_it(environ: dict[str, str], text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_key("K", environ)
+    assert str(caught.value) == text
+
+
+def test_a_key_shows_itself_nowhere() -> None:
+    key = read_key("K", {"K": KEY})
+    for text in (repr(key), str(key), f"{key}", f"{key!r}", "%s" % key):  # noqa: UP031 - each way of writing it
+        assert KEY not in text
+    assert scrub(f"Incorrect API key: {KEY}!") == f"Incorrect API key: {MASK}!"
+
+
+@pytest.fixture
+async def echoing_server() -> AsyncIterator[str]:
+    """A server that puts the key it got into everything that it says: errors first, then completions."""
+    asked = 0
+
+    async def echo(request: web.Request) -> web.Response:
+        nonlocal asked
+        asked += 1
+        said = request.headers.get("Authorization", "")
+        assert KEY in said, "the request itself does carry the key"
+        if asked == 1:
+            return web.json_response({"error": {"message": f"you said {said}", "code": said}}, status=401)
+        if asked == 2:
+            return web.Response(status=400, text=f"<html>{said}")
+        if asked == 3:
+            return web.Response(text=f"no json {said}")
+        return web.json_response({"choices": [{"message": {"content": f"Analysis: {said}"}}]})
+
+    application = web.Application()
+    application.router.add_post("/v1/chat/completions", echo)
+    runner = web.AppRunner(application, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    yield f"http://127.0.0.1:{runner.addresses[0][1]}/v1"
+    await runner.cleanup()
+
+
+async def test_a_key_is_in_no_log_message_or_recording_even_if_the_server_echoes_it(
+    echoing_server: str, broker: MemoryBroker, host: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str],
+    briefing: Callable[..., Briefing], observation: Callable[..., Observation],
+) -> None:  # fmt: skip
+    caplog.set_level(logging.DEBUG)
+    monkeypatch.setenv("ECHO_KEY", KEY)
+    model = tmp_path / "echo.yaml"
+    model.write_text(
+        f"profile: compatible\nmodel: echo\nbase_url: {echoing_server}\napi_key_env: ECHO_KEY\nretry: {{tries: 1}}\n",
+        encoding="utf-8",
+    )
+    policy = Workshop().policy(WorkerSpec(model=str(model)))
+    heard = await broker.session().subscribe(everything("test"), Delivery.SPEECH)
+    logged = await broker.session().subscribe(everything("test"), Delivery.LOG)
+    stop = asyncio.Event()
+    playing = asyncio.create_task(run_worker(broker.session(), "test", "blue", "Stalkers", policy, stop=stop))
+    await host.say(briefing())
+    for step in range(4):
+        await host.say(observation(step))
+        await host.replies(step + 1)
+    stop.set()
+    tally = await playing
+    await heard.close()
+    await logged.close()
+    payloads = [sample.payload async for sample in heard] + [sample.payload async for sample in logged]
+    statuses = [reply.detail or reply.status for reply in await host.replies(4)]
+    assert statuses == ["http 401", "http 400", "malformed", "ok"], "the server was asked and did answer"
+    assert len(payloads) >= 8
+    assert any(MASK.encode() in payload for payload in payloads)
+    emitted = [*payloads, caplog.text, *capsys.readouterr(), repr(policy), repr(vars(policy)), repr(tally)]
+    assert "http 401" in caplog.text
+    for text in emitted:
+        assert KEY not in (text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
+
+
+async def test_a_key_is_in_no_error_of_a_client(echoing_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    import traceback
+
+    from agents.llm.client import LLMError, Request
+
+    monkeypatch.setenv("ECHO_KEY", KEY)
+    config = ModelConfig(profile="compatible", model="m", base_url=echoing_server, api_key_env="ECHO_KEY")
+    client = client_for(config)
+    for _ in range(3):
+        with pytest.raises(LLMError) as caught:
+            await client.complete(Request((), timeout_s=5.0))
+        text = "".join(traceback.format_exception(caught.value)) + repr(caught.value) + repr(vars(caught.value))
+        assert KEY not in text
+    assert KEY not in (await client.complete(Request((), timeout_s=5.0))).text
+    await client.close()
