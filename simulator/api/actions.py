@@ -172,7 +172,7 @@ def _move_camera(seat: Seat, point: tuple[float, float], loop: int) -> None:
     if seat.options.raw:
         centre = action.action_raw.camera_move.center_world_space
         centre.x, centre.y = x - seat.origin[0], y - seat.origin[1]
-        centre.z = float(seat.world.map.terrain.ground_z(np.array([[x, y]]))[0])
+        centre.z = seat.hands.camera_z
     spatial = spatial_pb2.ActionSpatial()
     column, row = (math.floor(v) for v in seat.minimap.to_pixels(x, y))
     spatial.camera_move.center_minimap.x = min(column, seat.minimap.columns - 1)

@@ -102,7 +102,7 @@ def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: 
     x, y = seat.camera
     camera = raw.player.camera
     camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
-    camera.z = float(terrain.ground_z(np.array([seat.camera]))[0])
+    camera.z = seat.hands.camera_z
     raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
     Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin).write(raw)
     visibility, creep = world.visibility[seat.player], terrain.creep

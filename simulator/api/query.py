@@ -57,11 +57,16 @@ def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
             return 0.0
         start = (float(world.pos[slot, 0]), float(world.pos[slot, 1]))
         flying = world.unit_type(slot).flying
-    if not all(map(math.isfinite, (*start, *end))):
+    if not (_on_map(world, *start) and _on_map(world, *end)):
         return 0.0
     if flying:
         return math.dist(start, end)
     return world.ground.surface(Layer.WALK).distance(np.array(start), np.array(end))
+
+
+def _on_map(world: World, x: float, y: float) -> bool:
+    width, height = world.map.terrain.size
+    return 0 <= x < width and 0 <= y < height
 
 
 # places ---------------------------------------------------------------------------------------------------------------
@@ -74,7 +79,7 @@ def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> err
     if footprint is None:
         return error_pb2.NotSupported
     x, y = question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1]
-    if not (math.isfinite(x) and math.isfinite(y)):
+    if not _on_map(world, x, y):
         return error_pb2.CantBuildLocationInvalid
     cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
     terrain = world.map.terrain

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+_AT_ONCE = 8000
+"""Pixels looked at in one go: above, discs of one size at a time cost less than the idle pixels around small ones."""
+
 _DTYPES: dict[int, np.dtype[Any]] = {1: np.dtype(np.bool_), 8: np.dtype(np.uint8), 32: np.dtype("<i4")}
 
 
@@ -41,17 +44,16 @@ def _window(reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Discs:
     """Draws discs by their centres [n, 2] and radii [n], in pixels; every disc covers at least one pixel.
 
-    A pixel belongs to a disc when its centre does. Discs of similar size are drawn at once.
+    A pixel belongs to a disc when its centre does. A few discs are drawn in one go, many by their size.
     """
+    shape = (columns, rows)
     reach = np.ceil(radius + 0.5).astype(np.intp)
-    parts = [
-        _draw_size(int(size), np.flatnonzero(reach == size), centres, radius, (columns, rows))
-        for size in np.unique(reach)
-    ]
-    if not parts:
-        parts = [_NOTHING]
-    pixels, disc, inside, cover = (np.concatenate(column) for column in zip(*parts, strict=True))
-    if len(parts) > 1:
+    largest = int(reach.max(initial=0))
+    if len(radius) * (2 * largest + 1) ** 2 <= _AT_ONCE:
+        pixels, disc, inside, cover = _draw_size(largest, np.arange(len(radius)), centres, radius, shape)
+    else:
+        parts = [_draw_size(int(k), np.flatnonzero(reach == k), centres, radius, shape) for k in np.unique(reach)]
+        pixels, disc, inside, cover = (np.concatenate(column) for column in zip(*parts, strict=True))
         order = np.argsort(disc, kind="stable")
         pixels, disc, inside, cover = pixels[order], disc[order], inside[order], cover[order]
     area = columns * rows
@@ -64,9 +66,6 @@ def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Disc
 def _bytes(image: NDArray[Any]) -> NDArray[np.uint8]:
     capped: NDArray[np.uint8] = np.minimum(image, 255).astype(np.uint8)
     return capped
-
-
-_NOTHING = (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0, np.bool_), np.zeros(0))
 
 
 def _draw_size(

@@ -112,7 +112,7 @@ class Units:
         own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF].tolist()
         orders = {slot: self.world.orders_of(slot) for slot in own}
         points = [order.point or (0.0, 0.0) for some in orders.values() for order in some]
-        heights = iter(self.world.map.terrain.ground_z(np.array(points).reshape(-1, 2)).tolist())
+        heights = iter(self.world.map.terrain.ground_z(np.array(points)).tolist() if points else ())
         return {slot: [(order, next(heights)) for order in some] for slot, some in orders.items()}
 
 

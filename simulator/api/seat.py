@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api.layers import FeatureLayers, minimap_of, screen_of
@@ -16,7 +17,6 @@ from simulator.api.selection import Selection
 from simulator.api.sight import Sight, look
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from simulator.api.types import Types
@@ -30,6 +30,7 @@ class Hands:
     """What a player does at the interface: where he looks, what he holds, and what came of it."""
 
     camera: tuple[float, float]
+    camera_z: float  # of the ground there
     selection: Selection = dataclasses.field(default_factory=Selection)
     echoes: list[sc.Action] = dataclasses.field(default_factory=list)
     errors: list[sc.ActionError] = dataclasses.field(default_factory=list)
@@ -58,7 +59,7 @@ class Seat:
             self.screen, self.minimap = screen_of(layers), minimap_of(layers, shown)
             self.layers = FeatureLayers(layers, self.screen, self.minimap)
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
-        self.hands = Hands(world.map.camera)
+        self.hands = Hands(world.map.camera, self.ground_z(*world.map.camera))
         self.deaths_told = 0
         self.known: frozenset[int] = frozenset()  # tags in the last observation
         self.observed_loop = -1
@@ -91,9 +92,14 @@ class Seat:
         )
         return shown
 
+    def ground_z(self, x: float, y: float) -> float:
+        """Height of the ground at a world point."""
+        return float(self.world.map.terrain.ground_z(np.array([[x, y]]))[0])
+
     def move_camera(self, x: float, y: float) -> None:
         """Points the camera at a world point, or at the nearest one of the playable area."""
         self.hands.camera = self.playable.clamp(x, y)
+        self.hands.camera_z = self.ground_z(*self.hands.camera)
 
     def report(self, loop: int) -> sc.Action:
         """A new entry of the actions that the next observation reports."""

@@ -103,12 +103,18 @@ def test_layers_are_rows_from_the_top_most_significant_bit_first(
     assert decode(layer.blank, "height_map").data == bytes(len(data))
 
 
-def test_a_layer_of_discs_has_the_value_of_each() -> None:
+def test_pixels_have_their_values_and_the_later_one_counts() -> None:
     layer = Layer(6, 32, 8, 8)
-    drawn = discs((1.5, 1.5, 0.4), (6.5, 1.5, 0.4))
-    data = decode(layer.encode_discs(drawn, np.array([74, 73])), "unit_type").data
+    data = decode(layer.encode_pixels(np.array([9, 14, 9]), np.array([74, 73, 105], np.int32)), "unit_type").data
     image = np.frombuffer(data, np.int32).reshape(8, 8)
-    assert image[1, 1] == 74
+    assert image[1, 1] == 105
     assert image[1, 6] == 73
-    assert image.sum() == 147
-    assert layer.encode_discs(drawn, np.array([0, 0])) is layer.blank
+    assert image.sum() == 178
+
+
+def test_many_discs_are_drawn_as_few_are() -> None:
+    circles = [(i % 29 + 0.3, i % 31 + 0.7, 0.4 + i % 5) for i in range(200)]
+    together = discs(*circles, size=32)
+    one_by_one = [discs(circle, size=32) for circle in circles]
+    assert together.pixels.tolist() == [pixel for one in one_by_one for pixel in one.pixels]
+    assert together.rows.tolist() == [row for row, one in enumerate(one_by_one) for _ in one.pixels]

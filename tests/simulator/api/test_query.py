@@ -1,0 +1,101 @@
+"""Ways, places to build, abilities of units: one answer to each question."""
+
+import math
+
+import pytest
+from s2clientprotocol import common_pb2, error_pb2, query_pb2, raw_pb2
+
+from simulator.client import Client, interface
+
+PYLON, GATEWAY = 881, 883
+
+
+@pytest.fixture
+def client() -> Client:
+    client = Client()
+    client.play("2c_vs_64zg", interface(screen=0))
+    return client
+
+
+def distance(client: Client, start: tuple[float, float] | int, end: tuple[float, float]) -> float:
+    question = query_pb2.RequestQueryPathing(end_pos=common_pb2.Point2D(x=end[0], y=end[1]))
+    if isinstance(start, int):
+        question.unit_tag = start
+    else:
+        question.start_pos.x, question.start_pos.y = start
+    return client.ask(query=query_pb2.RequestQuery(pathing=[question])).query.pathing[0].distance
+
+
+def test_a_straight_way_is_as_long_as_the_line() -> None:
+    client = Client()
+    client.play("2s3z", interface(screen=0))
+    assert distance(client, (9.0, 16.0), (23.0, 16.0)) == pytest.approx(14.0)
+
+
+def test_a_way_round_a_cliff_is_longer_than_the_line(client: Client) -> None:
+    ways = [
+        (distance(client, (x, 16.0), (x + dx, 16.0 + dy)), math.hypot(dx, dy))
+        for x in (9.0, 16.0, 23.0) for dx in (-6.0, 6.0) for dy in (-8.0, 8.0)
+    ]  # fmt: skip
+    walked = [(way, line) for way, line in ways if way > 0]
+    assert all(way >= line - 0.01 for way, line in walked)
+    assert any(way > line + 0.5 for way, line in walked)
+
+
+@pytest.mark.parametrize("end", [(-5.0, 3.0), (float("nan"), 3.0), (1e30, -1e30), (float("inf"), 0.0)])
+def test_a_way_to_nowhere_is_no_fault(client: Client, end: tuple[float, float]) -> None:
+    assert distance(client, (9.0, 16.0), end) >= 0.0
+
+
+def test_a_unit_that_is_not_there_has_no_way(client: Client) -> None:
+    assert distance(client, 12345, (9.0, 16.0)) == 0.0
+
+
+def test_the_way_of_a_unit_starts_where_it_stands(client: Client) -> None:
+    unit = client.observe().observation.raw_data.units[0]
+    at = distance(client, (unit.pos.x, unit.pos.y), (unit.pos.x + 1, unit.pos.y))
+    assert distance(client, unit.tag, (unit.pos.x + 1, unit.pos.y)) == at
+
+
+def place(client: Client, ability: int, x: float, y: float) -> str:
+    question = query_pb2.RequestQueryBuildingPlacement(ability_id=ability, target_pos=common_pb2.Point2D(x=x, y=y))
+    answer = client.ask(query=query_pb2.RequestQuery(placements=[question])).query.placements[0]
+    return error_pb2.ActionResult.Name(answer.result)
+
+
+@pytest.mark.parametrize(
+    ("ability", "point", "result"),
+    [
+        (PYLON, (9.0, 16.0), "Success"),
+        (GATEWAY, (9.5, 16.5), "Success"),
+        (PYLON, (0.0, 0.0), "CantBuildLocationInvalid"),
+        (PYLON, (-50.0, 900.0), "CantBuildLocationInvalid"),
+        (PYLON, (float("nan"), 5.0), "CantBuildLocationInvalid"),
+        (23, (9.0, 16.0), "NotSupported"),
+        (0, (9.0, 16.0), "NotSupported"),
+    ],
+)
+def test_places_to_build(ability: int, point: tuple[float, float], result: str) -> None:
+    client = Client()
+    client.play("2s3z", interface(screen=0))
+    assert place(client, ability, *point) == result
+
+
+def test_abilities_are_told_of_own_units_only(client: Client) -> None:
+    units = client.observe().observation.raw_data.units
+    own = next(unit for unit in units if unit.alliance == raw_pb2.Self)
+    enemy = next(unit for unit in units if unit.alliance == raw_pb2.Enemy)
+    questions = [query_pb2.RequestQueryAvailableAbilities(unit_tag=tag) for tag in (own.tag, enemy.tag, 99)]
+    mine, theirs, nobody = client.ask(query=query_pb2.RequestQuery(abilities=questions)).query.abilities
+    assert (mine.unit_tag, mine.unit_type_id) == (own.tag, own.unit_type)
+    assert [ability.ability_id for ability in mine.abilities] == [1, 4, 16, 17, 18, 23]
+    assert theirs.unit_type_id == enemy.unit_type
+    assert not theirs.abilities
+    assert (nobody.unit_tag, nobody.unit_type_id) == (99, 0)
+
+
+def test_many_questions_have_as_many_answers(client: Client) -> None:
+    question = query_pb2.RequestQueryPathing(
+        start_pos=common_pb2.Point2D(x=9, y=16), end_pos=common_pb2.Point2D(x=10, y=16)
+    )
+    assert len(client.ask(query=query_pb2.RequestQuery(pathing=[question] * 300)).query.pathing) == 300
