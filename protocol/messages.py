@@ -46,9 +46,9 @@ AgentStatus = Literal[
 
 
 class Frozen(BaseModel):
-    """Base of all parts of messages: immutable, and unknown fields are errors."""
+    """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON has not) are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
 
 class Wire(Frozen):
@@ -438,7 +438,7 @@ class Report(Wire):
     game_loop: int = Field(ge=0)
     agents: tuple[AgentReport, ...]
     messages: tuple[Received, ...] = ()
-    """What the mailbox took in this step, in order of arrival; what it could deliver stands in the next observations."""
+    """What the mailbox took in this step, in order of arrival; what it could deliver is in the next observations."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0

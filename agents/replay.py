@@ -1,0 +1,143 @@
+"""Shows recorded observations to an agent again, and compares what it says with what it said.
+
+Worker, prompt and speech are the real ones, on a bus in memory; the model is replaced by its recorded completions,
+or the whole policy by one of the caller's. Observations that were not answered in time then are left out: what an
+agent does when it is cut off depends on the clock.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from agents.build import replay_policies
+from agents.worker import run_worker
+from protocol.bus import Delivery
+from protocol.bus.memory import MemoryBroker
+from protocol.codec import decode_as, encode
+from protocol.errors import RecordingError
+from protocol.keys import Topic, agent_key, run_key
+from protocol.messages import Briefing, Exchange, Message, Observation, Reply
+from protocol.recording.difference import Difference
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Iterator
+
+    from agents.policy import Policy
+    from protocol.bus import Bus, Publisher, Sample, Subscription
+    from protocol.messages import Run
+    from protocol.recording import Recording
+
+PATIENCE_S = 30.0
+"""How long a reply may take that waits for no model."""
+
+
+async def replay_agent(recording: Recording, agent: str, policy: Policy | None = None) -> list[Difference]:
+    """Replays one agent of a recording.
+
+    Args:
+        recording: of a run.
+        agent: its name.
+        policy: decides; by default the language model policy with the recorded completions.
+
+    Returns:
+        every reply and every list of messages that is not the recorded one.
+
+    Raises:
+        RecordingError: the recording has no such agent, or no requests of it and no policy is given.
+    """
+    run = recording.run
+    card = next((card for card in run.agents if card.name == agent), None) if run else None
+    if run is None or card is None:
+        raise RecordingError(f"{recording.path} has no agent {agent}")
+    if policy is None:
+        policies = replay_policies(recording.of(Exchange, agent=agent))
+        if agent not in policies:
+            raise RecordingError(
+                f"{recording.path} has no requests of {agent} to a model: give the policy it played with"
+            )
+        policy = policies[agent]
+    broker = MemoryBroker()
+    stage = await _Stage.set(broker.session(), run, card.side, agent)
+    stop = asyncio.Event()
+    worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, agent, policy, stop=stop))
+    try:
+        return [difference async for difference in stage.play(_script(recording, agent))]
+    finally:
+        stop.set()
+        await worker
+
+
+class _Scene:
+    """One observation with what was said to it."""
+
+    def __init__(self, observation: Observation, reply: Reply, messages: list[Message]) -> None:
+        self.observation, self.reply, self.messages = observation, reply, messages
+
+
+def _script(recording: Recording, agent: str) -> Iterator[Briefing | _Scene]:
+    """Briefings, and the observations that were answered, in their order."""
+    replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
+    messages: dict[tuple[int, int], list[Message]] = {}
+    for message in recording.of(Message, agent=agent):
+        messages.setdefault((message.episode, message.step), []).append(message)
+    for sample in recording:
+        match sample.message:
+            case Briefing(agent=name) as briefing if name == agent:
+                yield briefing
+            case Observation(agent=name) as seen if name == agent and (seen.episode, seen.step) in replies:
+                at = (seen.episode, seen.step)
+                yield _Scene(seen, replies[at], messages.get(at, []))
+
+
+class _Stage:
+    """The host's side of the bus, for one agent."""
+
+    def __init__(
+        self,
+        briefings: Publisher,
+        observations: Publisher,
+        replies: Subscription[Sample],
+        messages: Subscription[Sample],
+    ) -> None:
+        self._briefings, self._observations = briefings, observations
+        self._replies, self._messages = replies, messages
+
+    @classmethod
+    async def set(cls, bus: Bus, run: Run, side: str, agent: str) -> _Stage:
+        def key(topic: Topic) -> str:
+            return agent_key(run.run, side, agent, topic)
+
+        card = await bus.publisher(run_key(run.run, Topic.RUN), Delivery.STATE)
+        await card.put(encode(run))
+        return cls(
+            await bus.publisher(key(Topic.BRIEFING), Delivery.STATE),
+            await bus.publisher(key(Topic.OBSERVATION), Delivery.STATE),
+            await bus.subscribe(key(Topic.REPLY), Delivery.SPEECH),
+            await bus.subscribe(key(Topic.MESSAGE), Delivery.SPEECH),
+        )
+
+    async def play(self, script: Iterator[Briefing | _Scene]) -> AsyncIterator[Difference]:
+        for part in script:
+            if isinstance(part, Briefing):
+                await self._briefings.put(encode(part))
+                continue
+            await self._observations.put(encode(part.observation))
+            async with asyncio.timeout(PATIENCE_S):
+                reply = decode_as(Reply, (await anext(self._replies)).payload)
+                said = [decode_as(Message, (await anext(self._messages)).payload) for _ in part.messages]
+            for what, recorded, sent in (
+                ("reply", _words(part.reply), _words(reply)),
+                ("messages", _said(part.messages), _said(said)),
+            ):
+                if recorded != sent:
+                    yield Difference(reply.agent, reply.episode, reply.step, what, recorded, sent)
+
+
+def _words(reply: Reply) -> str:
+    """What a reply says, without how long it took."""
+    return reply.model_dump_json(exclude={"latency_s", "usage"})
+
+
+def _said(messages: list[Message]) -> str:
+    return "\n".join(message.model_dump_json() for message in messages)

@@ -1,0 +1,132 @@
+"""Plays a recorded match again without its agents: they say what they said, and must be shown what they were shown.
+
+The match, the bridge and the game are the real ones; `RecordedTurn` takes the place of the bus. With the same map,
+seed and rules, the observations of the replay equal the recorded ones byte for byte, and every difference is told.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bridge.task import TaskConfig
+from orchestrator.config import MatchConfig
+from orchestrator.host import assemble
+from orchestrator.roster import Seat
+from orchestrator.turn import Answer, Answers
+from protocol.codec import encode
+from protocol.errors import RecordingError
+from protocol.messages import Message, Observation, Reply, Report
+from protocol.recording.difference import Difference
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from bridge.game import OneSide
+    from protocol.messages import AgentReport, Briefing, Result
+    from protocol.recording import Recording, Step
+
+
+def recorded_config(recording: Recording) -> MatchConfig:
+    """The match that a recording is of.
+
+    Raises:
+        RecordingError: it has no run card.
+    """
+    run = recording.run
+    if run is None:
+        raise RecordingError(f"{recording.path} has no run card: it was ended before the match began")
+    task = TaskConfig.model_validate(run.config)
+    return MatchConfig(task=task, run=run.run, seed=run.seed, episodes=run.episodes)
+
+
+async def replay(recording: Recording, game: OneSide) -> list[Difference]:
+    """Plays a recording again, up to its last complete step.
+
+    Args:
+        recording: of a match.
+        game: the game of `recorded_config`, started.
+
+    Returns:
+        every observation that is not the recorded one; a replay that went another way ends at its first step.
+    """
+    turn = RecordedTurn(recording)
+    match = assemble(recorded_config(recording), game, turn, _Nobody())
+    try:
+        async for _ in match.play():
+            pass
+    except _EndOfRecording:
+        pass
+    return turn.differences
+
+
+class RecordedTurn:
+    """`orchestrator.turn.Asking` out of a recording: what was answered in time is answered at once."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.differences: list[Difference] = []
+        self._steps: Iterator[Step] = recording.by_step()
+        self._replies: dict[tuple[int, int, str], Reply] = {}
+        for reply in recording.of(Reply):
+            self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
+
+    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+        """Compares the observations with the recorded ones, and gives the recorded answers."""
+        first = next(iter(observations.values()))
+        step = next(self._steps, None)
+        if step is None or not step.of(Report):
+            raise _EndOfRecording
+        self._compare(step, observations)
+        if self.differences:
+            raise _EndOfRecording
+        (report,) = step.of(Report)
+        answers = {Seat(agent.side, agent.agent): self._answer(report, agent) for agent in report.agents}
+        messages = tuple(
+            Message(
+                run=first.run,
+                agent=said.sender,
+                side=first.side,
+                episode=first.episode,
+                step=first.step,
+                recipient=said.recipient,
+                text=said.text,
+            )
+            for said in report.messages
+        )
+        return Answers(answers, messages)
+
+    def _answer(self, report: Report, agent: AgentReport) -> Answer:
+        taken = agent.status in {"ok", "fallback"}
+        reply = self._replies[report.episode, report.step, agent.agent] if taken else None
+        return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
+
+    def _compare(self, step: Step, observations: Mapping[Seat, Observation]) -> None:
+        sent = {seat.agent: encode(observation).decode() for seat, observation in observations.items()}
+        for sample in step.samples:
+            message = sample.message
+            if not isinstance(message, Observation):
+                continue
+            now, recorded = sent.pop(message.agent, ""), sample.payload.decode()
+            if now != recorded:
+                self._differ(message.agent, step, recorded, now)
+        for agent, now in sent.items():
+            self._differ(agent, step, "", now)
+
+    def _differ(self, agent: str, step: Step, recorded: str, sent: str) -> None:
+        self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
+
+
+class _EndOfRecording(Exception):
+    """There is nothing more to compare."""
+
+
+class _Nobody:
+    """`orchestrator.match.Telling` to nobody."""
+
+    async def brief(self, briefing: Briefing) -> None:
+        """Is not told."""
+
+    async def report(self, report: Report) -> None:
+        """Is not told."""
+
+    async def result(self, result: Result) -> None:
+        """Is not told."""
