@@ -11,6 +11,8 @@ import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from agents.build import Workshop
+from agents.config import WorkerSpec
 from bridge.act import executor_of
 from bridge.game import GameConfig, GameThread, OneSide
 from bridge.pysc2_game import PySC2Game
@@ -49,6 +51,16 @@ class Minds:
     latency_s: float = 0.0
     """Of the scripted endpoint, if it is started."""
 
+    def check(self) -> None:
+        """Makes sure that an agent could decide so, before anything is started.
+
+        Raises:
+            ConfigError: a model file, a key or a policy is missing or wrong.
+        """
+        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model)
+        overrides = {"model": self.model_name, "base_url": self.base_url}
+        Workshop(budget_usd=self.budget_usd, overrides=overrides).policy(spec)
+
     @property
     def needs_endpoint(self) -> bool:
         """Whether the scripted endpoint has to be started."""
@@ -70,6 +82,7 @@ async def play(
     Raises:
         KhalaError: something the user can mend; the text says what.
     """
+    minds.check()
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
