@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from typing import TYPE_CHECKING, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from bridge.catalog import Action, catalogue
 from bridge.knowledge import knowledge
@@ -23,15 +23,45 @@ from protocol.messages import AgentCard, Clock, Frames, Frozen, TeamSpec
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+T = TypeVar("T")
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
+
+
+def _key_name(name: str) -> str:
+    try:
+        return check_name(name)
+    except WrongKey as error:
+        raise ValueError(str(error)) from None
+
+
+def _known(name: str, known: Iterable[str], what: str) -> str:
+    names = list(known)
+    if name in names:
+        return name
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f", did you mean '{close[0]}'?" if close else ""
+    raise ValueError(f"there is no {what} '{name}'{hint}")
+
+
+def _some(values: tuple[T, ...]) -> tuple[T, ...]:
+    """At least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
+    if not values:
+        raise ValueError("at least one is needed")
+    return values
+
+
+KeyName: TypeAlias = Annotated[str, AfterValidator(_key_name)]
+UnitTypeName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, knowledge(), "unit type"))]
+ActionName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, catalogue(), "action"))]
+MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, known_maps(), "map"))]
 
 
 class TeamConfig(Frozen):
     """One team of an agent."""
 
-    name: str
-    unit_types: tuple[str, ...] = Field(min_length=1)
+    name: KeyName
+    unit_types: Annotated[tuple[UnitTypeName, ...], AfterValidator(_some)]
     kind: TeamKind = "group"
     """`select`: every unit is a team of its own, named `<name>-1`, `<name>-2`, …; `select_all_type`: the units of
     a type around the first one; `group`: a control group, units are spread over the agent's teams."""
@@ -39,48 +69,28 @@ class TeamConfig(Frozen):
     """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
     task: str = ""
 
-    @field_validator("name")
-    @classmethod
-    def _name(cls, name: str) -> str:
-        return _key_name(name)
-
-    @field_validator("unit_types")
-    @classmethod
-    def _unit_types(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        for name in names:
-            _known(name, knowledge(), "unit type")
-        return names
-
 
 class AgentConfig(Frozen):
     """One agent: who it is, its teams, and what each type of unit may be told."""
 
-    name: str
+    name: KeyName
     role: str
     admits: Admission = "combat"
     """Which units it takes of those that its teams list; see `bridge.observe.teams`."""
-    teams: tuple[TeamConfig, ...] = Field(min_length=1)
-    actions: dict[str, tuple[str, ...]]
+    teams: Annotated[tuple[TeamConfig, ...], AfterValidator(_some)]
+    actions: dict[UnitTypeName, tuple[ActionName, ...]]
     """Names of text actions by unit type, in the order in which they are shown."""
     task: str = ""
     """What it has to do besides the task of all."""
     required: bool = True
     """Whether the match waits for it at the start."""
 
-    @field_validator("name")
-    @classmethod
-    def _name(cls, name: str) -> str:
-        return _key_name(name)
-
     @field_validator("actions")
     @classmethod
     def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
         for unit_type, names in actions.items():
-            _known(unit_type, knowledge(), "unit type")
-            for name in names:
-                _known(name, catalogue(), "action")
-                if not catalogue()[name].fits(unit_type):
-                    raise ValueError(f"{unit_type} has no action {name}")
+            if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
+                raise ValueError(f"{unit_type} has no action {strange[0]}")
         return actions
 
     @model_validator(mode="after")
@@ -111,17 +121,17 @@ class Opponent(Frozen):
 class TaskConfig(Frozen):
     """What is played, by whom, under which rules."""
 
-    name: str
+    name: KeyName
     description: str = ""
-    map: str
+    map: MapName
     race: Race | None = None
     """The agents' race; None for the map's own."""
     opponent: Opponent = Opponent()
-    side: str = "blue"
+    side: KeyName = "blue"
     """Name of the agents' side in keys and reports."""
     task: str
     """What all agents have to do."""
-    agents: tuple[AgentConfig, ...] = Field(min_length=1)
+    agents: Annotated[tuple[AgentConfig, ...], AfterValidator(_some)]
     channels: tuple[str, ...] = ()
     """Names under which more than one agent can be written to."""
     communication: bool = True
@@ -135,16 +145,6 @@ class TaskConfig(Frozen):
     """Actions that one team may have in one reply."""
     max_steps: int | None = Field(default=None, ge=1)
     """Decisions after which an episode ends without a result; None leaves it to the map."""
-
-    @field_validator("name", "side")
-    @classmethod
-    def _name(cls, name: str) -> str:
-        return _key_name(name)
-
-    @field_validator("map")
-    @classmethod
-    def _map(cls, name: str) -> str:
-        return _known(name, known_maps(), "map")
 
     @field_validator("agents")
     @classmethod
@@ -170,22 +170,6 @@ class TaskConfig(Frozen):
             AgentCard(name=a.name, side=self.side, teams=tuple(t.name for t in a.teams), required=a.required)
             for a in self.agents
         )
-
-
-def _key_name(name: str) -> str:
-    try:
-        return check_name(name)
-    except WrongKey as error:
-        raise ValueError(str(error)) from None
-
-
-def _known(name: str, known: Iterable[str], what: str) -> str:
-    names = list(known)
-    if name in names:
-        return name
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ""
-    raise ValueError(f"there is no {what} '{name}'{hint}")
 
 
 def _once(names: Iterable[str], what: str) -> None:

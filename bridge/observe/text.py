@@ -240,7 +240,7 @@ def _unit_line(unit: UnitView, size: float) -> str:
     if unit.shield_max:
         fields.append(f"shield {_whole(unit.shield)}/{_whole(unit.shield_max)}")
     if full := unit.health_max + unit.shield_max:
-        fields.append(f"total {round(100 * (unit.health + unit.shield) / full)}%")
+        fields.append(f"total {_whole(100 * (unit.health + unit.shield) / full)}%")
     if unit.energy_max:
         fields.append(f"energy {_whole(unit.energy)}/{_whole(unit.energy_max)}")
     if unit.build_progress < 1:
@@ -303,7 +303,8 @@ def _weapon(weapon: Weapon) -> str:
 
 def _message(message: Received, name: str) -> str:
     where = "" if message.recipient == name else f" in {message.recipient}"
-    text = " / ".join(line.strip() for line in message.text.splitlines())  # no line of it can pass for a heading
+    lines = [line.strip() for line in message.text.splitlines()]
+    text = " / ".join(line for line in lines if line)  # on one line, so that none can pass for a heading
     return f"Message from {message.sender}{where}: '''{text}'''"
 
 

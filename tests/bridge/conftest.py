@@ -127,3 +127,8 @@ def battle() -> list[raw_pb2.Unit]:
         make_unit(0x100200001, "Stalker", 20, 16, alliance="enemy", is_hallucination=True),
         make_unit(0x100240001, "MineralField", 12, 12, alliance="neutral", unit_type=341),
     ]
+
+
+@pytest.fixture
+def tasks_dir() -> Path:
+    return TASKS

@@ -1,0 +1,90 @@
+"""Task files: the shipped ones are right, and a wrong one is told where and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bridge.task import TaskConfig
+from protocol.configfile import load, loads
+from protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+TEAMS = {  # table D3 of the paper: how many units each team has to begin with
+    "2s3z": {"Zealot-1": 2, "Zealot-2": 1, "Stalker-1": 2},
+    "3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
+    "1c3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3, "Colossus-1": 1},
+    "3s5z_vs_3s6z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
+    "2c_vs_64zg": {"Colossus-1": 1, "Colossus-2": 1},
+    "2s_vs_1sc": {"Stalker-1": 1, "Stalker-2": 1},
+    "3s_vs_3z": {"Stalker-1": 3},
+    "3s_vs_4z": {"Stalker-1": 3},
+    "3s_vs_5z": {"Stalker-1": 3},
+}
+GOOD = """\
+name: duel
+map: 2s3z
+task: Win.
+agents:
+  - name: Stalkers
+    role: You lead.
+    teams:
+      - {name: A, unit_types: [Stalker], control_group: 1}
+    actions:
+      Stalker: [Attack_Unit]
+"""
+
+
+@pytest.mark.parametrize("name", list(TEAMS))
+def test_a_task_of_llm_smac_has_the_agent_and_teams_of_the_paper(name: str, task: Callable[..., TaskConfig]) -> None:
+    config = task(name)
+    (agent,) = config.agents
+    assert (config.name, agent.name, config.map_spec.difficulty) == (name, "CombatGroupSmac", "very_hard")
+    assert [team.name for team in agent.teams] == list(TEAMS[name])
+    assert config.clock.rule == "frozen"
+
+
+def test_every_shipped_task_can_be_read(tasks_dir: Path) -> None:
+    files = list(tasks_dir.rglob("*.yaml"))
+    assert len(files) >= 10
+    for file in files:
+        assert load(file, TaskConfig).name == file.stem
+
+
+def test_two_agents_share_the_battle_and_can_talk(task: Callable[..., TaskConfig]) -> None:
+    config = task("2s3z_pair")
+    assert [card.name for card in config.cards()] == ["Stalkers", "Zealots"]
+    assert config.communication
+    assert config.channels
+
+
+def test_a_task_may_change_who_the_opponent_is() -> None:
+    config = loads(GOOD + "opponent: {difficulty: easy}\n", TaskConfig, source="t")
+    assert (config.map_spec.difficulty, config.map_spec.opponent) == ("easy", "protoss")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "text"),
+    [
+        ("map: 2s3z", "map: 2s3y", 2, "there is no map '2s3y', did you mean '2s3z'?"),
+        ("[Attack_Unit]", "[Atack_Unit]", 10, "there is no action 'Atack_Unit', did you mean 'Attack_Unit'?"),
+        ("Stalker: [", "Stalkr: [", 10, "there is no unit type 'Stalkr', did you mean 'Stalker'?"),
+        ("[Stalker],", "[Zealot],", 5, "team A has units of type Zealot, for which no actions are listed"),
+        ("Stalker: [", "Zealot: [Ability_Blink_Screen]\n      Stalker: [", 9, "Zealot has no action Ability_Blink"),
+        ("name: duel", "name: a duel", 1, "name 'a duel' cannot stand in a key"),
+        ("control_group: 1", "control_group: 12", 8, "less than or equal to 9"),
+        ("control_group: 1}", "control_group: 1}\n      - {name: A, unit_types: [Stalker]}", 5, "two of team A"),
+        ("task: Win.\n", "", 1, "is required and not given"),
+        ("role: You lead.", "rolle: You lead.", 5, "is required and not given (and 1 more)"),
+    ],
+)
+def test_a_wrong_task_is_told_with_its_line(old: str, new: str, line: int, text: str) -> None:
+    assert old in GOOD
+    with pytest.raises(ConfigError) as error:
+        loads(GOOD.replace(old, new, 1), TaskConfig, source="duel.yaml")
+    assert text in str(error.value)
+    assert error.value.line == line

@@ -1,0 +1,136 @@
+"""Which unit answers to which agent and team."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from s2clientprotocol import sc2api_pb2 as sc_pb
+
+from bridge.observe.teams import Roster
+from bridge.task import AgentConfig, TaskConfig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from s2clientprotocol import raw_pb2
+
+ORDERS = {"Zealot": ("Stop",), "Stalker": ("Stop",), "Probe": ("Stop",), "Observer": ("Stop",), "WarpPrism": ("Stop",)}
+
+
+def agent(name: str, *teams: dict[str, Any], admits: str = "combat") -> AgentConfig:
+    return AgentConfig.model_validate({"name": name, "role": "", "admits": admits, "teams": teams, "actions": ORDERS})
+
+
+def team(name: str, *types: str, kind: str = "group") -> dict[str, Any]:
+    return {"name": name, "unit_types": types, "kind": kind}
+
+
+def grouped(agents: Iterable[AgentConfig], units: Iterable[raw_pb2.Unit], **player: int) -> dict[str, list[int]]:
+    roster = Roster(agents)
+    roster.update(sorted(units, key=lambda unit: unit.tag), sc_pb.PlayerCommon(**player))
+    return {t.name: list(t.tags) for a in agents for t in roster.teams(a.name)}
+
+
+def test_a_group_fills_the_smallest_team_first_up_to_four_units_each(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))]
+    zealots = [unit(tag, "Zealot", 10, 10) for tag in range(1, 8)]
+    assert grouped(agents, zealots) == {"Z-1": [1, 3, 5, 7], "Z-2": [2, 4, 6]}
+
+
+def test_a_full_group_takes_a_unit_to_the_team_whose_head_is_nearest(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))]
+    zealots = [unit(tag, "Zealot", 10 if tag % 2 else 30, 10) for tag in range(1, 9)]
+    late = [unit(9, "Zealot", 28, 10), unit(10, "Zealot", 27, 10)]
+    assert grouped(agents, [*zealots, *late]) == {"Z-1": [1, 3, 5, 7], "Z-2": [2, 4, 6, 8, 9, 10]}
+
+
+def test_other_kinds_take_the_head_within_15_then_an_empty_team_then_the_nearest_head(
+    unit: Callable[..., raw_pb2.Unit],
+) -> None:
+    teams = [team(name, "Zealot", kind="select_all_type") for name in ("Z-1", "Z-2")]
+    places = {1: 10, 2: 24.9, 3: 60, 4: 76, 5: 27}
+    zealots = [unit(tag, "Zealot", x, 10) for tag, x in places.items()]
+    assert grouped([agent("A", *teams)], zealots) == {"Z-1": [1, 2, 5], "Z-2": [3, 4]}
+
+
+def test_of_a_select_team_every_unit_is_a_team_with_a_number_of_its_own(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [agent("A", team("Obs", "Observer", kind="select"))]
+    roster = Roster(agents)
+    for tags in ([1, 2], [2], [2, 3]):
+        roster.update([unit(tag, "Observer", 9, 9) for tag in tags], sc_pb.PlayerCommon())
+    assert [(t.name, t.tags) for t in roster.teams("A")] == [("Obs-2", (2,)), ("Obs-3", (3,))]
+
+
+@pytest.mark.parametrize(
+    ("admits", "types", "player", "taken"),
+    [
+        ("combat", "Probe Probe Zealot", {}, [1, 3]),  # one scout, while there is nothing else
+        ("combat", "Zealot Probe", {}, [1]),
+        ("builder", "Probe Probe Probe", {"food_workers": 31}, [1, 2]),
+        ("builder", "Probe", {}, []),
+        ("defender", "Zealot Zealot Zealot", {"food_army": 15}, [1]),
+        ("defender", "Zealot Zealot Zealot", {"food_army": 16}, [1, 2]),
+        ("any", "Probe Probe Zealot", {}, [1, 2, 3]),
+    ],
+)
+def test_an_agent_takes_what_it_admits(
+    admits: str, types: str, player: dict[str, int], taken: list[int], unit: Callable[..., raw_pb2.Unit]
+) -> None:
+    agents = [agent("A", team("T", "Zealot", "Probe"), admits=admits)]
+    units = [unit(tag, name, 5, 5) for tag, name in enumerate(types.split(), 1)]
+    assert grouped(agents, units, **player) == ({"T": taken} if taken else {})
+
+
+def test_what_one_agent_does_not_admit_goes_to_the_next(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [agent("D", team("T-1", "Zealot"), admits="defender"), agent("C", team("T-2", "Zealot"))]
+    zealots = [unit(tag, "Zealot", 5, 5) for tag in (1, 2, 3)]
+    assert grouped(agents, zealots, food_army=6) == {"T-1": [1], "T-2": [2, 3]}
+
+
+def test_a_unit_beside_a_transport_goes_to_the_airborne_agent(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [
+        agent("C", team("Z", "Zealot")),
+        agent("Air", team("Drop", "Zealot"), team("Prism", "WarpPrism"), admits="airborne"),
+    ]
+    units = [unit(1, "WarpPrism", 50, 50), unit(2, "Zealot", 53.9, 50), unit(3, "Zealot", 54, 50)]
+    assert grouped(agents, units) == {"Prism": [1], "Drop": [2], "Z": [3]}
+
+
+def test_a_unit_that_is_not_finished_or_not_listed_is_nobodys(unit: Callable[..., raw_pb2.Unit]) -> None:
+    agents = [agent("A", team("Z", "Zealot"))]
+    assert grouped(agents, [unit(1, "Zealot", 5, 5, build_progress=0.9), unit(2, "Observer", 5, 5)]) == {}
+
+
+def test_the_head_is_the_oldest_unit_and_stays_it(unit: Callable[..., raw_pb2.Unit]) -> None:
+    roster = Roster([agent("A", team("Z", "Zealot"))])
+    heads = []
+    for tags in ([5, 7], [3, 5, 7], [3, 7], [3, 5, 7]):
+        roster.update([unit(tag, "Zealot", 5, 5) for tag in tags], sc_pb.PlayerCommon())
+        (z,) = roster.teams("A")
+        heads.append((z.head, z.tags))
+    assert heads == [(5, (5, 7)), (5, (5, 7, 3)), (7, (7, 3)), (7, (7, 3, 5))]
+
+
+def test_a_unit_that_comes_back_returns_to_its_team(unit: Callable[..., raw_pb2.Unit]) -> None:
+    roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
+    for tags in ([1, 2], [1], [1, 2]):
+        roster.update([unit(tag, "Zealot", 5, 5) for tag in tags], sc_pb.PlayerCommon())
+    assert [t.tags for t in roster.teams("A")] == [(1,), (2,)]
+
+
+def test_a_team_without_units_is_named_as_idle(unit: Callable[..., raw_pb2.Unit]) -> None:
+    roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
+    roster.update([unit(1, "Zealot", 5, 5)], sc_pb.PlayerCommon())
+    assert roster.idle_teams("A") == ("Z-2",)
+
+
+def test_the_army_of_2s3z_is_grouped_as_in_the_paper(
+    task: Callable[..., TaskConfig], unit: Callable[..., raw_pb2.Unit]
+) -> None:
+    army = [unit(tag, "Stalker" if tag < 3 else "Zealot", 9, 16) for tag in range(1, 6)]
+    assert {n: len(t) for n, t in grouped(task("2s3z").agents, army).items()} == {
+        "Zealot-1": 2,
+        "Zealot-2": 1,
+        "Stalker-1": 2,
+    }
