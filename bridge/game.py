@@ -11,6 +11,7 @@ snapshots and not one. `OneSide` is the game as a match with one side has it: co
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -127,9 +128,10 @@ class GameThread:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Closes the game."""
+        """Closes the game, or kills it if it does not let itself be closed."""
         try:
-            await asyncio.shield(asyncio.get_running_loop().run_in_executor(self._threads, self._playing.close))
+            with contextlib.suppress(GameHangs):  # it is gone, which was wanted
+                await self._run(self._playing.close)
         finally:
             self._threads.shutdown(wait=False)
 

@@ -1,0 +1,171 @@
+"""The game from outside: found or missing, in its thread, hanging, dead. Without a game: with one see test_live."""
+
+from __future__ import annotations
+
+import os
+import stat
+import threading
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from bridge.act import JointAction, Played
+from bridge.act.raw import RawExecutor
+from bridge.errors import GameError, GameHangs, GameMissing
+from bridge.game import GameConfig, GameInfo, GameThread, OneSide, Turn, find_sc2
+from bridge.maps import known_maps
+from bridge.pysc2_game import PySC2Game
+from protocol.errors import KhalaError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from bridge.act import Plan
+    from bridge.snapshot import Snapshot
+
+
+class FakeGame:
+    """A game that lets loops pass, or hangs until it is killed."""
+
+    def __init__(self, snapshot: Callable[..., Snapshot], *, hangs: bool = False) -> None:
+        self._snapshot = snapshot
+        self._hangs = hangs
+        self._killed = threading.Event()
+        self._loop = 0
+        self.calls: list[str] = []
+        self.threads: set[int] = set()
+
+    @property
+    def info(self) -> GameInfo:
+        return GameInfo("4.10.0.75689", "B89B", "m.SC2Map", "0" * 64)
+
+    def reset(self) -> tuple[Snapshot, ...]:
+        self._note("reset")
+        self._loop = 0
+        return (self._snapshot([], loop=0),)
+
+    def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
+        self._note("act")
+        if self._hangs:
+            self._killed.wait()
+            raise GameError("the game died")
+        (plan,) = plans
+        self._loop += next(plan).loops
+        after = self._snapshot([], loop=self._loop)
+        try:
+            plan.send(after)
+        except StopIteration as done:
+            return (Turn(after, done.value, 1),)
+        raise AssertionError
+
+    def kill(self) -> None:
+        self.calls.append("kill")
+        self._killed.set()
+
+    def close(self) -> None:
+        self._note("close")
+
+    def _note(self, call: str) -> None:
+        self.calls.append(call)
+        self.threads.add(threading.get_ident())
+
+
+async def test_a_side_plays_commands_and_gets_snapshots(snapshot: Callable[..., Snapshot]) -> None:
+    fake = FakeGame(snapshot)
+    async with OneSide(GameThread(lambda: fake), RawExecutor(), step_loops=11) as game:
+        first = await game.reset()
+        turn = await game.act(JointAction().commands)
+        assert (first.game_loop, turn.snapshot.game_loop) == (0, 11)
+        assert (turn.played, turn.env_steps) == (Played(), 1)
+        assert game.info.version == "4.10.0.75689"
+    assert fake.calls == ["reset", "act", "close"]
+
+
+async def test_the_game_has_a_thread_of_its_own(snapshot: Callable[..., Snapshot]) -> None:
+    fake = FakeGame(snapshot)
+    async with GameThread(lambda: fake) as game:
+        await game.reset()
+    assert len(fake.threads) == 1
+    assert threading.get_ident() not in fake.threads
+
+
+async def test_a_game_that_hangs_is_killed_and_named(snapshot: Callable[..., Snapshot]) -> None:
+    fake = FakeGame(snapshot, hangs=True)
+    async with GameThread(lambda: fake, hang_s=0.05) as game:
+        with pytest.raises(GameHangs, match=r"^the game did not answer within 0.05 s and was ended; try again"):
+            await game.act([RawExecutor().plan([], snapshot([]), 8)])
+    assert fake.calls == ["act", "kill", "close"]
+
+
+async def test_a_game_that_cannot_be_started_is_an_error_of_the_entering() -> None:
+    def fail() -> FakeGame:
+        raise GameError("no luck")
+
+    with pytest.raises(GameError, match="no luck"):
+        await GameThread(fail).__aenter__()
+
+
+# --- where the game is --------------------------------------------------------------------------------------------
+
+
+def lay_out(directory: Path, *, script: str = "#!/bin/sh\nexit 3\n", maps: bool = True) -> Path:
+    """A directory that looks like an install, whose game is a script."""
+    binary = directory / "Versions" / "Base75689" / "SC2_x64"
+    binary.parent.mkdir(parents=True)
+    binary.write_text(script)
+    binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
+    if maps:
+        battle = directory / "Maps" / "llm_smac" / "2s3z.SC2Map"
+        battle.parent.mkdir(parents=True)
+        battle.write_bytes(b"a map")
+    return directory
+
+
+def test_a_game_is_found_by_name_by_sc2path_or_by_directory(tmp_path: Path) -> None:
+    install = lay_out(tmp_path / "sc2")
+    assert find_sc2("simulator", simulator=install) == install
+    assert find_sc2("starcraft2", environ={"SC2PATH": str(install)}) == install
+    assert find_sc2(str(install)) == install
+
+
+def test_a_missing_game_is_told_with_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    cases: list[tuple[str, dict[str, Any], str]] = [
+        ("simulator", {}, "the simulator is not installed: `khala sc2 install DIR` lays it out"),
+        (
+            "starcraft2",
+            {"environ": {"SC2PATH": "/no/where"}},
+            "there is no StarCraft II in /no/where (SC2PATH): no such directory; set SC2PATH to where it is",
+        ),
+        (
+            str(tmp_path / "empty"),
+            {},
+            f"there is no StarCraft II in {tmp_path}/empty: it has no directory Versions with a Base in it",
+        ),
+    ]
+    for source, options, text in cases:
+        with pytest.raises(GameMissing) as error:
+            find_sc2(source, **options)
+        assert str(error.value) == text
+        assert isinstance(error.value, KhalaError)
+
+
+def config(directory: Path) -> GameConfig:
+    return GameConfig(sc2path=directory, map=known_maps()["2s3z"], start_timeout_s=8)
+
+
+def test_a_missing_map_is_told(tmp_path: Path) -> None:
+    install = lay_out(tmp_path / "sc2", maps=False)
+    with pytest.raises(GameMissing) as error:
+        PySC2Game(config(install))
+    assert str(error.value) == (
+        f"there is no map llm_smac/2s3z.SC2Map in {install}/Maps: copy it there, or play with the simulator"
+    )
+
+
+def test_a_game_that_ends_before_it_listens_is_told_and_leaves_the_environment_alone(tmp_path: Path) -> None:
+    before = dict(os.environ)
+    with pytest.raises(GameError, match=r"^the game could not be started: Failed to connect to the SC2 websocket"):
+        PySC2Game(config(lay_out(tmp_path / "sc2")))
+    assert dict(os.environ) == before

@@ -1,0 +1,143 @@
+"""Whole battles on the simulator, through PySC2, by a player that reads nothing but the text."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bridge.act import Actor, executor_of
+from bridge.errors import GameError
+from bridge.game import GameConfig, Turn
+from bridge.observe import Feedback, Observer
+from bridge.pysc2_game import PySC2Game
+from protocol.speech import parse
+from simulator.install import install
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from bridge.snapshot import Snapshot
+    from bridge.task import TaskConfig
+
+    Play = Callable[[str], "Battle"]
+
+pytestmark = pytest.mark.game
+
+TEAM = re.compile(r"^Team (\S+)\n((?: .*\n)+)", re.MULTILINE)
+ENEMY = re.compile(r"\| tag (0x[0-9a-f]+) \| screen \S+ \S+ \| distance \S+ \| health (\d+)/\d+ \| shield (\d+)")
+
+
+def focus_fire(text: str) -> str:
+    """Every team attacks the weakest enemy on its screen."""
+    lines = ["Actions:"]
+    for name, block in TEAM.findall(text):
+        enemies = [(int(health) + int(shield), tag) for tag, health, shield in ENEMY.findall(block)]
+        lines += [f"Team {name}:"] + ([f"<Attack_Unit({min(enemies)[1]})>"] if enemies else [])
+    return "\n".join(lines)
+
+
+class Battle:
+    """A task in a game, played turn by turn."""
+
+    def __init__(self, game: PySC2Game, task: TaskConfig) -> None:
+        self.game, self.task = game, task
+        self.actor, self.observer, self.executor = Actor(task), Observer(task), executor_of(task)
+        self.texts: list[str] = []
+        self.turns: list[Turn] = []
+        self.reasons: list[str] = []
+        self._feedback: dict[str, Feedback] = {}
+        (self.now,) = game.reset()
+
+    def turn(self, policy: Callable[[str], str]) -> Snapshot:
+        sight = self.observer.observe(self.now, self._feedback)
+        self.texts += [agent.text for agent in sight.agents.values()]
+        joint = self.actor.joint(sight, {name: parse(policy(agent.text)) for name, agent in sight.agents.items()})
+        (turn,) = self.game.act([self.executor.plan(joint.commands, self.now, self.task.clock.step_loops)])
+        self.turns.append(turn)
+        refused = {
+            name: (*joint.rejections[name], *(r.rejection for r in turn.played.refusals if r.agent == name))
+            for name in joint.accepted
+        }
+        self.reasons += [rejection.reason for rejections in refused.values() for rejection in rejections]
+        self._feedback = {name: Feedback(joint.accepted[name], refused[name]) for name in joint.accepted}
+        self.now = turn.snapshot
+        return self.now
+
+    def to_the_end(self) -> Battle:
+        while not self.now.ended:
+            self.turn(focus_fire)
+        return self
+
+
+@pytest.fixture(scope="module")
+def sc2path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install(tmp_path_factory.mktemp("sc2"))
+
+
+@pytest.fixture
+def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
+    games: list[PySC2Game] = []
+
+    def begin(executor: str, name: str = "2s3z") -> Battle:
+        config = task(name, executor=executor)
+        games.append(PySC2Game(GameConfig(sc2path=sc2path, map=config.map_spec, seed=3)))
+        return Battle(games[-1], config)
+
+    yield begin
+    for game in games:
+        game.close()
+
+
+@pytest.mark.parametrize("executor", ["raw", "screen"])
+def test_a_battle_is_played_to_its_end(executor: str, start: Play) -> None:
+    battle = start(executor).to_the_end()
+    assert battle.now.outcome in ("win", "loss")  # five against five do not last until the time is up
+    assert len(battle.turns) > 10
+    assert set(battle.reasons) <= {"refused_by_game"}
+    steps = {turn.env_steps for turn in battle.turns}
+    assert steps == {1} if executor == "raw" else max(steps) > 3 * 2
+    dead = frozenset[int]().union(*(turn.snapshot.dead for turn in battle.turns))
+    assert len(dead) >= 5
+
+
+def test_both_executors_give_the_same_orders(start: Play) -> None:
+    battles = [start("raw"), start("screen")]
+    for battle in battles:
+        while "Enemy units" not in battle.observer.observe(battle.now).agents["CombatGroupSmac"].text:
+            battle.turn(lambda _: "")
+    before = [_orders(battle) for battle in battles]
+    for battle in battles:
+        battle.turn(focus_fire)
+    after = [_orders(battle) for battle in battles]
+    assert before[0] == before[1]
+    assert after[0] == after[1] != before[0]
+
+
+def _orders(battle: Battle) -> dict[int, list[tuple[int, int]]]:
+    return {u.tag: [(o.ability_id, o.target_unit_tag) for o in u.orders] for u in battle.now.own}
+
+
+def test_the_same_seed_and_replies_give_the_same_observations(start: Play) -> None:
+    first, second = (start("raw").to_the_end() for _ in range(2))
+    assert first.texts == second.texts
+
+
+def test_an_episode_that_is_over_is_not_played_on_but_reset(start: Play) -> None:
+    battle = start("raw").to_the_end()
+    with pytest.raises(GameError, match="the episode is over: the game has to be reset before it is played on"):
+        battle.game.act([battle.executor.plan([], battle.now, 8)])
+    (fresh,) = battle.game.reset()
+    assert (fresh.ended, fresh.outcome, len(fresh.own)) == (False, None, 5)
+    assert fresh.game_loop < 16
+
+
+def test_a_game_that_dies_is_an_error_and_can_be_closed(start: Play) -> None:
+    battle = start("raw")
+    battle.game.kill()
+    with pytest.raises(GameError, match=r"^the game died or broke its contract: "):
+        battle.turn(lambda _: "")
+    battle.game.close()
+    battle.game.close()
