@@ -7,6 +7,7 @@ file, the budget by all. Each agent has a client, and so a connection, of its ow
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -99,20 +100,28 @@ class Workshop:
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
         if name not in self._models:
-            config = self._overridden(load_model(name))
+            config = _changed(_located(load_model(name)), self._overrides, source="command line")
             if self._budget.limit_usd is not None and not config.prices.known:
                 raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
             limits = Limits(config.limits, prices=config.prices, budget=self._budget, source=f"model file {name}")
             self._models[name] = config, limits
         return self._models[name]
 
-    def _overridden(self, config: ModelConfig) -> ModelConfig:
-        try:
-            return ModelConfig.model_validate({**config.model_dump(), **self._overrides})
-        except ValidationError as error:
-            fault = error.errors(include_url=False)[0]
-            field = ".".join(str(part) for part in fault["loc"])
-            raise ConfigError(fault["msg"].removeprefix("Value error, "), source="command line", field=field) from None
+
+def _located(config: ModelConfig) -> ModelConfig:
+    """The model at the address that the environment says, if it says one."""
+    variable = config.base_url_env
+    address = os.environ.get(variable) if variable else None
+    return _changed(config, {"base_url": address}, source=variable) if address else config
+
+
+def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
+    try:
+        return ModelConfig.model_validate({**config.model_dump(), **changes})
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in fault["loc"])
+        raise ConfigError(fault["msg"].removeprefix("Value error, "), source=source, field=field) from None
 
 
 def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[str, LLMPolicy]:

@@ -51,7 +51,7 @@ def agent(
         typer.Argument(help="Agents to play, as the task file names them. Several share this process."),
     ] = None,
     *,
-    run: Annotated[str, typer.Option(help="Name of the run; the host prints it.", show_default=False)],
+    run: Annotated[str, typer.Option(envvar="KHALA_RUN", help="Name of the run; the host prints it.", metavar="NAME")],
     side: Annotated[str, typer.Option(help="Side of the agents, as the task file names it.")] = "blue",
     connect: Annotated[
         list[str] | None,
@@ -194,10 +194,10 @@ async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | Non
     async with endpoint:
         ready = json.dumps({"base_url": endpoint.base_url, "pid": os.getpid(), "models": list(PLAYERS)})
         _say(f"scripted models {', '.join(PLAYERS)} at {endpoint.base_url}")
-        if as_json:
-            typer.echo(ready)
         if ready_file is not None:
             _write_whole(ready_file, ready)
+        if as_json:
+            typer.echo(ready)
         await stop.wait()
         _say(f"{endpoint.requests} requests were answered")
 

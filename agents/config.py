@@ -39,6 +39,8 @@ class ModelConfig(Frozen):
     """As the endpoint calls it."""
     base_url: str
     """Usually ends in `/v1`."""
+    base_url_env: str | None = None
+    """Name of the environment variable whose value takes the place of `base_url` where it is set."""
     api_key_env: str | None = None
     """Name of the environment variable with the key; with `_FILE` appended, of one with the path of a file."""
     max_tokens: int | None = Field(default=None, ge=1)
@@ -57,6 +59,13 @@ class ModelConfig(Frozen):
     @classmethod
     def _address(cls, value: str) -> str:
         return checked_address(value)
+
+    @field_validator("base_url_env")
+    @classmethod
+    def _address_variable(cls, value: str | None) -> str | None:
+        if value is not None and not _VARIABLE.fullmatch(value):
+            raise ValueError("the name of an environment variable is wanted here, such as VLLM_BASE_URL")
+        return value
 
     @field_validator("api_key_env", mode="before")
     @classmethod

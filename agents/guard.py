@@ -120,4 +120,4 @@ class Guard:
     def _once(self, text: str, key: str | None = None) -> None:
         if (key or text) not in self._complaints:
             self._complaints.add(key or text)
-            log.warning("agent %s: %s", self._agent, text)
+            log.error("agent %s: %s", self._agent, text)

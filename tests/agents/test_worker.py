@@ -309,7 +309,7 @@ async def test_a_failure_of_a_policy_is_logged_once_with_its_type_and_place(
         await host.say(observation(step=step))
         await host.replies(step + 1)
     (record,) = caplog.records
-    assert record.levelno == logging.WARNING
+    assert record.levelno == logging.ERROR
     assert record.getMessage().startswith("agent Stalkers: the policy failed: KeyError: 'tag' at ")
     assert "test_worker.py:" in record.getMessage()
 

@@ -1,0 +1,222 @@
+"""Model files and agent files: what ships is right, and what is wrong is said."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from agents.build import Workshop, client_for, load_policy
+from agents.config import WorkerSpec, load_agents, load_model, model_files
+from agents.llm.anthropic import Anthropic
+from agents.llm.openai_compatible import OpenAICompatible
+from agents.llm_policy import LLMPolicy
+from agents.policy import FunctionPolicy
+from agents.scripted.policies import Silent
+from protocol.configfile import loads
+from protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+from agents.config import AgentsFile, ModelConfig
+
+KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("name", ["anthropic", "deepseek", "ollama", "openai", "scripted", "vllm"])
+def test_a_shipped_model_file_makes_a_client(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in KEYS:
+        monkeypatch.setenv(variable, "sk-0123456789")
+    config = load_model(name)
+    client = client_for(config)
+    assert isinstance(client, Anthropic if name == "anthropic" else OpenAICompatible)
+    assert (client.model, client.endpoint) == (config.model, config.base_url)
+
+
+def test_every_shipped_model_file_is_tried() -> None:
+    assert sorted(model_files()) == ["anthropic", "deepseek", "ollama", "openai", "scripted", "vllm"]
+
+
+def test_the_shipped_agents_file_makes_policies() -> None:
+    file = load_agents(ROOT / "configs" / "agents" / "mixed.yaml")
+    workshop = Workshop(budget_usd=file.budget_usd)
+    policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
+    assert {name: type(policy) for name, policy in policies.items()} == {
+        "CombatGroupSmac": LLMPolicy,
+        "Watcher": Silent,
+    }
+
+
+def test_a_missing_key_names_its_variable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    monkeypatch.delenv("OPENAI_API_KEY_FILE", raising=False)
+    with pytest.raises(ConfigError) as caught:
+        Workshop().policy(WorkerSpec(model="openai"))
+    assert str(caught.value) == (
+        "no key: set the environment variable OPENAI_API_KEY, or let OPENAI_API_KEY_FILE name a file that holds it"
+    )
+
+
+GOOD = "profile: vllm\nmodel: m\nbase_url: http://h/v1\n"
+BAD_MODELS = [
+    ("profile: vllm\nmodel: m\n", "m.yaml:1 (base_url): is required and not given"),
+    (GOOD.replace("http://h", "h"), "m.yaml:3 (base_url): 'h/v1' is no URL that begins with http:// or https://"),
+    (
+        GOOD.replace("h/", "me:sk-secret@h/"),
+        ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
+        "name a variable in api_key_env"),
+    ),
+    (
+        GOOD.replace("/v1", "/v1?key=sk-secret"),
+        ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
+        "name a variable in api_key_env"),
+    ),
+    (
+        GOOD + "api_key_env: sk-secret",
+        "m.yaml:4 (api_key_env): the name of an environment variable is wanted here, such as OPENAI_API_KEY, not a key",
+    ),
+    (
+        GOOD + "api_key: sk-secret",
+        "m.yaml:4 (api_key): no such field, did you mean 'api_key_env'?",
+    ),
+    (
+        GOOD + "extra:\n  api_key: sk-secret",
+        "m.yaml:4 (extra): 'api_key' looks like a key, and extra fields are recorded: use api_key_env",
+    ),
+    (
+        GOOD.replace("vllm", "openai"),
+        "m.yaml:1: openai wants a key: name the environment variable that holds it in api_key_env",
+    ),
+    (GOOD + "try_timeout_s: 0", "m.yaml:4 (try_timeout_s): input should be greater than 0, not 0"),
+    (GOOD + "retry: {tries: 0}", "m.yaml:4 (retry.tries): input should be greater than or equal to 1, not 0"),
+    (GOOD + "prices: {promt: 1}", "m.yaml:4 (prices.promt): no such field, did you mean 'prompt'?"),
+    (GOOD + "limits:\n  in_flight: many",
+     "m.yaml:5 (limits.in_flight): input should be a valid integer, unable to parse string as an integer, not 'many'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "expected"), BAD_MODELS)
+def test_a_wrong_model_file_says_line_and_field_and_never_a_key(text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads(text, ModelConfig, source="m.yaml")
+    assert str(caught.value) == expected
+    assert "secret" not in str(caught.value)
+
+
+BAD_AGENTS = [
+    ("agents: {}", "a.yaml:1 (agents): dictionary should have at least 1 item after validation, not 0, not {}"),
+    ("agents:\n  A: {}", "a.yaml:2 (agents.A): either a model or a policy is wanted"),
+    ("agents:\n  A: {model: scripted, policy: silent}", "a.yaml:2 (agents.A): either a model or a policy is wanted"),
+    (
+        "agents:\n  A/B: {policy: silent}",
+        (
+            "a.yaml:1 (agents): agent 'A/B' cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
+            "beginning with a letter or a digit"
+        ),
+    ),
+    ("agents:\n  A: {policy: silent}\nbudget: 3", "a.yaml:3 (budget): no such field, did you mean 'budget_usd'?"),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), BAD_AGENTS)
+def test_a_wrong_agents_file_says_line_and_field(text: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads(text, AgentsFile, source="a.yaml")
+    assert str(caught.value) == expected
+
+
+def test_a_model_file_is_found_beside_the_agents_file_that_names_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text(GOOD, encoding="utf-8")
+    (tmp_path / "agents.yaml").write_text("agents:\n  A: {model: mine.yaml}\n", encoding="utf-8")
+    spec = load_agents(tmp_path / "agents.yaml").agents["A"]
+    policy = Workshop().policy(spec)
+    assert isinstance(policy, LLMPolicy)
+    assert policy.client.endpoint == "http://h/v1"
+
+
+def test_agents_with_the_same_model_share_its_limits_and_not_its_connection(tmp_path: Path) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text(GOOD, encoding="utf-8")
+    workshop = Workshop()
+    a, b, c = (workshop.policy(WorkerSpec(model=name)) for name in ("scripted", "scripted", str(other)))
+    assert isinstance(a, LLMPolicy)
+    assert isinstance(b, LLMPolicy)
+    assert isinstance(c, LLMPolicy)
+    assert a.limits is b.limits
+    assert a.limits is not c.limits
+    assert a.limits.budget is c.limits.budget
+    assert a.client is not b.client
+
+
+def test_the_command_line_changes_what_a_file_says() -> None:
+    policy = Workshop(overrides={"base_url": "http://other:1/v1", "model": "silent"}).policy(
+        WorkerSpec(model="scripted")
+    )
+    assert isinstance(policy, LLMPolicy)
+    assert (policy.client.endpoint, policy.client.model) == ("http://other:1/v1", "silent")
+
+
+@pytest.fixture
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A directory that we are in, with a module `my_agent` of the user's in it."""
+    (tmp_path / "my_agent.py").write_text(
+        "def decide(briefing, observation):\n    return 'text'\n\n"
+        "class Mine:\n    async def decide(self, briefing, observation):\n        return 'text'\n\n"
+        "mine = Mine()\nnumber = 3\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "broken_agent.py").write_text("raise RuntimeError('half written')\n", encoding="utf-8")
+    (tmp_path / "lost_agent.py").write_text("import not_installed\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    before = list(sys.path)
+    yield tmp_path
+    sys.path[:] = before
+    for name in ("my_agent", "broken_agent", "lost_agent"):
+        sys.modules.pop(name, None)
+
+
+def test_a_policy_is_found_by_its_module_in_the_current_directory(module: Path) -> None:
+    assert isinstance(load_policy("my_agent:decide"), FunctionPolicy)
+    assert type(load_policy("my_agent:Mine")).__name__ == "Mine"
+    assert load_policy("my_agent:mine") is sys.modules["my_agent"].mine
+    assert isinstance(load_policy("silent"), Silent)
+
+
+BAD_POLICIES = [
+    ("my_agent", "'my_agent' is no policy: write 'silent' or module:name, such as my_agent:decide"),
+    ("nowhere:decide", "policy nowhere:decide: there is no module 'nowhere'"),
+    ("lost_agent:decide", "policy lost_agent:decide: there is no module 'not_installed'"),
+    ("my_agent:decide_not", "policy my_agent:decide_not: the module my_agent has no 'decide_not'"),
+    ("my_agent:number", "policy my_agent:number: it is no function and has no method `decide`"),
+    ("broken_agent:decide", "policy broken_agent:decide: importing it failed: RuntimeError: half written"),
+]
+
+
+@pytest.mark.parametrize(("name", "text"), BAD_POLICIES)
+def test_a_policy_that_cannot_be_had_is_one_clear_sentence(module: Path, name: str, text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_policy(name)
+    assert str(caught.value) == text
+
+
+BAD_SPECS = [
+    ("opnai", None, {}, "there is no model file 'opnai': did you mean openai?; a path to a .yaml file works too"),
+    ("no.yaml", None, {}, "no.yaml: there is no such file"),
+    ("deepseek", 1.0, {}, "deepseek: a budget needs the prices of the model, and there are none"),
+    ("scripted", None, {"base_url": "localhost"}, ("command line (base_url): 'localhost' is no URL that begins with "
+     "http:// or https://")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("model", "budget", "overrides", "text"), BAD_SPECS)
+def test_a_model_that_cannot_be_had_is_one_clear_sentence(
+    model: str, budget: float | None, overrides: dict[str, str], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DEEPSEEK_API_KEY", "sk-0123456789")
+    with pytest.raises(ConfigError) as caught:
+        Workshop(budget_usd=budget, overrides=overrides).policy(WorkerSpec(model=model))
+    assert str(caught.value) == text
