@@ -53,7 +53,7 @@ bench: install ## Measure what the README claims
 docs: install ## Write the generated pages of docs/reference
 	$(RUN)python -m docs.generate
 
-picture: install ## Play a battle and draw docs/images/2s3z.gif from its recording
+picture: install ## Play a battle and draw docs/images/2s3z.webp from its recording
 	$(RUN)python -m docs.picture
 
 clean: ## Remove what make made

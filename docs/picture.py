@@ -1,4 +1,4 @@
-"""Draws a recorded battle as a moving picture: `python -m docs.picture RECORDING OUT.gif`.
+"""Draws a recorded battle as a moving picture: `python -m docs.picture [RECORDING]`, which plays one if none is given.
 
 Everything on it comes out of the recording: where units stood and how they fared from the views, what the agents
 said from their replies, what came of it from the reports. Left the battlefield, right what the agents say.
@@ -6,6 +6,8 @@ said from their replies, what came of it from the reports. Left the battlefield,
 
 from __future__ import annotations
 
+import json
+import subprocess
 import sys
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -25,8 +27,10 @@ Image = np.ndarray
 Colour = tuple[int, int, int]
 
 FIELD, PANEL, HEIGHT, MARGIN = 460, 380, 460, 26
-BETWEEN = 2  # pictures from one step to the next
-FRAME_MS, LAST_MS = 60, 2500
+TASK = "2s3z_pair"
+OUT = Path(__file__).parent / "images" / "2s3z.webp"
+BETWEEN = 3  # pictures from one step to the next
+FRAME_MS, LAST_MS = 50, 3000
 
 BACKGROUND: Colour = (38, 27, 20)
 GROUND: Colour = (52, 38, 29)
@@ -160,7 +164,7 @@ class Painter:
             return
         kind = team.partition("-")[0]
         for tag, unit in now.units.items():
-            if unit.alliance == "own" and unit.type == kind:
+            if unit.alliance != "enemy" and unit.type == kind:
                 cv2.line(image, at[tag], at[target], (130, 110, 70), 1, cv2.LINE_AA)
 
     def _panel(self, image: Image, now: Moment) -> None:
@@ -200,7 +204,7 @@ def _unit(image: Image, at: tuple[int, int], unit: UnitView) -> None:
     radius, corners = RADIUS.get(unit.type, 10), CORNERS.get(unit.type, 12)
     turns = np.arange(corners) * 2 * np.pi / corners - np.pi / 2
     shape = np.stack([at[0] + radius * np.cos(turns), at[1] + radius * np.sin(turns)], axis=1).astype(np.int32)
-    cv2.fillPoly(image, [shape], OWN if unit.alliance == "own" else ENEMY, cv2.LINE_AA)
+    cv2.fillPoly(image, [shape], ENEMY if unit.alliance == "enemy" else OWN, cv2.LINE_AA)
     for share, colour, width in (
         (unit.shield / unit.shield_max if unit.shield_max else 0.0, SHIELD, radius + 6),
         (unit.health / unit.health_max, HEALTH, radius + 3),
@@ -225,23 +229,28 @@ def _wrap(text: str, width: int) -> Iterator[str]:
 
 
 def save(pictures: list[Image], path: Path) -> None:
-    """Writes the pictures as a GIF that runs for ever."""
+    """Writes the pictures as a WebP that runs for ever; a GIF of them is forty times as large."""
     animation = cv2.Animation(0, (0, 0, 0, 0))
     animation.frames = pictures
     animation.durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
-    if not cv2.imwriteanimation(str(path), animation):
+    if not cv2.imwriteanimation(str(path), animation, [cv2.IMWRITE_WEBP_QUALITY, 85]):
         raise SystemExit(f"{path} cannot be written")
 
 
+def play(task: str) -> Path:
+    """Plays a task and returns its recording."""
+    command = [sys.executable, "-m", "khala", "run", task, "--json"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)  # noqa: S603  # our own command line
+    return Path(json.loads(done.stdout)["recording"])
+
+
 def main() -> None:
-    """Draws `argv[1]` into `argv[2]`."""
-    match sys.argv[1:]:
-        case [recording, out]:
-            pictures = list(Painter(load(Path(recording))).pictures())
-            save(pictures, Path(out))
-            sys.stdout.write(f"{out}: {len(pictures)} pictures, {Path(out).stat().st_size / 1e6:.1f} MB\n")
-        case _:
-            raise SystemExit("usage: python -m docs.picture RECORDING OUT.gif")
+    """Draws the recording that is named, or one of a match that is played for it."""
+    recording = Path(sys.argv[1]) if len(sys.argv) > 1 else play(TASK)
+    pictures = list(Painter(load(recording)).pictures())
+    OUT.parent.mkdir(parents=True, exist_ok=True)
+    save(pictures, OUT)
+    sys.stdout.write(f"{OUT}: {len(pictures)} pictures, {OUT.stat().st_size / 1e6:.1f} MB\n")
 
 
 if __name__ == "__main__":
