@@ -1,8 +1,10 @@
 """The command line: mounts what the packages define, adds what needs all of them, and prints errors as one sentence."""
 
 import asyncio
+import itertools
 import json
 import logging
+import os
 import signal
 import sys
 from collections.abc import Callable, Coroutine, Iterator
@@ -231,7 +233,14 @@ def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
     loaded = change(load_task(task), **given)
     name = check_name(run or new_run_name(loaded.name), "run")
-    return MatchConfig(task=loaded, run=name, record=out / name / "recording.mcap", **match)
+    return MatchConfig(task=loaded, run=name, record=_free_recording(out / name), **match)
+
+
+def _free_recording(directory: Path) -> Path:
+    """A file for the recording that is not there yet: a run may be begun anew under its name, as containers do it."""
+    names = itertools.chain(["recording"], (f"recording-{number}" for number in itertools.count(2)))
+    paths = (directory / f"{name}.mcap" for name in names)
+    return next(path for path in paths if not os.path.exists(path))  # noqa: PTH110  # Path.exists raises where it may not look
 
 
 def _bus(connect: list[str] | None, listen: list[str] | None, *, insecure: bool) -> BusConfig:
