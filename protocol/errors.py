@@ -41,7 +41,7 @@ class ConfigError(KhalaError):
         self.source, self.line, self.field = source, line, field
         where = source or ""
         if line is not None:
-            where += f":{line}"
+            where += f":{line}" if where else f"line {line}"
         if field:
             where += f" ({field})" if where else field
         super().__init__(f"{where}: {message}" if where else message)

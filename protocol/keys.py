@@ -18,6 +18,7 @@ from protocol.errors import WrongKey
 
 ROOT = "khala"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_LONGEST_SHOWN = 200
 
 
 class Topic(StrEnum):
@@ -57,7 +58,7 @@ def check_name(name: str, what: str = "name") -> str:
     """
     if not _NAME.fullmatch(name):
         raise WrongKey(
-            f"{what} {name!r} cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
+            f"{what} {name[:_LONGEST_SHOWN]!r} cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
             "beginning with a letter or a digit"
         )
     return name
@@ -84,6 +85,8 @@ def alive_key(run: str, side: str, agent: str, instance: str) -> str:
 
 def every_agent(run: str, topic: Topic) -> str:
     """Expression that matches this topic of every agent of a run, on every side."""
+    if topic not in AGENT_TOPICS:
+        raise WrongKey(f"{topic} belongs to the run, not to an agent")
     tail = f"{Topic.ALIVE}/*" if topic is Topic.ALIVE else str(topic)
     return f"{ROOT}/{check_name(run, 'run')}/*/*/{tail}"
 
@@ -99,14 +102,16 @@ def parse(key: str) -> Address:
     Raises:
         WrongKey: it is none of the forms at the top of this module.
     """
-    match key.split("/"):
-        case [root, run, topic] if root == ROOT and topic in RUN_TOPICS:
-            return Address(run, Topic(topic))
-        case [root, run, side, agent, Topic.ALIVE, instance] if root == ROOT:
-            return Address(run, Topic.ALIVE, side, agent, instance)
-        case [root, run, side, agent, topic] if root == ROOT and topic in AGENT_TOPICS - {Topic.ALIVE}:
-            return Address(run, Topic(topic), side, agent)
-    raise WrongKey(f"{key!r} is no key of this protocol")
+    parts = key.split("/")
+    if all(_NAME.fullmatch(part) for part in parts):
+        match parts:
+            case [root, run, topic] if root == ROOT and topic in RUN_TOPICS:
+                return Address(run, Topic(topic))
+            case [root, run, side, agent, Topic.ALIVE, instance] if root == ROOT:
+                return Address(run, Topic.ALIVE, side, agent, instance)
+            case [root, run, side, agent, topic] if root == ROOT and topic in AGENT_TOPICS - {Topic.ALIVE}:
+                return Address(run, Topic(topic), side, agent)
+    raise WrongKey(f"{key[:_LONGEST_SHOWN]!r} is no key of this protocol")
 
 
 def _agent_root(run: str, side: str, agent: str) -> str:
