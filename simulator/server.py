@@ -76,6 +76,8 @@ async def serve(sock: socket.socket, session: Session) -> None:
     app.router.add_get(ENDPOINT, server.connect)
     runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
-    await web.SockSite(runner, sock).start()
-    await server.done.wait()
-    await runner.cleanup()
+    try:
+        await web.SockSite(runner, sock).start()
+        await server.done.wait()
+    finally:
+        await runner.cleanup()

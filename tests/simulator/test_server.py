@@ -1,0 +1,163 @@
+"""The websocket: frames of both kinds, connections that come and go, and the end of the process."""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator
+
+import aiohttp
+import pytest
+from aiohttp import WSMsgType
+from s2clientprotocol import common_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.__main__ import Arguments, listen, parse
+from simulator.client import interface
+from simulator.server import serve
+from simulator.session import Session
+
+Ws = aiohttp.ClientWebSocketResponse
+
+
+class Running:
+    """A server in this process, and clients that connect to it."""
+
+    def __init__(self, sock: socket.socket, http: aiohttp.ClientSession) -> None:
+        self.url = f"http://127.0.0.1:{sock.getsockname()[1]}"
+        self.http = http
+        self.task = asyncio.create_task(serve(sock, Session(".")))
+
+    async def connect(self) -> Ws:
+        return await self.http.ws_connect(f"{self.url}/sc2api", max_msg_size=0)
+
+
+@pytest.fixture
+async def running() -> AsyncIterator[Running]:
+    async with aiohttp.ClientSession() as http:
+        server = Running(listen("127.0.0.1", 0), http)
+        yield server
+        server.task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await server.task
+
+
+async def ask(ws: Ws, request: sc.Request, *, text: bool = False) -> sc.Response:
+    data = request.SerializeToString()
+    await (ws.send_frame(data, WSMsgType.TEXT) if text else ws.send_bytes(data))
+    return sc.Response.FromString(await ws.receive_bytes())
+
+
+PING = sc.Request(ping=sc.RequestPing(), id=255)
+
+
+@pytest.mark.parametrize("text", [True, False], ids=["text", "binary"])
+async def test_both_kinds_of_frames_carry_protobuf(running: Running, text: bool) -> None:
+    ws = await running.connect()
+    request = sc.Request(save_map=sc.RequestSaveMap(map_path="x", map_data=bytes(range(256))), id=255)
+    response = await ask(ws, request, text=text)  # no valid UTF-8, as most requests of PySC2
+    assert response.id == 255
+    assert response.HasField("save_map")
+
+
+async def test_a_frame_of_50_megabytes_is_a_request_like_any(running: Running) -> None:
+    ws = await running.connect()
+    request = sc.Request(save_map=sc.RequestSaveMap(map_path="big", map_data=bytes(50_000_000)))
+    assert (await ask(ws, request)).HasField("save_map")
+    assert (await ask(ws, PING)).ping.base_build == 75689
+
+
+async def test_garbage_is_answered_and_the_connection_lives_on(running: Running) -> None:
+    ws = await running.connect()
+    await ws.send_bytes(b"\xff\xfe garbage")
+    response = sc.Response.FromString(await ws.receive_bytes())
+    assert list(response.error) == ["The request is not a protobuf message of the SC2 API"]
+    assert (await ask(ws, PING)).HasField("ping")
+
+
+async def test_requests_in_a_row_are_answered_in_their_order(running: Running) -> None:
+    ws = await running.connect()
+    for number in range(20):
+        await ws.send_bytes(sc.Request(ping=sc.RequestPing(), id=number).SerializeToString())
+    answers = [sc.Response.FromString(await ws.receive_bytes()).id for _ in range(20)]
+    assert answers == list(range(20))
+
+
+async def test_a_game_survives_its_connection(running: Running) -> None:
+    ws = await running.connect()
+    create = sc.RequestCreateGame(
+        local_map=sc.LocalMap(map_path="2s3z"), player_setup=[sc.PlayerSetup(type=sc.Participant)]
+    )
+    await ask(ws, sc.Request(create_game=create))
+    await ws.close()
+    ws = await running.connect()
+    join = sc.RequestJoinGame(race=common_pb2.Protoss, options=interface())
+    assert (await ask(ws, sc.Request(join_game=join))).join_game.player_id == 1
+    await ws.close()
+    ws = await running.connect()
+    seen = await ask(ws, sc.Request(observation=sc.RequestObservation()))
+    assert len(seen.observation.observation.raw_data.units) == 10
+
+
+async def test_the_newest_client_is_served_and_the_one_before_is_dropped(running: Running) -> None:
+    vanished = await running.connect()
+    ws = await running.connect()
+    assert (await ask(ws, PING)).HasField("ping")
+    assert (await vanished.receive()).type in {WSMsgType.CLOSED, WSMsgType.CLOSE, WSMsgType.ERROR}
+
+
+async def test_a_connection_that_never_says_a_word_holds_nobody_up(running: Running) -> None:
+    port = int(running.url.rpartition(":")[2])
+    _, silent = await asyncio.open_connection("127.0.0.1", port)
+    ws = await running.connect()
+    assert (await ask(ws, PING)).HasField("ping")
+    silent.close()
+    await silent.wait_closed()
+
+
+async def test_only_the_endpoint_exists(running: Running) -> None:
+    async with running.http.get(f"{running.url}/") as response:
+        assert response.status == 404
+
+
+async def test_quit_is_answered_and_ends_the_server(running: Running) -> None:
+    ws = await running.connect()
+    response = await ask(ws, sc.Request(quit=sc.RequestQuit(), id=999999999))
+    assert (response.status, response.id) == (sc.quit, 999999999)
+    await asyncio.wait_for(running.task, 1)
+
+
+async def test_a_client_that_quits_without_reading_ends_the_server(running: Running) -> None:
+    ws = await running.connect()
+    await ws.send_bytes(sc.Request(quit=sc.RequestQuit()).SerializeToString())
+    await ws.close()
+    await asyncio.wait_for(running.task, 1)
+
+
+# the command line -----------------------------------------------------------------------------------------------------
+
+PYSC2 = "-listen 127.0.0.1 -port 15555 -dataDir /sc2/ -tempDir /tmp/sc-x/"
+
+
+@pytest.mark.parametrize(
+    ("argv", "arguments"),
+    [
+        (PYSC2, Arguments("127.0.0.1", 15555, "/sc2/", "/tmp/sc-x/")),
+        (f"{PYSC2} -dataVersion B89B", Arguments("127.0.0.1", 15555, "/sc2/", "/tmp/sc-x/", "B89B")),
+        (f"{PYSC2} -eglpath libEGL.so -verbose -headlessNoRender",
+         Arguments("127.0.0.1", 15555, "/sc2/", "/tmp/sc-x/")),
+        ("-listen ::1 -ipv6 -port 7", Arguments(host="::1", port=7)),
+        ("-listen [::1] -port 7", Arguments(host="::1", port=7)),
+        ("-displayMode 0 -windowwidth 640 -port 7", Arguments(port=7)),
+        ("-executable /x/Versions/Base92440/SC2_x64 -port 7", Arguments(port=7, base_build=92440)),
+        ("", Arguments()),
+        ("-port", Arguments()),
+    ],
+)  # fmt: skip
+def test_the_command_lines_of_clients_are_understood(argv: str, arguments: Arguments) -> None:
+    assert parse(argv.split()) == arguments
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_it_listens_on_both_kinds_of_addresses(host: str) -> None:
+    with listen(host, 0) as sock, socket.create_connection((host, sock.getsockname()[1]), timeout=1):
+        pass
