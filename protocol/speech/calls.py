@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import NoReturn
 
 from protocol.speech.marks import SHORT, Malformed
 
@@ -21,6 +22,7 @@ _NAKED = re.compile(
     r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+"
     r"(?P<call>(?P<name>[^\W\d][\w-]*+)\((?P<inside>[^()<>\n]*+(?:\([^()<>\n]*+\)[^()<>\n]*+)*+)\))"
 )
+_MORE_WORDS = re.compile(r"(?:[ \t]++\w++)++(?=[ \t]*+\()")
 _CLOSING_TAG = re.compile(r"</\s*+([^\W\d][\w-]*+)\s*+>")
 _HTML = re.compile(
     "a|b|body|br|center|code|div|em|font|h[1-6]|hr|html|i|img|li|ol|p|pre|s|span|strong|su[bp]|table|t[dhr]|u|ul",
@@ -81,6 +83,17 @@ def close_parentheses(text: str, at: int, name: str) -> tuple[int, int]:
         elif not opened:
             return match.start(), _close_angle(text, match.end(), name)
     raise Malformed(f"the call is not closed: end it with )> as in <{name[:SHORT]}(...)>")
+
+
+def refuse_words(text: str, opening: Opening) -> NoReturn:
+    """Says what is wrong with a name that neither `(` nor `>` follows.
+
+    Raises:
+        Malformed: always.
+    """
+    more = _MORE_WORDS.match(text, opening.end)
+    name = "_".join([opening.name, *(more.group().split() if more else [])])
+    raise Malformed(f"the name of a call is one word, its arguments stand in parentheses: write <{name[:SHORT]}(...)>")
 
 
 def close_bare(text: str, at: int) -> int | None:

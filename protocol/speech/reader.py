@@ -24,6 +24,7 @@ from protocol.speech.calls import (
     is_talk,
     naked_at,
     opening_at,
+    refuse_words,
     segment_end,
 )
 from protocol.speech.headings import SENTENCE_END, Heading, Section, heading_at, tag_heading_at
@@ -189,10 +190,7 @@ class _Walk:
         if not opening.has_parenthesis:
             end = close_bare(self._plain, opening.end)
             if end is None:
-                reason = (
-                    f"the name of a call is one word, its arguments stand in parentheses: write <{name[:SHORT]}(...)>"
-                )
-                raise Malformed(reason)
+                refuse_words(self._plain, opening)
             if is_markup(name, self._closing_tags):
                 return end
         elif name.lower() in MESSAGE_NAMES:

@@ -321,7 +321,7 @@ FAULTS = [
     (
         "<Attack Unit(0x1)>",
         "<Attack Unit(0x1)>",
-        "the name of a call is one word, its arguments stand in parentheses: write <Attack(...)>",
+        "the name of a call is one word, its arguments stand in parentheses: write <Attack_Unit(...)>",
     ),
     (
         "<Attack_Unit[0x1]>",
