@@ -132,3 +132,22 @@ def battle() -> list[raw_pb2.Unit]:
 @pytest.fixture
 def tasks_dir() -> Path:
     return TASKS
+
+
+TEAMS = {  # table D3 of the paper: how many units each team has to begin with
+    "2s3z": {"Zealot-1": 2, "Zealot-2": 1, "Stalker-1": 2},
+    "3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
+    "1c3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3, "Colossus-1": 1},
+    "3s5z_vs_3s6z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
+    "2c_vs_64zg": {"Colossus-1": 1, "Colossus-2": 1},
+    "2s_vs_1sc": {"Stalker-1": 1, "Stalker-2": 1},
+    "3s_vs_3z": {"Stalker-1": 3},
+    "3s_vs_4z": {"Stalker-1": 3},
+    "3s_vs_5z": {"Stalker-1": 3},
+}
+
+
+@pytest.fixture
+def paper_teams() -> dict[str, dict[str, int]]:
+    """By task and team: how many units the team has to begin with."""
+    return TEAMS

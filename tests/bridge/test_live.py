@@ -10,6 +10,7 @@ import pytest
 from bridge.act import Actor, executor_of
 from bridge.errors import GameError
 from bridge.game import GameConfig, Turn
+from bridge.maps import known_maps
 from bridge.observe import Feedback, Observer
 from bridge.pysc2_game import PySC2Game
 from protocol.speech import parse
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from bridge.snapshot import Snapshot
     from bridge.task import TaskConfig
 
-    Play = Callable[[str], "Battle"]
+    Play = Callable[..., "Battle"]
 
 pytestmark = pytest.mark.game
 
@@ -89,6 +90,17 @@ def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
     yield begin
     for game in games:
         game.close()
+
+
+@pytest.mark.parametrize("name", list(known_maps()))
+def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
+    name: str, start: Play, paper_teams: dict[str, dict[str, int]]
+) -> None:
+    battle = start("raw", name)
+    (agent,) = battle.observer.observe(battle.now).agents.values()
+    assert {team.view.name: len(team.view.units) for team in agent.teams} == paper_teams[name]
+    battle.turn(focus_fire)
+    assert battle.reasons == []
 
 
 @pytest.mark.parametrize("executor", ["raw", "screen"])

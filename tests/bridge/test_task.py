@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from bridge.maps import known_maps
 from bridge.task import TaskConfig
 from protocol.configfile import load, loads
 from protocol.errors import ConfigError
@@ -14,17 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-TEAMS = {  # table D3 of the paper: how many units each team has to begin with
-    "2s3z": {"Zealot-1": 2, "Zealot-2": 1, "Stalker-1": 2},
-    "3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
-    "1c3s5z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3, "Colossus-1": 1},
-    "3s5z_vs_3s6z": {"Zealot-1": 2, "Zealot-2": 2, "Zealot-3": 1, "Stalker-1": 3},
-    "2c_vs_64zg": {"Colossus-1": 1, "Colossus-2": 1},
-    "2s_vs_1sc": {"Stalker-1": 1, "Stalker-2": 1},
-    "3s_vs_3z": {"Stalker-1": 3},
-    "3s_vs_4z": {"Stalker-1": 3},
-    "3s_vs_5z": {"Stalker-1": 3},
-}
 GOOD = """\
 name: duel
 map: 2s3z
@@ -39,12 +29,14 @@ agents:
 """
 
 
-@pytest.mark.parametrize("name", list(TEAMS))
-def test_a_task_of_llm_smac_has_the_agent_and_teams_of_the_paper(name: str, task: Callable[..., TaskConfig]) -> None:
+@pytest.mark.parametrize("name", list(known_maps()))
+def test_a_task_of_llm_smac_has_the_agent_and_teams_of_the_paper(
+    name: str, task: Callable[..., TaskConfig], paper_teams: dict[str, dict[str, int]]
+) -> None:
     config = task(name)
     (agent,) = config.agents
     assert (config.name, agent.name, config.map_spec.difficulty) == (name, "CombatGroupSmac", "very_hard")
-    assert [team.name for team in agent.teams] == list(TEAMS[name])
+    assert [team.name for team in agent.teams] == list(paper_teams[name])
     assert config.clock.rule == "frozen"
 
 
