@@ -1,0 +1,240 @@
+"""What a turn costs besides the model: wall time of a step for 1 to 128 agents at an endpoint of fixed latency.
+
+Host, agents (in two processes) and endpoint share this machine; observations are those of a real battle, 2s3z in its
+sixth second, each agent with an observer and an actor of its own. Beside it, in the same run, stands the way of the
+first implementation: threads that poll (`bench.original`). The parts are those of the agent whose reply came last:
+
+    build     observers: views and texts of all agents          agent    prompt, parsing and sending, without HTTP
+    publish   until its observation was put                     http     the request beyond the endpoint's latency
+    bus       the way to it and back, with coding               merge    speech, recognition and translation of all
+
+Run `python -m bench.turn`; `--json` for one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import json
+import statistics
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from bench.original import step_s
+from bridge.act import Actor
+from bridge.observe import Observer
+from khala import games
+from khala.children import Children
+from khala.local import one_side, shares
+from orchestrator.announce import Announcer
+from orchestrator.brief import briefing
+from orchestrator.config import MatchConfig, load_task
+from orchestrator.roster import Roster, Seat
+from orchestrator.turn import Turn
+from protocol.bus import Delivery
+from protocol.bus.config import BusConfig
+from protocol.bus.zenoh import open_bus
+from protocol.codec import decode_as
+from protocol.keys import Topic, every_agent
+from protocol.messages import Exchange, Observation, Run
+from protocol.speech import parse
+
+if TYPE_CHECKING:
+    from bridge.snapshot import Snapshot
+    from bridge.task import TaskConfig
+    from orchestrator.turn import Answer, Answers
+    from protocol.bus import Bus, Sample, Subscription
+
+GOALS_MS = {1: 10, 8: 20, 32: 45, 128: 150}
+PARTS = ("build", "publish", "bus", "agent", "http", "merge")
+AGENT_PROCESSES = 2
+LATENCY_S = 1.0
+BATTLE_STEPS = 12
+
+
+@dataclass
+class Measured:
+    """One number of agents, measured."""
+
+    agents: int
+    step_s: list[float] = field(default_factory=list)
+    parts_s: dict[str, list[float]] = field(default_factory=lambda: {part: [] for part in PARTS})
+    original_s: list[float] = field(default_factory=list)
+    observation_bytes: int = 0
+
+    def row(self, latency_s: float) -> dict[str, float]:
+        """Medians, in milliseconds, without the endpoint's latency."""
+        row = {"agents": self.agents, "over": 1000 * (statistics.median(self.step_s) - latency_s)}
+        row |= {part: 1000 * statistics.median(values) for part, values in self.parts_s.items()}
+        row["original"] = 1000 * (statistics.median(self.original_s) - latency_s) if self.original_s else 0.0
+        return row | {"goal": float(GOALS_MS.get(self.agents, 0)), "observation_bytes": self.observation_bytes}
+
+
+class Bench:
+    """Host's side of a turn, with the real parts around a snapshot that stays."""
+
+    def __init__(self, bus: Bus, run: str, task: TaskConfig, snapshot: Snapshot, agents: int) -> None:
+        self.bus, self.run, self.task, self.snapshot = bus, run, task, snapshot
+        self.seats = [Seat(task.side, f"Agent{number}") for number in range(agents)]
+        self.observers = {seat: Observer(task) for seat in self.seats}
+        self.actors = {seat: Actor(task) for seat in self.seats}
+        self.exchanges: dict[str, Exchange] = {}
+        self.arrived = asyncio.Event()
+
+    async def measure(self, steps: int, children: Children, options: list[str]) -> Measured:
+        """Starts the agents, plays `steps` steps and one to warm up."""
+        names = [seat.agent for seat in self.seats]
+        for number, share in enumerate(shares(names, AGENT_PROCESSES)):
+            await children.start(f"{self.run}-{number}", "agent", *share, "--run", self.run, *options)
+        measured = Measured(len(names))
+        async with (
+            Announcer(self.bus, self.run, self.seats) as announcer,
+            Roster(self.bus, self.run, self.seats) as roster,
+            Turn(self.bus, self.run, roster) as turn,
+        ):
+            log = await self.bus.subscribe(every_agent(self.run, Topic.EXCHANGE), Delivery.LOG, depth=4096)
+            listening = asyncio.create_task(self._listen(log))
+            await announcer.run(_card(self.run, self.task))
+            for seat in self.seats:
+                agent = self.task.agents[0].model_copy(update={"name": seat.agent})
+                await announcer.brief(briefing(self.task, agent, self.run, 0))
+            await roster.assemble(self.seats, 120)
+            for number in range(steps + 1):
+                await self._step(turn, number, measured if number else Measured(0))
+            await log.close()
+            await listening
+        return measured
+
+    async def _step(self, turn: Turn, number: int, measured: Measured) -> None:
+        began = time.perf_counter()
+        sights = {seat: observer.observe(self.snapshot) for seat, observer in self.observers.items()}
+        observations = {seat: self._observation(seat, number, sights[seat].agents) for seat in self.seats}
+        built = time.perf_counter()
+        answers = await turn.ask(observations)
+        asked = time.perf_counter()
+        for seat, answer in answers.by_seat.items():
+            assert answer.status == "ok", answer
+            self.actors[seat].joint(sights[seat], {self.task.agents[0].name: parse(answer.text or "")})
+        ended = time.perf_counter()
+        measured.step_s.append(ended - began)
+        measured.observation_bytes = len(next(iter(observations.values())).model_dump_json())
+        await self._told()
+        for part, value in self._last(answers, asked - built).items():
+            measured.parts_s[part].append(value)
+        measured.parts_s["build"].append(built - began)
+        measured.parts_s["merge"].append(ended - asked)
+
+    def _last(self, answers: Answers, ask_s: float) -> dict[str, float]:
+        """The parts of the agent whose reply came last."""
+
+        def arrival(item: tuple[Seat, Answer]) -> float:
+            return item[1].latency_s or 0.0
+
+        seat, answer = max(answers.by_seat.items(), key=arrival)
+        assert answer.reply is not None and answer.latency_s is not None
+        request = self.exchanges[seat.agent]
+        return {
+            "publish": ask_s - answer.latency_s,
+            "bus": answer.latency_s - answer.reply.latency_s,
+            "agent": answer.reply.latency_s - request.latency_s,
+            "http": request.latency_s - LATENCY_S,
+        }
+
+    def _observation(self, seat: Seat, number: int, agents: Any) -> Observation:
+        (seen,) = agents.values()
+        return Observation(
+            run=self.run, agent=seat.agent, side=seat.side, episode=0, step=number, game_loop=8 * number,
+            answer_within_s=30, text=seen.text, view=seen.view,
+        )  # fmt: skip
+
+    async def _listen(self, log: Subscription[Sample]) -> None:
+        async for sample in log:
+            exchange = decode_as(Exchange, sample.payload)
+            self.exchanges[exchange.agent] = exchange
+            self.arrived.set()
+
+    async def _told(self) -> None:
+        """Waits until the exchanges of the step are here; they may be a moment later than the replies."""
+        while len(self.exchanges) < len(self.seats):
+            self.arrived.clear()
+            async with asyncio.timeout(10):
+                await self.arrived.wait()
+
+
+def _card(run: str, task: TaskConfig) -> Run:
+    return Run(
+        run=run, task=task.name, map_name=task.map, map_sha256="", seed=0, episodes=1, game="none", executor="raw",
+        clock=task.clock, agents=(), catalogue_sha256="", versions={},
+    )  # fmt: skip
+
+
+async def battle(task: TaskConfig) -> Snapshot:
+    """A snapshot from the middle of a battle."""
+    sc2path, _ = games.find("simulator")
+    async with one_side(MatchConfig(task=task, run="bench"), sc2path) as game:
+        snapshot = await game.reset()
+        for _ in range(BATTLE_STEPS):
+            snapshot = (await game.act([])).snapshot
+    return snapshot
+
+
+async def measure(agents: list[int], steps: int, original_steps: int) -> list[Measured]:
+    """Measures every number of agents, ours and the original's way."""
+    task = load_task("2s3z")
+    snapshot = await battle(task)
+    found = []
+    async with contextlib.AsyncExitStack() as stack:
+        logs = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        children = await stack.enter_async_context(Children(logs))
+        llm = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S))
+        bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+        stack.push_async_callback(bus.close)
+        options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
+        for count in agents:
+            async with Children(logs) as workers:
+                bench = Bench(bus, f"bench-{count}", task, snapshot, count)
+                measured = await bench.measure(steps, workers, [*options, "--model-name", "silent"])
+            text = next(iter(Observer(task).observe(snapshot).agents.values())).text
+            measured.original_s = await asyncio.to_thread(
+                step_s, llm["base_url"], "silent", [text] * count, original_steps
+            )
+            found.append(measured)
+    return found
+
+
+def table(rows: list[dict[str, float]]) -> Table:
+    """The figures, in milliseconds over the endpoint's latency."""
+    shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms")
+    for column in ("agents", "over", "goal", *PARTS, "original"):
+        shown.add_column(column, justify="right")
+    for row in rows:
+        shown.add_row(*(f"{row[column]:.0f}" if column in {"agents", "goal"} else f"{row[column]:.1f}"
+                        for column in ("agents", "over", "goal", *PARTS, "original")))  # fmt: skip
+    return shown
+
+
+def main() -> None:
+    """Measures, and prints a table or a JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--agents", type=int, nargs="+", default=list(GOALS_MS))
+    parser.add_argument("--steps", type=int, default=10)
+    parser.add_argument("--original-steps", type=int, default=3)
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
+    arguments = parser.parse_args()
+    measured = asyncio.run(measure(arguments.agents, arguments.steps, arguments.original_steps))
+    rows = [one.row(LATENCY_S) for one in measured]
+    Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
+    if arguments.json:
+        print(json.dumps({"latency_s": LATENCY_S, "rows": rows}))
+
+
+if __name__ == "__main__":
+    main()
