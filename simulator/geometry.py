@@ -35,12 +35,17 @@ def facing(vector: Floats) -> Floats:
 def turn_towards(current: Floats, wanted: Floats, cos_step: Floats, sin_step: Floats) -> Floats:
     """Turn unit vectors (n, 2) towards ``wanted`` by at most the angle whose cosine and sine are given (n,).
 
-    Where the wanted direction is within the step it is reached exactly; straight backwards turns left.
+    Where the wanted direction is within the step it is reached exactly; straight backwards turns left. A wanted
+    vector of length zero turns nothing.
     """
     cx, cy = current[:, 0], current[:, 1]
     wx, wy = wanted[:, 0], wanted[:, 1]
     cos_error = cx * wx + cy * wy
     reached = cos_error >= cos_step
+    nowhere = (wx == 0.0) & (wy == 0.0)
+    if np.count_nonzero(nowhere):
+        wanted = np.where(nowhere[:, None], current, wanted)
+        reached |= nowhere
     if np.count_nonzero(reached) == len(reached):
         return wanted
     sine = np.where(cx * wy - cy * wx >= 0.0, sin_step, -sin_step)

@@ -46,8 +46,11 @@ class Mechanics:
     push_idle: float
     blocked_share: float
     detour_after: int
+    detour_period: int
     detour_loops: int
     crowd_share: float
+    crowd_near: float
+    crowd_patience: int
     vision_period: int
     high_ground_step: float
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator import geometry
 from simulator.arrays import which
 from simulator.traits import Layer
 
@@ -28,6 +29,7 @@ Bools = NDArray[np.bool_]
 FIELDS_KEPT: Final = 2048
 SIDE_CLEARANCE: Final = 0.3
 SAMPLE_STEP: Final = 0.35
+NEAR_SIDE: Final = 0.2
 LOOK_AHEAD: Final = (1, 2, 3, 5, 8, 12, 18, 26)
 NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
@@ -62,19 +64,21 @@ class Surface:
         """Centres (..., 2) of cells."""
         return np.stack([cells % self.width + 0.5, cells // self.width + 0.5], axis=-1)
 
-    def nearest(self, point: Floats, part: int) -> int:
-        """The cell of a connected part whose centre is nearest to ``point``."""
+    def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
+        """The cell of a connected part nearest to ``point``; of nearly equal ones that on the side of ``start``."""
         members = self._members[part]
-        offset = self.centre(members) - point
-        return int(members[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
+        centres = self.centre(members)
+        distance = geometry.length(centres - point)
+        if start is not None:
+            distance += NEAR_SIDE * geometry.length(centres - start)
+        return int(members[np.argmin(distance)])
 
     def nearest_free(self, point: Floats) -> int | None:
         """The free cell nearest to ``point`` over all parts, or None when nothing is free."""
         candidates = [self.nearest(point, part) for part in range(len(self._members))]
         if not candidates:
             return None
-        offset = self.centre(np.array(candidates)) - point
-        return candidates[int(np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2))]
+        return candidates[int(np.argmin(geometry.length(self.centre(np.array(candidates)) - point)))]
 
     # lines --------------------------------------------------------------------------------------------------------
 

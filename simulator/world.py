@@ -84,7 +84,9 @@ COLUMNS: Final[tuple[tuple[str, type, int, float], ...]] = (
     ("nav_end", np.bool_, 0, 0),
     ("blocked", np.int64, 0, 0),
     ("detour", np.int64, 0, 0),
-    ("detour_loop", np.int64, 0, 0),
+    ("detour_end", np.int64, 0, 0),
+    ("detour_review", np.int64, 0, 0),
+    ("aside", np.float64, 2, 0),
 )
 # What follows from type, owner and upgrades, or is written anew in every loop before it is read.
 TRAITS: Final[tuple[tuple[str, type, int, float], ...]] = (
@@ -185,8 +187,10 @@ class World:
     nav_straight: Bools  # (capacity,) the straight line to the goal is free
     nav_end: Bools  # (capacity,) no way leads nearer to the goal
     blocked: Ints  # (capacity,) loops without progress in a row
-    detour: Ints  # (capacity,) side of a detour, -1 right, 1 left, 0 none
-    detour_loop: Ints  # (capacity,) loop at which the detour ends
+    detour: Ints  # (capacity,) side on which it goes around bodies, -1 right, 1 left, 0 none
+    detour_end: Ints  # (capacity,) loop at which it forgets that side
+    detour_review: Ints  # (capacity,) loop at which it looks for a heading again
+    aside: Floats  # (capacity, 2) heading around bodies, zero when the way itself is free
 
     radius: Floats  # (capacity,) body for ranges
     separation: Floats  # (capacity,) body for pushing
@@ -300,6 +304,7 @@ class World:
         self.queue[slot] = []
         for column in (self.target, self.order_target, self.attacker):
             column[column == slot] = NOBODY
+        self.hurt = [pair for pair in self.hurt if slot not in pair]
         self.missiles.forget(slot)
         self.pending.forget(slot)
         self.ground.unblock(slot)

@@ -16,6 +16,7 @@ import numpy as np
 from simulator import geometry
 from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
+from simulator.systems import avoidance
 from simulator.traits import Layer
 from simulator.world import NOBODY
 
@@ -242,12 +243,4 @@ def _note_blocked(world: World, slots: Ints, before: Floats, after: Floats) -> N
     world.blocked[slots] = blocked
     stuck = which(hindered & (blocked % MECHANICS.detour_after == 0))
     if stuck.size:
-        _send_around(world, slots[stuck], intended[stuck], (real - intended)[stuck])
-
-
-def _send_around(world: World, slots: Ints, intended: Floats, shift: Floats) -> None:
-    """Begin a detour to the side the obstacle pushes to; one that leads nowhere is tried on the other side."""
-    side = np.where(intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0] >= 0.0, 1, -1)
-    under_way = world.detour[slots] != 0
-    world.detour[slots] = np.where(under_way, -world.detour[slots], side)
-    world.detour_loop[slots] = world.loop + MECHANICS.detour_loops
+        avoidance.begin(world, slots[stuck], (real - intended)[stuck])

@@ -1,4 +1,4 @@
-"""Movement: steps towards the next corner, acceleration, turning, and detours around bodies.
+"""Movement: steps towards the next corner, along the headings of ``avoidance``, acceleration and turning.
 
 Everybody steps as if alone; ``collision`` then carries the steps out, pushes bodies apart and off the walls, and
 notes who was blocked.
@@ -6,7 +6,6 @@ notes who was blocked.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +15,7 @@ from simulator.arrays import some, which
 
 if TYPE_CHECKING:
     from simulator.geometry import Floats
-    from simulator.world import Ints, World
-
-DETOUR_COS = math.cos(math.radians(70.0))
-DETOUR_SIN = math.sin(math.radians(70.0))
+    from simulator.world import Bools, Ints, World
 
 
 def move(world: World) -> None:
@@ -46,7 +42,11 @@ def _walk(world: World, walkers: Ints) -> None:
     speed = np.minimum(world.speed.take(walkers) + world.step_gain.take(walkers), _top_speed(world, walkers, pos))
     left = distance - world.stop_at.take(walkers) * world.nav_straight.take(walkers)
     step = np.minimum(speed, np.maximum(left, 0.0))
-    direction = _turned_aside(world, walkers, direction)
+    aside = world.aside.take(walkers, 0)
+    if np.count_nonzero(aside):
+        turned: Bools = (aside[:, 0] != 0.0) | (aside[:, 1] != 0.0)
+        turned &= world.detour.take(walkers) != 0
+        direction = np.where(turned[:, None], aside, direction)
     world.speed[walkers] = speed
     world.intended[walkers] = direction * step[:, None]
     facing = world.heading.take(walkers, 0)
@@ -66,20 +66,6 @@ def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
         y = np.clip(pos[:, 1].astype(np.int64), 0, height - 1)
         speed = np.where(world.map.terrain.creep[y, x], speed * world.creep_factor.take(walkers), speed)
     return speed
-
-
-def _turned_aside(world: World, walkers: Ints, direction: Floats) -> Floats:
-    """Directions of walkers on a detour, turned to their side."""
-    side = world.detour.take(walkers)
-    if not np.count_nonzero(side):
-        return direction
-    over = (side != 0) & (world.detour_loop.take(walkers) <= world.loop)
-    world.detour[walkers[over]] = 0
-    side = np.where(over, 0, side)
-    aside = np.empty_like(direction)
-    aside[:, 0] = direction[:, 0] * DETOUR_COS - direction[:, 1] * DETOUR_SIN * side
-    aside[:, 1] = direction[:, 1] * DETOUR_COS + direction[:, 0] * DETOUR_SIN * side
-    return np.where((side != 0)[:, None], aside, direction)
 
 
 def _face_targets(world: World) -> None:

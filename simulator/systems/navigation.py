@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator import geometry
 from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
+    from simulator.geometry import Floats
     from simulator.world import Ints, World
 
 CORNER_REACHED = 0.4
@@ -51,7 +53,9 @@ def find_ways(world: World) -> None:
 def _look_over(world: World, slots: Ints, layer: Layer) -> None:
     goal = world.goal[slots]
     surface = world.ground.surface(layer)
-    straight = np.ones(len(slots), dtype=np.bool_) if layer is Layer.AIR else surface.clear(world.pos[slots], goal)
+    straight = np.ones(len(slots), dtype=np.bool_)
+    if layer is not Layer.AIR:
+        straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))
     world.nav_straight[slots] = straight
     world.nav_end[slots] = False
     world.nav_point[slots] = goal
@@ -63,7 +67,7 @@ def _look_over(world: World, slots: Ints, layer: Layer) -> None:
     parts = surface.part[surface.cell(start)]
     usable = parts >= 0
     for i in np.flatnonzero(usable & (surface.part[cells] != parts)).tolist():
-        cells[i] = surface.nearest(world.goal[crooked[i]], int(parts[i]))
+        cells[i] = surface.nearest(world.goal[crooked[i]], int(parts[i]), start[i])
     crooked, start, cells = crooked[usable], start[usable], cells[usable]
     if crooked.size:
         centre = surface.centre(cells)
@@ -71,3 +75,12 @@ def _look_over(world: World, slots: Ints, layer: Layer) -> None:
         world.nav_point[crooked] = np.where(at_goal[:, None], centre, surface.corners(start, cells))
         offset = centre - start
         world.nav_end[crooked] = at_goal & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
+
+
+def _stopping_point(world: World, slots: Ints, goal: Floats) -> Floats:
+    """(k, 2) where each unit would stop on a straight way; a target on a footprint is reached from beside it."""
+    offset = world.pos.take(slots, 0) - goal
+    distance = geometry.length(offset)
+    share = np.minimum(world.stop_at.take(slots) / np.maximum(distance, 1e-12), 1.0)
+    result: Floats = goal + offset * share[:, None]
+    return result

@@ -13,7 +13,7 @@ from simulator.world import NO_TAG, NOBODY
 if TYPE_CHECKING:
     from simulator.world import World
 
-PACKED_AFTER_LOOPS = 5
+PACKED_AFTER_LOOPS = 2
 
 
 def carry_out(world: World) -> None:
@@ -44,7 +44,10 @@ def _arrived(world: World) -> list[int]:
 
 
 def _packed(world: World, slot: int, squared: float) -> bool:
-    """Whether friends' bodies fill the ground between a blocked unit and its goal."""
+    """Whether friends' bodies fill the ground between a blocked unit and its goal, or keep it out for long nearby."""
+    near = world.separation[slot] + MECHANICS.crowd_near
+    if world.blocked[slot] >= MECHANICS.crowd_patience and squared < near**2:
+        return True
     friends = world.units_of(int(world.owner[slot]))
     friends = friends[(world.layer_bits[friends] & world.layer_bits[slot] != 0) & (friends != slot)]
     offset = world.pos[friends] - world.order_point[slot]
@@ -60,7 +63,7 @@ def _next(world: World, slot: int) -> None:
         here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
         world.order_point[slot], world.order_origin[slot] = there, here
         world.nav_end[slot] = False
-        world.nav_loop[slot] = world.blocked[slot] = 0
+        world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
         return
     order: Order | None = None
     while waiting and order is None:

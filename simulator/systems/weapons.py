@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simulator.world import Bools, Ints, World
 
 NOT_STARTED = -1.0
+LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadiusLarge
 
 
 def fire(world: World) -> None:
@@ -134,6 +135,9 @@ def _condition(world: World, name: str, target: Ints) -> Bools:
     if name == "GroundUnitFilter":
         on_ground: Bools = (world.plane_bits[target] & GROUND_PLANE) != 0
         return on_ground
+    if name in ("TargetRadiusSmall", "TargetRadiusLarge"):
+        large: Bools = world.radius[target] >= LARGE_RADIUS
+        return large if name == "TargetRadiusLarge" else ~large
     if name == "IsStructure":
         walled: Bools = world.walled[target]
         return walled

@@ -1,0 +1,205 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from simulator import commands
+from simulator.orders import OrderKind
+
+
+def test_an_idle_unit_engages_an_enemy_within_its_scan_range(field: Any) -> None:
+    world = field.world
+    zealot, foe = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 14, 16)
+    world.acquires[foe] = False
+    field.play(4)
+    assert world.target[zealot] == foe
+    assert [o.kind for o in world.orders_of(zealot)] == [OrderKind.ATTACK_UNIT]
+    assert world.orders_of(zealot)[0].target == world.tag_of(foe)
+
+
+@pytest.mark.parametrize(
+    ("name", "scan"),
+    [("Zealot", 5.0), ("Stalker", 6.5), ("Colossus", 7.5), ("Zergling", 5.0), ("Marine", 5.5), ("SiegeTankSieged", 13)],
+)
+def test_the_scan_range_is_the_larger_of_range_and_the_least_scan(field: Any, name: str, scan: float) -> None:
+    world = field.world
+    for gap, seen in ((scan - 0.05, True), (scan + 0.05, False)):
+        unit = field.put(name, 1, 5, 16)
+        distance = gap + world.radius[unit] + 0.375
+        foe = field.put("Zergling", 2, 5 + distance, 16)
+        world.acquires[foe] = False
+        field.play(4)
+        assert bool(world.target[unit] == foe) is seen
+        commands.debug_kill(world, [world.tag_of(unit), world.tag_of(foe)])
+        field.play(1)
+
+
+def test_a_plain_walk_looks_at_nobody(field: Any) -> None:
+    world = field.world
+    zealot, foe = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 16, 17.2)
+    world.acquires[foe] = False
+    commands.move(world, [zealot], (28, 16))
+    for _ in field.loops(130):
+        assert world.target[zealot] == -1
+    assert world.life[foe] == 35
+    assert math.dist(world.pos[zealot], (28, 16)) < 1
+
+
+def test_an_attack_move_fights_and_then_goes_on_to_its_point(field: Any) -> None:
+    world = field.world
+    stalker, foe = field.put("Stalker", 1, 5, 16), field.put("Zergling", 2, 14, 19)
+    world.acquires[foe] = False
+    commands.attack_move(world, [stalker], (24, 16))
+    field.play(240)
+    assert not world.alive[foe]
+    assert math.dist(world.pos[stalker], (24, 16)) < 0.1
+
+
+def test_a_unit_that_holds_fires_but_does_not_walk(field: Any) -> None:
+    world = field.world
+    stalker = field.put("Stalker", 1, 10, 16)
+    near, far = field.put("Zergling", 2, 16, 16), field.put("Zergling", 2, 18.2, 16)
+    world.acquires[near] = world.acquires[far] = False
+    commands.hold(world, [stalker])
+    field.play(150)
+    assert not world.alive[near]
+    assert world.life[far] == 35
+    assert world.pos[stalker].tolist() == [10, 16]
+
+
+def test_the_nearest_of_the_most_urgent_targets_is_chosen(field: Any) -> None:
+    world = field.world
+    stalker = field.put("Stalker", 1, 10, 16)
+    hatchery = field.put("Hatchery", 2, 14.5, 16.5)  # priority 11
+    far, near = field.put("Zergling", 2, 16, 13), field.put("Zergling", 2, 15, 19)
+    for slot in (far, near, hatchery):
+        world.acquires[slot] = False
+    field.play(4)
+    assert world.target[stalker] == near
+
+
+def test_ground_weapons_do_not_engage_flyers(field: Any) -> None:
+    world = field.world
+    zealot, stalker = field.put("Zealot", 1, 10, 16), field.put("Stalker", 1, 10, 14)
+    overlord = field.put("Overlord", 2, 12, 16)
+    field.play(8)
+    assert world.target[zealot] == -1
+    assert world.target[stalker] == overlord
+
+
+def test_a_colossus_can_be_hit_from_the_ground_and_from_the_air(field: Any) -> None:
+    world = field.world
+    colossus = field.put("Colossus", 1, 16, 16)
+    zergling, corruptor = field.put("Zergling", 2, 14, 16), field.put("Corruptor", 2, 18, 18)
+    world.acquires[colossus] = False
+    field.play(4)
+    assert world.target[zergling] == world.target[corruptor] == colossus
+
+
+def test_neutral_units_are_left_alone(field: Any) -> None:
+    world = field.world
+    stalker = field.put("Stalker", 1, 10, 16)
+    field.put("MineralField", 0, 14, 16.5)
+    field.play(20)
+    assert world.target[stalker] == -1
+
+
+def test_workers_do_not_pick_fights(field: Any) -> None:
+    world = field.world
+    probe, foe = field.put("Probe", 1, 10, 16), field.put("Zergling", 2, 12, 16)
+    world.acquires[foe] = False
+    field.play(20)
+    assert world.target[probe] == -1
+    assert commands.attack_unit(world, [probe], world.tag_of(foe)) == [probe]
+    field.play(20)
+    assert world.target[probe] == foe
+
+
+def test_a_unit_under_attack_turns_on_an_attacker_beyond_its_scan_range_and_calls_its_friends(field: Any) -> None:
+    world = field.world
+    tank = field.put("SiegeTankSieged", 2, 4, 16)
+    zealot, friend = field.put("Zealot", 1, 16, 16), field.put("Zealot", 1, 19, 16)
+    stranger = field.put("Zealot", 1, 22, 22)
+    field.play(12)
+    assert world.target[zealot] == world.target[friend] == tank
+    assert world.target[stranger] == -1
+
+
+def test_an_idle_unit_goes_back_after_a_fight(field: Any) -> None:
+    world = field.world
+    zealot, foe = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 15, 16)
+    world.acquires[foe] = False
+    field.play(160)
+    assert not world.alive[foe]
+    assert math.dist(world.pos[zealot], (10, 16)) < 0.6
+
+
+def test_an_idle_unit_gives_a_chase_up_at_the_end_of_its_leash(field: Any) -> None:
+    world = field.world
+    zealot, bait = field.put("Zealot", 1, 3, 16), field.put("Zergling", 2, 7, 16)
+    world.acquires[bait] = False
+    field.play(4)
+    assert world.target[zealot] == bait
+    commands.move(world, [bait], (31, 16))
+    farthest = 0.0
+    for _ in field.loops(450):
+        farthest = max(farthest, float(world.pos[zealot, 0]) - 3)
+    assert 20.5 < farthest < 22.5
+    assert math.dist(world.pos[zealot], (3, 16)) < 0.6
+
+
+def test_a_chaser_prefers_a_target_in_reach(field: Any) -> None:
+    world = field.world
+    zealot, runner = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 14.0, 16)
+    world.acquires[runner] = False
+    commands.attack_move(world, [zealot], (30, 16))
+    field.play(4)
+    assert world.target[zealot] == runner
+    commands.move(world, [runner], (30, 16))
+    blocker = field.put("Zergling", 2, 13.5, 16.6)
+    world.acquires[blocker] = False
+    field.play(80)
+    assert not world.alive[blocker]
+
+
+def test_an_order_to_attack_one_unit_does_not_change_its_target(field: Any) -> None:
+    world = field.world
+    zealot = field.put("Zealot", 1, 10, 16)
+    far, near = field.put("SpineCrawler", 2, 20, 16), field.put("Zergling", 2, 12, 16.8)
+    world.acquires[far] = world.acquires[near] = False
+    commands.attack_unit(world, [zealot], world.tag_of(far))
+    field.play(150)
+    assert world.life[near] == 35
+    assert world.life[far] < 300
+
+
+def test_after_its_target_died_a_unit_goes_on_with_the_queue(field: Any) -> None:
+    world = field.world
+    stalker, foe = field.put("Stalker", 1, 10, 16), field.put("Zergling", 2, 14, 16)
+    world.acquires[foe] = False
+    commands.attack_unit(world, [stalker], world.tag_of(foe))
+    commands.move(world, [stalker], (6, 8), queue=True)
+    field.play(200)
+    assert not world.alive[foe]
+    assert math.dist(world.pos[stalker], (6, 8)) < 0.1
+
+
+def test_stop_ends_a_walk_and_an_idle_unit_fights_again(field: Any) -> None:
+    world = field.world
+    zealot, foe = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 14, 16)
+    world.acquires[foe] = False
+    commands.move(world, [zealot], (30, 16))
+    field.play(2)
+    commands.stop(world, [zealot])
+    field.play(4)
+    assert world.target[zealot] == foe
+
+
+def test_a_cloaked_enemy_is_not_engaged(field: Any) -> None:
+    world = field.world
+    zealot, templar = field.put("Zealot", 1, 10, 16), field.put("DarkTemplar", 2, 13, 16)
+    world.acquires[templar] = False
+    field.play(12)
+    assert world.target[zealot] == -1
