@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import jsonschema
+import jsonschema  # type: ignore[import-untyped]  # comes with check-jsonschema; one test is not worth its stubs
 import pytest
 from mcap.reader import make_reader
 
