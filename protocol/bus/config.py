@@ -22,7 +22,7 @@ TX_SLOTS = 16
 100 Mbit link lost 2 of 96, with 16 none."""
 BATCH_BYTES = 65_535
 """What travels in one piece; Zenoh's largest, and its default."""
-WAIT_BEFORE_DROP_S = 0.01
+WAIT_BEFORE_DROP_S = 0.02
 """How long a put of one batch waits for a slot before it is dropped. With Zenoh's 1 ms, bursts of 128 samples of 20 kB
 were dropped on a busy machine, and came 0.3 s later; a batch takes 5 ms on a link of 100 Mbit."""
 _ENDPOINT = re.compile(r"(?P<transport>[a-z-]+)/(?P<address>[^?#]+)(?P<rest>[?#].*)?")

@@ -12,10 +12,9 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import threading
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import zenoh
 from zenoh import CongestionControl, Priority, SampleKind
@@ -31,12 +30,14 @@ from zenoh.ext import (
 from zenoh.handlers import Callback
 
 from protocol.bus import Delivery, Liveness, Sample
+from protocol.bus.audience import Audience
 from protocol.bus.config import BusConfig, check, settings
 from protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
 from protocol.bus.keyexpr import check_key, check_key_expr
 from protocol.bus.lane import Lane, Shut, Stopwatch, Window
 from protocol.bus.mailbox import Mailbox
 from protocol.bus.sightings import PATIENCE_S, Sightings
+from protocol.bus.threads import run_detached
 from protocol.errors import BusClosed, BusError
 
 if TYPE_CHECKING:
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 
     from protocol.bus import Publisher, Subscription, Token
 
-T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 CLOSE_TIMEOUT_S = 1.8
@@ -76,7 +76,7 @@ async def open_bus(config: BusConfig) -> ZenohBus:
         except zenoh.ZError as error:
             raise BusError(f"Zenoh does not accept {value!r} for {path!r}: {plain(str(error))}") from None
     try:
-        session = await _on_thread(lambda: zenoh.open(zenoh_config))
+        session = await run_detached(lambda: zenoh.open(zenoh_config))
     except zenoh.ZError as error:
         said = str(error)
         if "Unable to connect" in said:
@@ -115,7 +115,7 @@ class ZenohBus:
         self._sightings: set[Sightings] = set()
         self._links = {str(transport.zid) for transport in session.info.transports()}
         events = Callback(partial(self._hand_over, self._on_transport), indirect=False)
-        self._held.add(session.info.declare_transport_events_listener(events))
+        self._held.add(session.info.declare_transport_events_listener(events, history=True))
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -130,6 +130,11 @@ class ZenohBus:
         raise BusError("the session did not tell where it listens")
 
     @property
+    def identity(self) -> str:
+        """How this session appears among the `routers` of others."""
+        return str(self._session.zid())
+
+    @property
     def routers(self) -> tuple[str, ...]:
         """Identities of the routers that this session is connected to."""
         return tuple(str(zid) for zid in self._session.info.routers_zid())
@@ -137,17 +142,21 @@ class ZenohBus:
     async def publisher(self, key: str, delivery: Delivery) -> Publisher:
         """See `protocol.bus.Bus.publisher`."""
         self._check_open()
-        key_expr = zenoh.KeyExpr(check_key(key))
+        check_key(key)
         if delivery is Delivery.STATE:
-            advanced = _declare_state_publisher(self._session, key_expr)
-            self._held.add(advanced)
-            return _Publisher(key, self._held, self._bulk_lane(), advanced.put, advanced)
-        # A declared publisher is silent until it has heard of a subscriber: up to 60 of 60 first puts were lost. A put
-        # of the session goes to the router in any case.
-        if delivery is Delivery.LOG:
-            return _Publisher(key, self._held, self._bulk_lane(), partial(self._session.put, key_expr, **_LOG))
-        self._question = self._question or key
-        return _Publisher(key, self._held, self._speech, partial(self._session.put, key_expr, **_SPEECH))
+            state = _declare_state_publisher(self._session, key)
+            self._held.add(state)
+            return _Publisher(key, self._held, self._bulk_lane(), state.put, (state,))
+        if delivery is Delivery.SPEECH:
+            self._question = self._question or key
+        qos, lane = (_SPEECH, self._speech) if delivery is Delivery.SPEECH else (_LOG, self._bulk_lane())
+        publisher = self._session.declare_publisher(key, **qos)
+        audience = Audience()
+        listener = Callback(partial(self._hand_over, partial(_see_audience, audience)), indirect=False)
+        declared = (publisher, publisher.declare_matching_listener(listener))
+        self._held.add(*declared)
+        _see_audience(audience, publisher.matching_status)  # type: ignore[arg-type]  # no bool, as its stub has it
+        return _Publisher(key, self._held, lane, publisher.put, declared, audience)
 
     async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
         """See `protocol.bus.Bus.subscribe`."""
@@ -161,7 +170,12 @@ class ZenohBus:
             declared = (self._session.declare_subscriber(key_expr, take),)
         self._mailboxes.add(mailbox)
         self._held.add(*declared)
-        await self._settle(key_expr)
+        try:
+            await self._settle(key_expr)
+            self._check_open()
+        except BaseException:  # cancelled, too: nobody else could close it
+            await mailbox.close()
+            raise
         return mailbox
 
     async def announce(self, key: str) -> Token:
@@ -195,7 +209,7 @@ class ZenohBus:
             mailbox.shut()
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT_S):
-                await _on_thread(self._shut)
+                await run_detached(self._shut)
         except TimeoutError:
             log.warning("the bus did not close within %g s and was left behind", CLOSE_TIMEOUT_S)
         except zenoh.ZError as error:
@@ -273,19 +287,26 @@ class _Held:
     def take_back(self, *declared: Any) -> None:
         self._declared.difference_update(declared)
         if not self.closed:
-            for one in declared:
+            for one in reversed(declared):  # a listener goes before what it listens to
                 one.undeclare()
 
 
 class _Publisher:
     def __init__(
-        self, key: str, held: _Held, lane: Lane, put: Callable[[bytes], None], declared: AdvancedPublisher | None = None
+        self,
+        key: str,
+        held: _Held,
+        lane: Lane,
+        put: Callable[[bytes], None],
+        declared: tuple[Any, ...],
+        audience: Audience | None = None,
     ) -> None:
         self._key = key
         self._held = held
         self._lane = lane
         self._put = put
         self._declared = declared
+        self._audience = audience
         self._closed = False
 
     @property
@@ -293,6 +314,8 @@ class _Publisher:
         return self._key
 
     async def put(self, payload: bytes) -> None:
+        if self._audience is not None:
+            await self._audience.wait()
         if self._closed or self._held.closed:
             raise BusClosed(f"the publisher of {self._key!r} is closed")
         try:
@@ -303,8 +326,8 @@ class _Publisher:
             raise BusError(f"cannot put under {self._key!r}: {plain(str(error))}") from None
 
     async def close(self) -> None:
-        if not self._closed and self._declared is not None:
-            self._held.take_back(self._declared)
+        if not self._closed:
+            self._held.take_back(*self._declared)
         self._closed = True
 
 
@@ -319,13 +342,13 @@ class _Token:
             self._held.take_back(token)
 
 
-def _declare_state_publisher(session: zenoh.Session, key_expr: zenoh.KeyExpr) -> AdvancedPublisher:
+def _declare_state_publisher(session: zenoh.Session, key: str) -> AdvancedPublisher:
     # BLOCK would let one stopped agent freeze all others for seconds; DROP with a cache and a heartbeat kept their
     # worst gap at 0.1 s, and the stopped one had the newest sample 0.08 s after it went on.
     replies = RepliesConfig(congestion_control=CongestionControl.DROP, priority=Priority.DATA_HIGH)
     return declare_advanced_publisher(
         session,
-        key_expr,
+        key,
         congestion_control=CongestionControl.DROP,
         priority=Priority.DATA_HIGH,
         cache=CacheConfig(max_samples=STATE_CACHE, replies_config=replies),
@@ -367,6 +390,10 @@ def _ignore(reply: zenoh.Reply) -> None:
 # --- on the loop ------------------------------------------------------------------------------------
 
 
+def _see_audience(audience: Audience, status: zenoh.MatchingStatus) -> None:
+    audience.see(present=status.matching)
+
+
 def _see(sightings: Sightings, sample: zenoh.Sample) -> None:
     sightings.token(str(sample.key_expr), alive=sample.kind == SampleKind.PUT)
 
@@ -374,17 +401,3 @@ def _see(sightings: Sightings, sample: zenoh.Sample) -> None:
 def _resolve(future: asyncio.Future[None]) -> None:
     if not future.done():
         future.set_result(None)
-
-
-async def _on_thread(work: Callable[[], T]) -> T:
-    """Runs what may block for seconds. Not on the loop's executor, whose threads keep a process from ending."""
-    future: Future[T] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(work())
-        except Exception as error:  # noqa: BLE001  it is raised where it is awaited
-            future.set_exception(error)
-
-    threading.Thread(target=run, name="khala-bus", daemon=True).start()
-    return await asyncio.wrap_future(future)

@@ -1,15 +1,26 @@
-"""Fixtures of the bus: where to meet without a port."""
+"""Fixtures of the bus: where to meet, and whom."""
 
 from __future__ import annotations
 
+import asyncio
 import shutil
+import sys
 import tempfile
-from collections.abc import Iterator
+from asyncio.subprocess import PIPE, Process
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
 
+from protocol.bus.config import BusConfig
+from protocol.bus.zenoh import ZenohBus, open_bus
+
 pytest.register_assert_rewrite("protocol.bus.testing")
+
+OpenBus = Callable[[BusConfig], Awaitable[ZenohBus]]
+StartPeer = Callable[..., Awaitable[Process]]
+PEER = str(Path(__file__).parent / "peer.py")
 
 
 @pytest.fixture
@@ -18,3 +29,38 @@ def socket() -> Iterator[str]:
     directory = Path(tempfile.mkdtemp(prefix="bus"))
     yield f"unixsock-stream/{directory}/bus.sock"
     shutil.rmtree(directory)
+
+
+@pytest.fixture
+async def opened() -> AsyncIterator[OpenBus]:
+    """Opens sessions of Zenoh and closes them in the end."""
+    async with AsyncExitStack() as sessions:
+
+        async def open_one(config: BusConfig) -> ZenohBus:
+            session = await open_bus(config)
+            sessions.push_async_callback(session.close)
+            return session
+
+        yield open_one
+
+
+@pytest.fixture
+async def start() -> AsyncIterator[StartPeer]:
+    """Starts `peer.py` in a role, waits until it is up, and kills it in the end."""
+    async with AsyncExitStack() as processes:
+
+        async def start_one(*arguments: str, command: tuple[str, ...] = ()) -> Process:
+            process = await asyncio.create_subprocess_exec(*command, sys.executable, PEER, *arguments, stdout=PIPE)
+
+            async def end() -> None:
+                if process.returncode is None:
+                    process.kill()
+                await process.wait()
+
+            processes.push_async_callback(end)
+            assert process.stdout is not None
+            async with asyncio.timeout(20):
+                assert await process.stdout.readline() == b"up\n"
+            return process
+
+        yield start_one

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack
+from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus import Bus
 from protocol.bus.config import BusConfig
 from protocol.bus.memory import MemoryBroker
 from protocol.bus.testing import BusConformance, Connect
 from protocol.bus.zenoh import open_bus
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+    from protocol.bus import Bus
 
 
 class TestMemoryBus(BusConformance):
@@ -48,8 +52,17 @@ class TestZenohBusOfClients(BusConformance):
 class TestZenohBusWithTheHostAsRouter(BusConformance):
     """The first session is the router, and the others are its clients."""
 
+    NEEDS_A_ROUTER_THAT_STAYS = frozenset(
+        {
+            "test_closing_one_session_leaves_the_others_alone",
+            "test_the_state_of_a_publisher_that_came_back_arrives",
+        }
+    )
+
     @pytest.fixture
-    async def connect(self, socket: str) -> AsyncIterator[Connect]:
+    async def connect(self, socket: str, request: pytest.FixtureRequest) -> AsyncIterator[Connect]:
+        if request.node.originalname in self.NEEDS_A_ROUTER_THAT_STAYS:
+            pytest.skip("the session that is closed first is the router here")
         async with AsyncExitStack() as sessions:
             configs = [BusConfig(mode="router", listen=(socket,))]
 
