@@ -168,7 +168,7 @@ class _Player:
         """Lets game loops pass; a step that is over gives way to the next one."""
         if self.step is None:
             return
-        if self.step.loops > loops:
+        if self.step.loops > loops and not snapshot.ended:
             self.step = Step(self.step.actions, self.step.loops - loops)
         else:
             self._advance(snapshot)

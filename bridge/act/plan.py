@@ -2,7 +2,7 @@
 
 A plan is a generator and touches no game: it yields what has to enter one `SC2Env.step`, is sent the snapshot that
 this step led to, and returns what it played. So both executors can be tested without a game, and the game needs to
-know nothing of executors.
+know nothing of executors. A plan ends when it is sent a snapshot of an episode that is over.
 """
 
 from __future__ import annotations

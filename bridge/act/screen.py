@@ -14,6 +14,7 @@ while others are being told.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from itertools import groupby
 from typing import TYPE_CHECKING, TypeAlias
@@ -54,16 +55,21 @@ class ScreenExecutor:
         tour = _Tour(snapshot, self._groups)
         places = {_team(command): place for place, command in reversed(list(enumerate(commands)))}
         in_order = sorted(commands, key=lambda command: places[_team(command)])
-        for _, of_team in groupby(in_order, key=_team):
-            yield from tour.visit(list(of_team))
-        if tour.loops < loops:
-            yield from tour.step(None, loops - tour.loops)
+        with contextlib.suppress(_EpisodeOver):
+            for _, of_team in groupby(in_order, key=_team):
+                yield from tour.visit(list(of_team))
+            if tour.loops < loops:
+                yield from tour.step(None, loops - tour.loops)
         return Played(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
 
 
 def _team(command: Command) -> tuple[str, str]:
     team = command.said.team.team
     return team.agent, team.name
+
+
+class _EpisodeOver(Exception):
+    """Ends a tour where the game ended."""
 
 
 class _Tour:
@@ -80,6 +86,8 @@ class _Tour:
     def step(self, action: GameAction | None, loops: int = 1) -> Generator[Step, Snapshot, None]:
         self.now = yield Step(() if action is None else (action,), loops)
         self.loops += loops
+        if self.now.ended:
+            raise _EpisodeOver
 
     def visit(self, commands: Sequence[Command]) -> Generator[Step, Snapshot, None]:
         """Carries out the commands of one team."""

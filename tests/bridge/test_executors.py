@@ -246,6 +246,14 @@ def test_a_point_of_the_minimap_is_clicked_on_the_minimap(table: Any, joint: Any
     assert game.functions()[-1] == ("Move_minimap", [[0], [40, 12]])
 
 
+def test_a_tour_ends_where_the_episode_ends_and_says_what_it_played(table: Any, joint: Any) -> None:
+    for executor in (RawExecutor(), ScreenExecutor()):
+        game = table(ended=True)
+        played = game.play(executor, joint(game))
+        assert len(game.steps) == 1
+        assert played.functions[0].startswith(("Attack_unit(now", "camera_move("))
+
+
 def test_a_tour_takes_as_long_as_it_needs(table: Any, joint: Any) -> None:
     game = table()
     game.play(ScreenExecutor(), joint(game), loops=2)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import stat
 import threading
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import JointAction, Played
+from bridge.act import JointAction, Played, Step
 from bridge.act.raw import RawExecutor
 from bridge.errors import GameError, GameHangs, GameMissing
 from bridge.game import GameConfig, GameInfo, GameThread, OneSide, Turn, find_sc2
@@ -104,6 +106,65 @@ async def test_a_game_that_cannot_be_started_is_an_error_of_the_entering() -> No
 
     with pytest.raises(GameError, match="no luck"):
         await GameThread(fail).__aenter__()
+
+
+# --- plans in SC2Env ----------------------------------------------------------------------------------------------
+
+
+class StubEnv:
+    """An `SC2Env` of two players that counts loops and notes what enters."""
+
+    def __init__(self, last_loop: int) -> None:
+        self.game_info = [sc_pb.ResponseGameInfo()] * 2
+        self.entered: list[tuple[list[list[str]], int]] = []
+        self._last_loop = last_loop
+
+    def step(self, actions: list[list[str]], step_mul: int) -> list[SimpleNamespace]:
+        self.entered.append((actions, step_mul))
+        loop = sum(loops for _, loops in self.entered)
+        return [self._time_step(loop, player) for player in (1, 2)]
+
+    def _time_step(self, loop: int, player: int) -> SimpleNamespace:
+        response = sc_pb.ResponseObservation()
+        response.observation.game_loop = loop
+        response.observation.player_common.player_id = player
+        response.observation.raw_data.event.dead_units.append(100 * player + loop)
+        ended = loop >= self._last_loop
+        if ended:
+            for number, result in ((1, sc_pb.Victory), (2, sc_pb.Defeat)):
+                response.player_result.add(player_id=number, result=result)
+        observation = {"_response_observation": lambda: response, "available_actions": [0]}
+        return SimpleNamespace(observation=observation, last=lambda: ended)
+
+
+def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[Turn, ...]]:
+    """Plays plans of two players that return how many steps they took."""
+
+    def plan(steps: list[Step]) -> Plan:
+        for step in steps:
+            if (yield step).ended:
+                break
+        return Played((f"{len(steps)} steps",))
+
+    game = object.__new__(PySC2Game)
+    env = StubEnv(last_loop)
+    game._env, game._ended = env, False
+    return env, game.act([plan(steps) for steps in plans])
+
+
+def test_two_players_share_the_steps_and_each_action_enters_once() -> None:
+    env, turns = play([[Step(("a",), 1), Step(("b",), 3)], [Step(("c",), 8)]], last_loop=99)
+    assert env.entered == [([["a"], ["c"]], 1), ([["b"], []], 3), ([[], []], 4)]
+    assert [turn.snapshot.game_loop for turn in turns] == [8, 8]
+    assert [turn.snapshot.dead for turn in turns] == [{101, 104, 108}, {201, 204, 208}]
+    assert [(turn.env_steps, turn.played.functions) for turn in turns] == [(3, ("2 steps",)), (3, ("1 steps",))]
+
+
+def test_plans_end_with_the_episode() -> None:
+    env, turns = play([[Step(("a",), 1), Step(("b",), 1)], [Step(("c",), 8)]], last_loop=1)
+    assert env.entered == [([["a"], ["c"]], 1)]
+    assert [(turn.snapshot.ended, turn.snapshot.outcome) for turn in turns] == [(True, "win"), (True, "loss")]
+    assert [turn.played.functions for turn in turns] == [("2 steps",), ("1 steps",)]
 
 
 # --- where the game is --------------------------------------------------------------------------------------------
