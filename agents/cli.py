@@ -48,7 +48,9 @@ Examples:\n
 def agent(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Agents to play, as the task file names them. Several share this process."),
+        typer.Argument(
+            envvar="KHALA_AGENTS", help="Agents to play, as the task file names them. Several share this process."
+        ),
     ] = None,
     *,
     run: Annotated[str, typer.Option(envvar="KHALA_RUN", help="Name of the run; the host prints it.", metavar="NAME")],
