@@ -25,6 +25,7 @@ BATCH_BYTES = 65_535
 WAIT_BEFORE_DROP_S = 0.02
 """How long a put of one batch waits for a slot before it is dropped. With Zenoh's 1 ms, bursts of 128 samples of 20 kB
 were dropped on a busy machine, and came 0.3 s later; a batch takes 5 ms on a link of 100 Mbit."""
+UNIX_PATH_BYTES = 107
 _ENDPOINT = re.compile(r"(?P<transport>[a-z-]+)/(?P<address>[^?#]+)(?P<rest>[?#].*)?")
 _HOST_PORT = re.compile(r"(?P<host>\[[^\]]+\]|[^:\[\]]+):(?P<port>\d{1,5})")
 
@@ -73,9 +74,9 @@ class BusConfig(BaseModel):
     shared_memory: bool = False
     """Large samples between processes of one machine through /dev/shm. It leaves files behind after a kill, and
     crosses network namespaces; worth it for images only."""
-    zenoh: dict[str, Any] = Field(default_factory=dict)
-    """Anything else, as paths and values of Zenoh's configuration: `{"transport/link/tx/batch_size": 8192}`. It is
-    applied last."""
+    zenoh: dict[str, Any] = Field(default_factory=dict, repr=False)
+    """Anything else, as paths and values of Zenoh's configuration: `{"transport/link/tx/batch_size": 8192}`. They are
+    set last, and never printed, as they may hold passwords."""
 
     @property
     def connect_to(self) -> tuple[str, ...]:
@@ -182,6 +183,8 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
             f"transports are {', '.join(sorted(TRANSPORTS))}"
         )
     if found["transport"] == "unixsock-stream":
+        if len(found["address"].encode()) > UNIX_PATH_BYTES:
+            raise BusError(f"{endpoint!r} has too long a path: a unix socket's has at most {UNIX_PATH_BYTES} bytes")
         return
     place = _HOST_PORT.fullmatch(found["address"])
     port = int(place["port"]) if place else -1

@@ -33,6 +33,7 @@ _REASONS: tuple[tuple[type[OSError], str], ...] = (
     (FileNotFoundError, "there is no such socket"),
     (socket.gaierror, "this host name is unknown"),
 )
+_INNER_MESSAGE = re.compile(r'(?:Str\(|msg: )"(.+?)"(?:\)|, location)')
 _SOURCE_PLACE = re.compile(r"\s+at /\S+\.rs:\d+\.?")
 
 
@@ -53,8 +54,10 @@ def why_not_listening(config: BusConfig, said: str) -> str:
 
 
 def plain(said: str) -> str:
-    """An error text of Zenoh without the places in its source."""
-    return _SOURCE_PLACE.sub("", said).strip()
+    """An error text of Zenoh without the places in its source and the names of its types."""
+    said = _SOURCE_PLACE.sub("", said).strip()
+    inner = _INNER_MESSAGE.search(said)
+    return inner[1] if inner else said
 
 
 async def _attempt(endpoint: str) -> str:

@@ -74,7 +74,7 @@ async def open_bus(config: BusConfig) -> ZenohBus:
         try:
             zenoh_config.insert_json5(path, json.dumps(value))
         except zenoh.ZError as error:
-            raise BusError(f"Zenoh does not accept {value!r} for {path!r}: {plain(str(error))}") from None
+            raise BusError(f"Zenoh does not accept the setting {path!r}: {plain(str(error))}") from None
     try:
         session = await run_detached(lambda: zenoh.open(zenoh_config))
     except zenoh.ZError as error:

@@ -1,4 +1,4 @@
-"""Another process on the bus, for tests that kill, stop or forget it: `peer.py <role> <endpoint>`.
+"""Another process on the bus, for tests that kill, stop or forget it: `peer.py <role> <endpoint>...`.
 
 It says `up` on stdout when it is ready.
 """
@@ -13,9 +13,9 @@ from protocol.bus.config import BusConfig
 from protocol.bus.zenoh import open_bus
 
 
-async def agent(endpoint: str) -> None:
+async def agent(*endpoints: str) -> None:
     """Replies to each observation with its first eight bytes."""
-    bus = await open_bus(BusConfig(connect=(endpoint,)))
+    bus = await open_bus(BusConfig(connect=endpoints))
     observations = await bus.subscribe("agent/observation", Delivery.STATE, depth=1)
     replies = await bus.publisher("agent/reply", Delivery.SPEECH)
     await bus.announce("agent/alive")
@@ -25,17 +25,17 @@ async def agent(endpoint: str) -> None:
         await replies.put(sample.payload[:8])
 
 
-async def router(endpoint: str) -> None:
+async def router(*endpoints: str) -> None:
     """Routes until it is killed."""
-    await open_bus(BusConfig(mode="router", listen=(endpoint,), insecure=True))
+    await open_bus(BusConfig(mode="router", listen=endpoints, insecure=True))
     sys.stdout.write("up\n")
     sys.stdout.flush()
     await asyncio.get_running_loop().create_future()
 
 
-async def forgetful(endpoint: str) -> None:
+async def forgetful(*endpoints: str) -> None:
     """Uses everything, closes nothing, and ends."""
-    bus = await open_bus(BusConfig(connect=(endpoint,)))
+    bus = await open_bus(BusConfig(connect=endpoints))
     for delivery in Delivery:
         subscription = await bus.subscribe("a/*", delivery)
         await (await bus.publisher(f"a/{delivery.value}", delivery)).put(bytes(200_000))
@@ -47,4 +47,4 @@ async def forgetful(endpoint: str) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run({"agent": agent, "router": router, "forgetful": forgetful}[sys.argv[1]](sys.argv[2]))
+    asyncio.run({"agent": agent, "router": router, "forgetful": forgetful}[sys.argv[1]](*sys.argv[2:]))
