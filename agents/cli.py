@@ -5,6 +5,7 @@ raised as a `protocol.errors.KhalaError` of one sentence; printing it is the fro
 """
 
 import asyncio
+import gc
 import json
 import os
 import signal
@@ -151,6 +152,12 @@ def _specs(names: list[str], *, model: str | None, policy: str | None, memory: i
     return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
 
 
+def _settle_memory() -> None:
+    """Takes what was imported out of garbage collection: going through it stops every agent for 40 ms."""
+    gc.collect()
+    gc.freeze()
+
+
 async def _play(
     config: BusConfig, run: str, side: str, policies: dict[str, Policy], default_reply: str, stop: asyncio.Event
 ) -> dict[str, Tally]:
@@ -161,6 +168,7 @@ async def _play(
         _say(
             f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {', '.join(config.connect_to)}"
         )
+        _settle_memory()
         return await run_workers(bus, run, side, policies, default_reply=default_reply, stop=stop)
     finally:
         await bus.close()
@@ -194,6 +202,7 @@ def _plain(tally: Tally) -> dict[str, Any]:
 
 async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | None, *, as_json: bool) -> None:
     async with endpoint:
+        _settle_memory()
         ready = json.dumps({"base_url": endpoint.base_url, "pid": os.getpid(), "models": list(PLAYERS)})
         _say(f"scripted models {', '.join(PLAYERS)} at {endpoint.base_url}")
         if ready_file is not None:

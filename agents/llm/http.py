@@ -34,6 +34,7 @@ from agents.llm.client import (
     Unreachable,
 )
 from agents.llm.retry import is_retried
+from agents.llm.transport import CONNECT_S, AiohttpTransport
 from agents.secret import scrub
 
 if TYPE_CHECKING:
@@ -44,8 +45,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_TIMEOUT = httpx.Timeout(connect=5.0, write=30.0, read=None, pool=None)  # the whole try has a limit of its own
-_LIMITS = httpx.Limits(max_connections=None, max_keepalive_connections=2, keepalive_expiry=120.0)
+_TIMEOUT = httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None)  # a whole try has a limit of its own
 _WARM_TIMEOUT_S = 5.0
 _SPENT_CODES = frozenset(
     {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
@@ -115,10 +115,9 @@ class HttpEndpoint:
         if self._client is None:
             self._client = httpx.AsyncClient(
                 headers=self._headers,
-                verify=_tls(),
+                transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in _LOOPBACK),
                 timeout=_TIMEOUT,
-                limits=_LIMITS,
-                trust_env=urlsplit(self.address).hostname not in _LOOPBACK,  # a proxy cannot know our loopback
+                trust_env=False,  # what is to be had from the environment, the transport has
             )
         return self._client
 
