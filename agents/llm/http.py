@@ -1,9 +1,8 @@
-"""HTTP to one model endpoint: the only module that knows httpx.
+"""HTTP to one model endpoint: with `agents.llm.transport` below it, the only module that knows httpx.
 
-Each agent has its own `httpx.AsyncClient`, for a shared one costs 20 times as much CPU at 128 calls in flight, and
-a call that is cancelled can leave its slot of the pool taken for ever (httpcore 1.0.9, encode/httpcore#1093).
-So there is no limit on connections here, `agents.llm.limits` holds requests back, and `refresh` throws the
-client away between episodes. HTTP/2 stays off: nothing is won for few long calls.
+Each agent has a client, and so connections, of its own: what is cancelled for one disturbs no other. There is no
+limit on connections, `agents.llm.limits` holds requests back; and `refresh` throws the client away between
+episodes, with whatever is left of cancelled calls. HTTP/2 stays off: nothing is won for few long calls.
 
 Above it are `openai_compatible` and `anthropic`, which know what the bytes mean.
 """

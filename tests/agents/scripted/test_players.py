@@ -15,6 +15,8 @@ from protocol.speech import parse
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+GOLDEN = Path(__file__).resolve().parents[2] / "bridge" / "golden"
+"""Observations as the host writes them; the two packages share no code, only this text."""
 OBSERVATION = (Path(__file__).parent / "observation.txt").read_text(encoding="utf-8")
 
 
@@ -116,3 +118,16 @@ def test_random_legal_selects_an_own_unit_first() -> None:
 @pytest.mark.parametrize("player", PLAYERS.values(), ids=PLAYERS)
 def test_the_same_prompt_gets_the_same_reply(player: Callable[[str, random.Random], str]) -> None:
     assert player(OBSERVATION, random.Random("x")) == player(OBSERVATION, random.Random("x"))
+
+
+@pytest.mark.parametrize("page", sorted(GOLDEN.glob("*.txt")), ids=lambda page: page.stem)
+def test_the_host_writes_what_players_can_read(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    teams = read(text).teams.values()
+    units = [unit for team in teams for unit in (*team.own, *team.allies, *team.enemies)]
+    assert len(units) == text.count(" | tag 0x") > 0
+    assert all(unit.hit_points > 0 for unit in units)
+    assert all(unit.distance < 100 for team in teams for unit in team.enemies)
+    assert all(team.actions for team in teams)
+    speech = parse(focus_fire(text, quiet()))
+    assert (len(speech.calls), speech.faults) == (len(teams), ())
