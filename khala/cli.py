@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -210,10 +210,10 @@ for command, epilog in (
 app.add_typer(simulator.cli.app, name="sc2")
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
     try:
-        app(standalone_mode=True)
+        app(arguments, prog_name="khala")
     except* (KhalaError, simulator.install.InstallError) as group:
         for error in _leaves(group):
             sys.stderr.write(f"khala: {error}\n")

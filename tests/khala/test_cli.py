@@ -1,0 +1,246 @@
+"""The command line as a person meets it: a process, its words, its exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from khala.cli import main
+from protocol.messages import Report
+from protocol.recording import Recording
+
+KEY = "sk-test-0123456789abcdef-do-not-tell"
+
+
+def khala(*arguments: str, cwd: Path, **environ: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "khala", *arguments],
+        cwd=cwd,
+        env=os.environ | {"KHALA_CACHE": str(cwd / "cache"), "COLUMNS": "200"} | environ,
+        capture_output=True,
+        text=True,
+        timeout=110,
+        check=False,
+    )
+
+
+BAD = [
+    ("run nosuch", "there is no task 'nosuch'"),
+    ("run 2s3zz", "did you mean 2s3z"),
+    (
+        "run bad.yaml",
+        "bad.yaml:3 (agents.0.teams.0.unit_types.0): there is no unit type 'Stlaker', did you mean 'Stalker'?",
+    ),
+    ("run broken.yaml", "broken.yaml:2: this is no YAML"),
+    ("run missing.yaml", "missing.yaml: there is no such file"),
+    ("run 2s3z --run a/b", "run 'a/b' cannot stand in a key"),
+    ("run 2s3z --executor magic", "executor: Input should be 'raw' or 'screen'"),
+    ("run 2s3z --model nope", "there is no model file 'nope'"),
+    ("run 2s3z --model openai", "no key: set the environment variable OPENAI_API_KEY"),
+    ("run 2s3z --policy nope:decide", "there is no module 'nope'"),
+    ("run 2s3z --game nowhere", "there is no StarCraft II in nowhere"),
+    ("run 2s3z --game starcraft2", "there is no StarCraft II in nowhere (SC2PATH)"),
+    ("run 2s3z --out file/below", "cannot be made: Not a directory; --out names another place"),
+    ("host 2s3z --connect tcp/127.0.0.1:{closed}", "nothing listens there"),
+    ("host 2s3z --listen tcp/127.0.0.1:{taken}", "another process uses it"),
+    ("host 2s3z --listen tcp/0.0.0.0:7499", "would let every machine that reaches it join without TLS"),
+    ("host 2s3z --connect x --listen y", "give --connect or --listen, not both"),
+    ("router --listen tcp/127.0.0.1:{taken}", "another process uses it"),
+    ("router --check --connect tcp/127.0.0.1:{closed}", "no router answered"),
+    ("agent Stalkers --run r --connect tcp/127.0.0.1:{closed} --policy silent", "no router answered"),
+    ("agent Stalkers --run r --connect nonsense --policy silent", "'nonsense' is no endpoint"),
+    ("llm --port {taken}", "in use"),
+    ("llm --fault teapot=2", "teapot"),
+    ("replay missing.mcap", "missing.mcap: there is no such file"),
+    ("replay bad.yaml", "bad.yaml is no recording"),
+    ("replay missing.mcap --steps soon", "'soon' names no steps"),
+    ("sc2 install file/below", "file"),
+]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("cli")
+    task = Path(__file__).parents[2] / "configs" / "tasks" / "llm_smac" / "2s3z.yaml"
+    assert task.is_file()
+    (place / "bad.yaml").write_text(
+        "name: bad\nmap: 2s3z\nagents: [{name: A, role: r, teams: [{name: T, unit_types: [Stlaker]}], actions: {}}]\n"
+        "task: win\n"
+    )
+    (place / "broken.yaml").write_text("name: x\n  map: [\n")
+    (place / "file").write_text("")
+    return place
+
+
+@pytest.mark.parametrize(("command", "words"), BAD, ids=[command for command, _ in BAD])
+def test_what_the_user_can_mend_is_one_sentence_and_no_traceback(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str, words: str
+) -> None:
+    monkeypatch.chdir(place)
+    monkeypatch.setenv("KHALA_CACHE", str(place / "cache"))
+    monkeypatch.setenv("OPENAI_API_KEY", "")
+    monkeypatch.setenv("SC2PATH", "nowhere")
+    with socket.socket() as taken, socket.socket() as closed:
+        for held in (taken, closed):
+            held.bind(("127.0.0.1", 0))
+        taken.listen()
+        ports = {"taken": taken.getsockname()[1], "closed": closed.getsockname()[1]}
+        with pytest.raises(SystemExit) as ended:
+            main(command.format(**ports).split())
+    told = capsys.readouterr()
+    assert ended.value.code == 1, told.err
+    assert words in told.err
+    assert told.out == ""
+    assert len(told.err.strip().splitlines()) == 1
+
+
+@pytest.mark.game
+def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -> None:
+    done = khala("run", "2s3z_pair", "--max-steps", "4", "--latency", "0", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    (result,) = told["results"]
+    assert (result["steps"], result["outcome"], result["cause"]) == (4, "draw", "step limit")
+    assert result["statuses"] == {"Stalkers": {"ok": 4}, "Zealots": {"ok": 4}}
+    recording = Recording.open(tmp_path / told["recording"])
+    assert recording.complete
+    assert len(list(recording.of(Report))) == 4
+    replayed = khala("replay", told["recording"], "--steps", "2", cwd=tmp_path)
+    assert replayed.returncode == 0
+    assert "step 2" in replayed.stdout
+    assert "step 3" not in replayed.stdout
+
+
+POLICY = """
+import os, signal
+
+def decide(briefing, observation):
+    if observation.agent == "Stalkers" and observation.step == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return ""
+"""
+
+
+@pytest.mark.game
+def test_a_process_killed_in_a_step_costs_its_agent_and_not_the_game(tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(POLICY)
+    command = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
+    done = khala(*command, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["results"][0]["statuses"] == {"Stalkers": {"ok": 2, "gone": 3}, "Zealots": {"ok": 5}}
+    reports = Recording.open(tmp_path / told["recording"]).of(Report)
+    assert max(report.timings.wait_s for report in reports) < 5  # far from the 20 s that it would have waited
+
+
+@pytest.mark.game
+def test_an_agent_that_cannot_begin_ends_the_match_with_its_own_words(tmp_path: Path) -> None:
+    (tmp_path / "picky.py").write_text(
+        "import sys\nif 'agent' in sys.argv: raise OSError('no GPU here')\ndef decide(b, o):\n    return ''\n"
+    )
+    done = khala("run", "2s3z_pair", "--policy", "picky:decide", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "no GPU here" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.game
+def test_ctrl_c_ends_everything_and_leaves_a_readable_recording(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.05", "--run", "cut"]
+    environ = os.environ | {"KHALA_CACHE": str(tmp_path / "cache")}
+    with subprocess.Popen(command, cwd=tmp_path, env=environ, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("step 0"):
+                break
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+        assert process.wait(30) == 130
+    assert "interrupted" in rest
+    assert "Traceback" not in rest
+    assert list(Recording.open(tmp_path / "runs" / "cut" / "recording.mcap").of(Report))
+    assert _processes_of("cut") == []
+
+
+def _processes_of(run: str) -> list[str]:
+    """Command lines of processes that still play this run."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = entry.read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue
+        if "--run" in words and words[words.index("--run") + 1] == run:
+            found.append(" ".join(words))
+    return found
+
+
+@pytest.mark.game
+def test_a_key_in_the_environment_is_in_nothing_that_a_run_leaves_behind(tmp_path: Path) -> None:
+    llm = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json"]
+    with subprocess.Popen(llm, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as endpoint:
+        assert endpoint.stdout is not None
+        base_url = json.loads(endpoint.stdout.readline())["base_url"]
+        command = ["-v", "run", "2s3z_pair", "--model", "openai", "--model-name", "focus-fire"]
+        command += ["--base-url", base_url, "--max-steps", "3", "--json"]
+        done = khala(*command, cwd=tmp_path, OPENAI_API_KEY=KEY)
+        endpoint.terminate()
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["results"][0]["statuses"]["Stalkers"] == {"ok": 3}
+    recording = tmp_path / json.loads(done.stdout)["recording"]
+    leftovers = [done.stdout, done.stderr, *(sample.payload.decode() for sample in Recording.open(recording))]
+    leftovers += [path.read_text() for path in recording.parent.glob("*.log")]
+    assert len(leftovers) > 10
+    assert not [text for text in leftovers if KEY in text]
+    assert KEY.encode() not in recording.read_bytes()
+
+
+def test_an_error_of_a_real_process_is_one_sentence_as_well(tmp_path: Path) -> None:
+    done = khala("run", "nosuch", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("khala: there is no task 'nosuch'")
+    assert "Traceback" not in done.stderr
+
+
+def tell(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return int(ended.value.code or 0), capsys.readouterr().out
+
+
+def test_the_doctor_says_what_it_finds_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out = tell(capsys, "doctor", "--json")
+    found = {finding["name"]: finding["state"] for finding in json.loads(out)["findings"]}
+    assert found["Python"] == found["PySC2"] == found["protobuf"] == "ok"
+
+
+def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SC2PATH", str(tmp_path))
+    code, out = tell(capsys, "doctor", "--json")
+    (wrong,) = [finding for finding in json.loads(out)["findings"] if finding["state"] == "wrong"]
+    assert code == 1
+    assert "khala sc2 install" in wrong["advice"]
+
+
+def test_every_task_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out = tell(capsys, "tasks", "--json")
+    names = {task["name"] for task in json.loads(out)["tasks"]}
+    assert {"2s3z", "2s3z_pair", "3s5z", "1c3s5z", "3s5z_vs_3s6z", "2c_vs_64zg", "2s_vs_1sc"} <= names
+
+
+@pytest.mark.parametrize("command", ["", "run", "host", "agent", "router", "llm", "replay", "doctor", "tasks", "sc2"])
+def test_help_teaches(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    code, out = tell(capsys, *command.split(), "--help")
+    assert code == 0
+    assert "Usage: khala" in out
+    if command in {"run", "host", "agent", "router", "llm", "replay"}:
+        assert "Examples:" in out
