@@ -42,13 +42,27 @@ class Surface:
         self.height, self.width = free.shape
         self._last = np.array([self.width - 1, self.height - 1])
         self.flat: Bools = free.ravel()
-        padded = np.pad(free, 1)
+        blocked = {(dx, dy): self._neighbour_blocked(dx, dy) for dx, dy in NEIGHBOURS}
         # free with all eight neighbours free: a body of at most one cell touches no wall from here
-        self.open: Bools = np.logical_and.reduce(
-            [padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width] for dx, dy in ((0, 0), *NEIGHBOURS)]
-        ).ravel()
+        self.open: Bools = self.flat & ~np.logical_or.reduce(list(blocked.values()))
+        # (cells, 2) whether the neighbour towards lower and towards higher x and y is blocked, as 0 and 1
+        self.walls_low: Floats = np.stack([blocked[-1, 0], blocked[0, -1]], axis=1).astype(np.float64)
+        self.walls_high: Floats = np.stack([blocked[1, 0], blocked[0, 1]], axis=1).astype(np.float64)
+        # corners of a cell (as offsets) at which only the diagonal neighbour is blocked, and of which cells
+        self.spikes: list[tuple[Floats, Bools]] = [
+            (np.array([max(dx, 0), max(dy, 0)], dtype=np.float64), blocked[dx, dy] & ~blocked[dx, 0] & ~blocked[0, dy])
+            for dx, dy in NEIGHBOURS
+            if dx and dy
+        ]
+        self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
         self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
         self._fields: dict[int, tuple[Ints, Floats]] = {}
+
+    def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
+        """(cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
+        padded = np.pad(self.free, 1)
+        shifted = padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width]
+        return ~shifted.ravel()
 
     # cells --------------------------------------------------------------------------------------------------------
 

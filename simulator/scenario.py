@@ -26,7 +26,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,7 +87,22 @@ class At(_Model):
     at_loop: Annotated[int, Field(ge=0)]
 
 
-When = Literal["start", "unit_died"] | Every | At
+def _kind(value: Any) -> str | None:
+    """Which of several models a value is meant to be: the name of its only key, or ``event`` for a word."""
+    if isinstance(value, str):
+        return "event"
+    keys = list(value) if isinstance(value, dict) else list(type(value).model_fields)
+    return str(keys[0]) if len(keys) == 1 else None
+
+
+When = Annotated[
+    Annotated[Literal["start", "unit_died"], Tag("event")]
+    | Annotated[Every, Tag("every_loops")]
+    | Annotated[At, Tag("at_loop")],
+    Discriminator(
+        _kind, custom_error_type="when", custom_error_message="give start, unit_died, {every_loops: n} or {at_loop: n}"
+    ),
+]
 
 
 class Condition(_Model):
@@ -131,7 +155,10 @@ class Result(_Model):
     result: dict[PlayerId, Outcome]
 
 
-Action = Create | Order | Result
+Action = Annotated[
+    Annotated[Create, Tag("create")] | Annotated[Order, Tag("order")] | Annotated[Result, Tag("result")],
+    Discriminator(_kind, custom_error_type="do", custom_error_message="give exactly one of create, order, result"),
+]
 
 
 class Trigger(_Model):
@@ -215,26 +242,31 @@ def parse_scenario(text: str, source: str) -> Scenario:
         return Scenario.model_validate(raw)
     except ValidationError as error:
         first = error.errors()[0]
-        where = [part for part in first["loc"] if not (isinstance(part, str) and part.istitle())]
-        line = _line_of(text, where)
-        field = ".".join(map(str, where)) or "the file"
-        raise ScenarioError(f"{source}:{line}: {field}: {first['msg']}") from error
+        line, field = _locate(text, first["loc"], missing=first["type"] == "missing")
+        message = first["msg"].removeprefix("Value error, ")
+        raise ScenarioError(f"{source}:{line}: {field or 'the file'}: {message}") from error
 
 
-def _line_of(text: str, where: list[int | str]) -> int:
-    """The line on which the innermost part of ``where`` that exists stands."""
+def _locate(text: str, where: tuple[int | str, ...], *, missing: bool) -> tuple[int, str]:
+    """The line of the innermost part of ``where`` that the file has, and the field's name.
+
+    Parts that are no key of the file are the validator's own names of alternatives; the last one may be ``missing``.
+    """
     node = yaml.compose(text, Loader=yaml.SafeLoader)
-    line = 1
+    line, field = 1, ""
     for part in where:
         if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
-            node = node.value[part]
+            node, field = node.value[part], f"{field}[{part}]"
         elif isinstance(node, yaml.MappingNode):
-            found = [(k, v) for k, v in node.value if k.value == str(part)]
-            if not found:
-                break
-            line, node = found[0][0].start_mark.line + 1, found[0][1]
+            found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
+            if found is None:
+                if missing and part == where[-1]:
+                    field = f"{field}.{part}".lstrip(".")
+                continue
+            node, field = found[1], f"{field}.{part}".lstrip(".")
+            line = found[0].start_mark.line + 1
             continue
         else:
-            break
+            continue
         line = node.start_mark.line + 1
-    return line
+    return line, field

@@ -53,10 +53,13 @@ class _Table:
 
     def append(self, count: int, **columns: object) -> None:
         """Add ``count`` rows; each column is given as one value for all or one per row."""
-        new = np.zeros(count, dtype=self.dtype)
+        old = len(self.rows)
+        rows = np.zeros(old + count, dtype=self.dtype)
+        rows[:old] = self.rows
+        new = rows[old:]
         for name, values in columns.items():
             new[name] = values
-        self.rows = np.concatenate([self.rows, new])
+        self.rows = rows
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Drop the rows where ``mask`` is false."""

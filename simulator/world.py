@@ -85,7 +85,6 @@ COLUMNS: Final[tuple[tuple[str, type, int, float], ...]] = (
     ("blocked", np.int64, 0, 0),
     ("detour", np.int64, 0, 0),
     ("detour_end", np.int64, 0, 0),
-    ("detour_review", np.int64, 0, 0),
     ("aside", np.float64, 2, 0),
 )
 # What follows from type, owner and upgrades, or is written anew in every loop before it is read.
@@ -189,7 +188,6 @@ class World:
     blocked: Ints  # (capacity,) loops without progress in a row
     detour: Ints  # (capacity,) side on which it goes around bodies, -1 right, 1 left, 0 none
     detour_end: Ints  # (capacity,) loop at which it forgets that side
-    detour_review: Ints  # (capacity,) loop at which it looks for a heading again
     aside: Floats  # (capacity, 2) heading around bodies, zero when the way itself is free
 
     radius: Floats  # (capacity,) body for ranges

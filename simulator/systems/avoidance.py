@@ -28,6 +28,7 @@ FAN_SIN = np.array([math.sin(math.radians(a)) for a in FAN_DEG])
 SEEN_AHEAD = 0.7
 TOLERANCE = 0.02
 LAYERS = tuple(Layer)
+AIR = Layer.AIR
 
 
 def find_headings(world: World) -> None:
@@ -35,13 +36,14 @@ def find_headings(world: World) -> None:
     n = world.top
     if not np.count_nonzero(world.detour[:n]):
         return
+    if world.loop % MECHANICS.detour_period:
+        return
     turning = which((world.detour[:n] != 0) & world.wants[:n])
     over = world.detour_end.take(turning) <= world.loop
     world.detour[turning[over]] = 0
     world.aside[turning[over]] = 0.0
-    due = turning[~over & (world.detour_review.take(turning) <= world.loop)]
+    due = turning[~over]
     if due.size:
-        world.detour_review[due] = world.loop + MECHANICS.detour_period
         _look(world, due)
 
 
@@ -107,7 +109,7 @@ def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
     layers = world.layer.take(slots)
     for layer in LAYERS:
         mine = layers == layer
-        if layer is not Layer.AIR and some(mine):
+        if layer is not AIR and some(mine):
             surface = world.ground.surface(layer)
             free[mine] = surface.flat[surface.cell(points[mine])]
     return free

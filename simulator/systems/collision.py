@@ -8,6 +8,7 @@ holds, an idle unit before a friend that comes through, nobody before an enemy. 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ from simulator.world import NOBODY
 if TYPE_CHECKING:
     from simulator.geometry import Floats
     from simulator.pathing import Surface
-    from simulator.world import Bools, Ints, World
+    from simulator.world import Ints, World
 
 CONTACT_SKIN = 0.2
 OVERLAP_ALLOWED = 1e-3
@@ -32,8 +33,8 @@ SAME_POINT = 1e-9
 EDGE_MARGIN = 1e-6
 IMMOBILE_YIELDING = 1e-6
 LAYERS = tuple(Layer)
-WALL_NEIGHBOURS = np.array([(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)])
-EIGHT_DIRECTIONS = WALL_NEIGHBOURS / geometry.length(WALL_NEIGHBOURS.astype(np.float64))[:, None]
+AIR = Layer.AIR
+EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 4)) for i in range(8)])
 
 
 def separate(world: World) -> None:
@@ -173,7 +174,7 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
         mine = which(moved & (layers == layer))
         if not mine.size:
             continue
-        if layer is Layer.AIR:
+        if layer is AIR:
             x0, y0, x1, y1 = world.map.terrain.playable
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
@@ -184,37 +185,29 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
 
 
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
-    """Positions (k, 2) pushed out of blocked cells; what can't be helped stays where it was."""
-    for _ in range(2):
-        cell = np.floor(after)
-        corner = cell[:, None, :] + WALL_NEIGHBOURS
-        nearest = np.clip(after[:, None, :], corner, corner + 1.0)
-        offset = after[:, None, :] - nearest
-        distance = geometry.length(offset)
-        depth = np.where(_blocked(surface, corner), clearance[:, None] - distance, 0.0)
-        deepest = np.argmax(depth, axis=1)
-        rows = np.arange(len(after))
-        depth, offset, distance = depth[rows, deepest], offset[rows, deepest], distance[rows, deepest]
-        push = np.where(depth > 0.0, depth / np.maximum(distance, 1e-9), 0.0)
-        after = after + offset * push[:, None]
-    return _free_or_back(surface, before, after)
-
-
-def _blocked(surface: Surface, corner: Floats) -> Bools:
-    x, y = corner[..., 0].astype(np.int64), corner[..., 1].astype(np.int64)
-    inside = (x >= 0) & (y >= 0) & (x < surface.width) & (y < surface.height)
-    index = np.where(inside, y * surface.width + x, 0)
-    blocked: Bools = ~(inside & surface.flat[index])
-    return blocked
+    """Positions (k, 2) kept a body's clearance away from blocked cells; what can't be helped stays where it was."""
+    cell = surface.cell(after)
+    corner = np.floor(after)
+    room = clearance[:, None]
+    low, high = surface.walls_low.take(cell, 0), surface.walls_high.take(cell, 0)
+    kept = np.minimum(np.maximum(after, corner + low * room), corner + 1.0 - high * room)
+    if some(surface.spiked.take(cell)):
+        for toward, spiked in surface.spikes:
+            at = which(spiked.take(cell))
+            if at.size:
+                offset = kept[at] - (corner[at] + toward)
+                distance = geometry.length(offset)
+                push = np.maximum(clearance[at] - distance, 0.0) / np.maximum(distance, SAME_POINT)
+                kept[at] += offset * push[:, None]
+    return _free_or_back(surface, before, kept)
 
 
 def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
     """Where the new place is blocked: slide along one axis, else stay, else leave towards the nearest free cell."""
-    limit = np.array([surface.width - EDGE_MARGIN, surface.height - EDGE_MARGIN])
-    after = np.clip(after, 0.0, limit)
-    bad = ~surface.flat[surface.cell(after)]
+    after = np.minimum(np.maximum(after, 0.0), (surface.width - EDGE_MARGIN, surface.height - EDGE_MARGIN))
+    bad = ~surface.flat.take(surface.cell(after))
     for axes in ((0,), (1,), ()):
-        if not bad.any():
+        if not some(bad):
             return after
         attempt = before.copy()
         for axis in axes:
@@ -222,7 +215,7 @@ def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
         fits = bad & surface.flat[surface.cell(attempt)]
         after[fits] = attempt[fits]
         bad &= ~fits
-    for i in np.flatnonzero(bad).tolist():
+    for i in which(bad).tolist():
         free = surface.nearest_free(before[i])
         if free is not None:
             after[i] = surface.centre(np.array(free))

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from simulator.world import Ints, World
 
 CORNER_REACHED = 0.4
+NEAR_CORNER = 1.8
+LOOK_PERIOD = 4  # looking over many at once costs little more than looking over one
 LAYERS = tuple(Layer)
+AIR = Layer.AIR
 
 
 def find_ways(world: World) -> None:
@@ -33,11 +36,7 @@ def find_ways(world: World) -> None:
     world.nav_point[walkers] = np.where(
         straight[:, None], world.goal.take(walkers, 0), world.nav_point.take(walkers, 0)
     )
-    due = world.nav_loop.take(walkers) <= world.loop
-    crooked = ~(straight | due)
-    if some(crooked):
-        offset = world.nav_point[walkers] - world.pos[walkers]
-        due |= crooked & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
+    due = world.nav_loop.take(walkers) <= (world.loop if world.loop % LOOK_PERIOD == 0 else 0)
     if not some(due):
         return
     walkers = walkers[due]
@@ -46,15 +45,16 @@ def find_ways(world: World) -> None:
         on_layer = walkers[layers == layer]
         if on_layer.size:
             _look_over(world, on_layer, layer)
-    # spread over the loops, so that a crowd told at once does not look at once for ever
-    world.nav_loop[walkers] = world.loop + MECHANICS.path_period - walkers % 2
+    left = geometry.length(world.nav_point.take(walkers, 0) - world.pos.take(walkers, 0))
+    soon = ~world.nav_straight.take(walkers) & (left < NEAR_CORNER)
+    world.nav_loop[walkers] = world.loop + np.where(soon, LOOK_PERIOD, MECHANICS.path_period)
 
 
 def _look_over(world: World, slots: Ints, layer: Layer) -> None:
     goal = world.goal[slots]
     surface = world.ground.surface(layer)
     straight = np.ones(len(slots), dtype=np.bool_)
-    if layer is not Layer.AIR:
+    if layer is not AIR:
         straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))
     world.nav_straight[slots] = straight
     world.nav_end[slots] = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -11,6 +11,9 @@ from simulator.players import PlayerSetup
 from simulator.scenario import parse_scenario
 from simulator.tick import advance
 from simulator.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
 
 BARE = """
 name: bare

@@ -7,6 +7,7 @@ import pytest
 from simulator import commands
 from simulator.orders import Order, OrderKind
 from simulator.players import GameResult
+from simulator.tick import advance
 
 
 def test_smart_attacks_enemies_follows_friends_and_walks_to_points(field: Any) -> None:
@@ -35,7 +36,7 @@ def test_a_unit_without_a_weapon_scan_moves(field: Any) -> None:
     [
         (lambda w, s: commands.move(w, s, (20, 20)), 16),
         (lambda w, s: commands.patrol(w, s, (20, 20)), 17),
-        (lambda w, s: commands.hold(w, s), 18),
+        (commands.hold, 18),
         (lambda w, s: commands.attack_move(w, s, (20, 20)), 23),
     ],
 )
@@ -133,8 +134,6 @@ def test_values_are_set_within_what_the_type_can_have(field: Any) -> None:
 
 
 def test_units_of_a_finished_game_stand_still(field: Any) -> None:
-    from simulator.tick import advance
-
     world = field.world
     unit = field.put("Zealot", 1, 10, 16)
     commands.move(world, [unit], (20, 16))

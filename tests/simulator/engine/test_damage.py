@@ -1,16 +1,18 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator import commands
 from simulator.catalog import load_catalog
 from simulator.stats import ATTRIBUTES, Stats, bit_set
 from simulator.systems import damage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 # attacker, weapon damage, bonus, victim, and by hand: what one hit takes from shields and from life
 PER_HIT = [
@@ -106,6 +108,7 @@ def test_armor_upgrades_count_for_units_that_already_stand_there(field: Any) -> 
     assert world.life[victim] == 35 - (8 - 1)
 
 
+@settings(deadline=None)
 @given(
     life=st.floats(0.5, 500),
     shields=st.floats(0, 500),

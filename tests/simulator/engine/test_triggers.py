@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,9 @@ from simulator.maps import load_map, map_names
 from simulator.orders import OrderKind
 from simulator.players import GameResult
 from simulator.tick import advance, new_game
-from simulator.world import World
+
+if TYPE_CHECKING:
+    from simulator.world import World
 
 ARMIES = {
     "llm_smac/1c3s5z": ({"Colossus": 1, "Stalker": 3, "Zealot": 5}, {"Colossus": 1, "Stalker": 3, "Zealot": 5}),

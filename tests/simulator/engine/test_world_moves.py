@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ from simulator.maps import load_map
 from simulator.systems.placement import free_places
 from simulator.tick import advance, new_game
 from simulator.traits import Layer
-from simulator.world import World
+
+if TYPE_CHECKING:
+    from simulator.world import World
 
 
 def deepest_overlap(world: World) -> float:

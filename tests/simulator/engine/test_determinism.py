@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from simulator import commands
+from simulator.maps import load_map
+from simulator.tick import advance, new_game
+from simulator.world import COLUMNS, World
+
+PLAYED = """
+import sys
+from simulator import commands
+from simulator.maps import load_map
+from simulator.tick import advance, new_game
+world = new_game(load_map(sys.argv[1]), seed=int(sys.argv[2]))
+commands.attack_move(world, world.units_of(1).tolist(), (20.0, 14.0))
+advance(world, 300)
+print(world.digest())
+"""
+
+
+def played(name: str, seed: int, loops: int = 300) -> World:
+    world = new_game(load_map(name), seed=seed)
+    commands.attack_move(world, world.units_of(1).tolist(), (20.0, 14.0))
+    advance(world, loops)
+    return world
+
+
+@pytest.mark.parametrize("name", ["2s3z", "1c3s5z", "2c_vs_64zg", "2s_vs_1sc"])
+def test_the_same_game_has_the_same_digest(name: str) -> None:
+    assert played(name, 5).digest() == played(name, 5).digest()
+
+
+def test_another_process_with_other_hashes_plays_the_same_game() -> None:
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", PLAYED, "3s5z", "7"],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert digests == {played("3s5z", 7).digest() + "\n"}
+
+
+def test_another_seed_plays_another_game() -> None:
+    assert len({played("2s3z", seed).digest() for seed in range(4)}) == 4
+
+
+def test_advancing_in_steps_of_any_size_is_the_same() -> None:
+    by_ones = new_game(load_map("3s5z"), seed=1)
+    for _ in range(200):
+        advance(by_ones)
+    by_eights = new_game(load_map("3s5z"), seed=1)
+    for _ in range(25):
+        advance(by_eights, 8)
+    assert by_ones.digest() == by_eights.digest()
+
+
+def test_looking_changes_nothing() -> None:
+    watched, alone = new_game(load_map("2s3z"), seed=1), new_game(load_map("2s3z"), seed=1)
+    for _ in range(100):
+        advance(watched)
+        watched.facing(), watched.heights(), watched.is_visible(1), watched.digest()
+        for slot in watched.live.tolist():
+            watched.orders_of(slot)
+    advance(alone, 100)
+    assert watched.digest() == alone.digest()
+
+
+@pytest.mark.parametrize("column", [name for name, _, _, _ in COLUMNS])
+def test_every_column_counts_in_the_digest(column: str) -> None:
+    world = new_game(load_map("2s3z"), seed=1)
+    before = world.digest()
+    array = getattr(world, column)
+    if array.dtype == np.bool_:
+        array[1] = ~array[1]
+    else:
+        array[1] += 1
+    assert world.digest() != before
+
+
+def test_queues_shots_scores_and_the_clock_count_in_the_digest() -> None:
+    world = played("2s3z", 1, 30)
+    seen = {world.digest()}
+    commands.move(world, world.units_of(1)[:1].tolist(), (3, 3), queue=True)
+    seen.add(world.digest())
+    world.players[1].score.damage_dealt.life += 1
+    seen.add(world.digest())
+    world.loop += 1
+    seen.add(world.digest())
+    world.rng.random()
+    seen.add(world.digest())
+    assert len(seen) == 5

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simulator.maps import load_map
+from simulator.pathing import Ground, Surface
+from simulator.traits import Layer
+
+ROOM = """
+..........
+.########.
+.#......#.
+.#.####.#.
+.#.#..#.#.
+.#.#....#.
+.#.######.
+.#........
+.########.
+..........
+"""
+
+
+def surface(drawing: str) -> Surface:
+    lines = drawing.strip().splitlines()[::-1]
+    return Surface(np.array([[c == "." for c in line] for line in lines]))
+
+
+def at(x: float, y: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    return np.array([x, y], dtype=np.float64)
+
+
+def test_the_way_through_a_spiral_is_found() -> None:
+    room = surface(ROOM)
+    here, goal = at(5.0, 5.5), at(9.5, 2.5)
+    walked = [here]
+    for _ in range(40):
+        corner = room.corners(here[None], room.cell(goal[None]))[0]
+        assert room.clear(here[None], corner[None])[0] or math.dist(here, corner) <= math.sqrt(2) + 0.71
+        here = corner
+        walked.append(here)
+        if math.dist(here, goal) < 0.8:
+            break
+    assert math.dist(here, goal) < 0.8
+    assert len(walked) < 15
+
+
+def test_a_straight_way_is_as_long_as_the_line_and_a_crooked_one_longer() -> None:
+    room = surface(ROOM)
+    assert room.distance(at(0.5, 0.5), at(9.5, 0.5)) == pytest.approx(9.0)
+    assert room.distance(at(4.5, 5.5), at(4.5, 0.5)) > 12
+
+
+def test_what_is_cut_off_has_no_way() -> None:
+    divided = surface("...#...\n...#...\n...#...")
+    assert divided.distance(at(0.5, 0.5), at(6.5, 0.5)) == 0
+    assert divided.distance(at(0.5, 0.5), at(3.5, 0.5)) == 0
+    assert set(divided.part.tolist()) == {-1, 0, 1}
+    assert divided.centre(np.array(divided.nearest(at(6.5, 1.5), 0))).tolist() == [2.5, 1.5]
+
+
+def test_a_line_does_not_pass_between_two_cells_that_touch_at_a_corner() -> None:
+    pinched = surface("..#\n.#.\n#..")
+    assert not pinched.clear(at(0.6, 0.4 + 1)[None], at(2.4, 0.9)[None])[0]
+    assert pinched.part.reshape(3, 3)[2, 0] != pinched.part.reshape(3, 3)[0, 2]
+
+
+def test_structures_close_the_ground_and_open_it_again() -> None:
+    terrain = load_map("llm_smac/3s_vs_3z").terrain
+    ground = Ground(terrain)
+    bare = ground.surface(Layer.WALK)
+    wall = np.array([(16, y) for y in range(-2, 40)])
+    ground.block(7, wall)
+    assert ground.surface(Layer.WALK).distance(at(5, 5), at(25, 5)) == 0
+    assert ground.surface(Layer.GLIDE).distance(at(5, 5), at(25, 5)) == 0
+    assert ground.surface(Layer.AIR).distance(at(5, 5), at(25, 5)) == 20
+    assert not ground.walk[5, 16]
+    ground.unblock(7)
+    assert ground.surface(Layer.WALK) is bare
+    assert terrain.walk.all()
+
+
+def test_games_on_one_terrain_share_what_was_found() -> None:
+    terrain = load_map("llm_smac/2c_vs_64zg").terrain
+    assert Ground(terrain).surface(Layer.WALK) is Ground(terrain).surface(Layer.WALK)
+
+
+@settings(max_examples=60, deadline=None)
+@given(x=st.floats(0.5, 31.5), y=st.floats(0.5, 31.5), to_x=st.floats(0.5, 31.5), to_y=st.floats(0.5, 31.5))
+def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
+    x: float, y: float, to_x: float, to_y: float
+) -> None:
+    ledge = Ground(load_map("llm_smac/2c_vs_64zg").terrain).surface(Layer.WALK)
+    a, b = at(x, y), at(to_x, to_y)
+    there, back = ledge.distance(a, b), ledge.distance(b, a)
+    if there == 0 or back == 0:
+        assert there == back or math.dist(a, b) == 0
+        return
+    assert there == pytest.approx(back, abs=1.5)  # ways count from cell to cell
+    assert there >= math.dist(a, b) - 1.5
