@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.systems import (
     acquire,
+    avoidance,
     collision,
     damage,
     death,
@@ -38,6 +39,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     engagement.measure,  # who is in reach of his target, who wants to walk where
     weapons.fire,  # attacks start, take effect, cool down
     navigation.find_ways,  # the next corner on the way to every goal
+    avoidance.find_headings,  # around bodies in the way
     movement.move,  # steps, turning, acceleration
     collision.separate,  # bodies and walls
     missiles.fly,
