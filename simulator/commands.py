@@ -22,7 +22,7 @@ from simulator.orders import (
     OrderKind,
 )
 from simulator.players import GameResult
-from simulator.systems.engagement import disengage, engage
+from simulator.targets import disengage, engage
 from simulator.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:

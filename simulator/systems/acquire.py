@@ -15,7 +15,7 @@ from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.stats import AIR_PLANE, GROUND_PLANE
-from simulator.systems.engagement import disengage, engage
+from simulator.targets import disengage, engage
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Engagement: who fights whom with which weapon, how far away it is, and where everybody wants to be this loop.
+"""Engagement: how far away every fight is, and where everybody wants to be this loop.
 
 Between choosing targets (``acquire``, orders) and acting on them (``weapons``, ``movement``). Writes the columns
 ``gap``, ``in_reach``, ``wants``, ``goal`` and ``stop_at``, which the later systems of the same loop read.
@@ -6,7 +6,6 @@ Between choosing targets (``acquire``, orders) and acting on them (``weapons``, 
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,55 +13,14 @@ import numpy as np
 from simulator.arrays import some, which
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.stats import GROUND_PLANE
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
     from simulator.world import Ints, World
 
-WIDEST_AIM_DEG = 180.0
 EDGE_TOLERANCE = 1e-9
 FOLLOW_GAP = 0.5
 FOLLOW = int(OrderKind.FOLLOW)
-
-
-def engage(world: World, slot: int, target: int) -> bool:
-    """Make a unit fight ``target`` with the weapon that fits; False when it has none."""
-    on_ground = bool(world.plane_bits[target] & GROUND_PLANE)
-    row = int(world.ground_weapon[slot]) if on_ground else -1
-    if row < 0 and (not on_ground or world.plane_bits[target] != GROUND_PLANE):
-        row = int(world.air_weapon[slot])
-    if row < 0:
-        return False
-    if world.target[slot] != target:
-        drop_attack(world, slot)
-    weapon = world.catalog.weapons[row]
-    world.target[slot] = target
-    world.weapon[slot] = row
-    world.reach[slot] = world.stats.range[world.owner[slot], row]
-    world.reach_min[slot] = weapon.min_range or -math.inf
-    world.slop[slot] = weapon.slop
-    turns = weapon.turret_deg_n is None and not world.unit_type(slot).unturnable
-    angle = min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)
-    world.aim_cos[slot] = math.cos(math.radians(angle)) if turns else -1.0
-    world.nav_loop[slot] = 0
-    return True
-
-
-def disengage(world: World, slot: int) -> None:
-    """Make a unit stop fighting; what it has fired stays on its way."""
-    drop_attack(world, slot)
-    world.target[slot] = NOBODY
-    world.weapon[slot] = -1
-    world.nav_loop[slot] = 0
-    world.scan_now = True
-
-
-def drop_attack(world: World, slot: int) -> None:
-    """Drop an attack that is started and has not taken effect; it leaves no cooldown."""
-    if world.windup[slot] >= 0.0:
-        world.windup[slot] = -1.0
-        world.cooldown[slot] = 0.0
 
 
 def measure(world: World) -> None:
