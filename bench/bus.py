@@ -5,11 +5,13 @@
 
 Compared are, in turns of a few rounds so that a noisy machine treats them alike:
     bus    `protocol.bus`: observations as STATE, replies as SPEECH
-    raw    Zenoh in asyncio as bus.md measured it: plain publishers, direct callbacks, `call_soon_threadsafe`
+    raw    Zenoh in asyncio: plain publishers, direct callbacks, a queue filled by `call_soon_threadsafe`
     bare   Zenoh without asyncio: the agent answers inside its callback, the host waits on a thread's event
 with the host itself as the router, and with a router process between them. Agents are spread over worker processes, one
 session each, over TCP on this machine. No codec and no work are in it: it is what the bus costs.
 """
+
+# ruff: noqa: D102  the methods are those of `Host`
 
 from __future__ import annotations
 
@@ -43,6 +45,8 @@ BLOCK = zenoh.CongestionControl.BLOCK  # raw publishers have no cache to make go
 
 @dataclass(frozen=True)
 class Sizes:
+    """Bytes of an observation and of a reply."""
+
     observation: int
     reply: int
 
@@ -93,7 +97,7 @@ async def work_raw(endpoint: str, agents: range, size: int) -> None:
 
         subscriber = session.declare_subscriber(observation_key(agent), Callback(hand_over, indirect=False))
         ready()
-        while subscriber:
+        while subscriber is not None:
             replies.put((await queue.get())[:HEAD_BYTES] + bytes(size - HEAD_BYTES))
 
     ready = barrier(len(agents))
@@ -133,12 +137,19 @@ class Host(Protocol):
 
     endpoint: str
 
-    async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None: ...
-    async def play(self, number: int) -> None: ...
-    async def close(self) -> None: ...
+    async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None:
+        """Declares everything."""
+
+    async def play(self, number: int) -> None:
+        """One round: all observations out, all replies in."""
+
+    async def close(self) -> None:
+        """Closes the session."""
 
 
-class BusHost:
+class BusHost(Host):
+    """Over `protocol.bus`."""
+
     async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None:
         self.bus: ZenohBus = await open_bus(config)
         self.endpoint = self.bus.endpoints[0]
@@ -158,7 +169,9 @@ class BusHost:
         await self.bus.close()
 
 
-class RawHost:
+class RawHost(Host):
+    """Over Zenoh, in asyncio."""
+
     async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None:
         self.session = open_raw(config)
         self.endpoint = locator(self.session) if config.listen else config.connect[0]
@@ -186,6 +199,8 @@ class RawHost:
 
 
 class BareHost(RawHost):
+    """Over Zenoh, with a thread's event."""
+
     head = b""
     missing = 0
     done = threading.Event()
@@ -200,7 +215,7 @@ class BareHost(RawHost):
         self.head, self.missing = number.to_bytes(HEAD_BYTES), len(self.publishers)
         for publisher in self.publishers:
             publisher.put(self.head + self.body)
-        if not self.done.wait(1.0):  # noqa: ASYNC251  blocking is what is measured here
+        if not self.done.wait(1.0):  # blocking is what is measured here
             raise TimeoutError
 
 
@@ -211,7 +226,7 @@ def locator(session: zenoh.Session) -> str:
     return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
 
 
-HOSTS: dict[str, type[BusHost | RawHost]] = {"bus": BusHost, "raw": RawHost, "bare": BareHost}
+HOSTS: dict[str, type[Host]] = {"bus": BusHost, "raw": RawHost, "bare": BareHost}
 WORKERS = {"bus": work_bus, "raw": work_raw, "bare": work_bare}
 
 

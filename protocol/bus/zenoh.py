@@ -35,7 +35,7 @@ from protocol.bus.config import BusConfig, check, settings
 from protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
 from protocol.bus.keyexpr import check_key, check_key_expr
 from protocol.bus.lane import Lane, Shut, Stopwatch, Window
-from protocol.bus.mailbox import Mailbox
+from protocol.bus.mailbox import Doorbell, Mailbox
 from protocol.bus.sightings import PATIENCE_S, Sightings
 from protocol.bus.threads import run_detached
 from protocol.errors import BusClosed, BusError
@@ -111,6 +111,7 @@ class ZenohBus:
         self._threads = [ThreadPoolExecutor(1, f"khala-{name}") for name in ("speech", "bulk")]
         self._speech = Lane(self._threads[0], Window(self._ask) if self._is_client else Shut())
         self._stopwatch = Stopwatch()
+        self._doorbell = Doorbell()
         self._mailboxes: set[Mailbox[Any]] = set()
         self._sightings: set[Sightings] = set()
         self._links = {str(transport.zid) for transport in session.info.transports()}
@@ -162,7 +163,9 @@ class ZenohBus:
         """See `protocol.bus.Bus.subscribe`."""
         self._check_open()
         check_key_expr(key_expr)
-        mailbox: Mailbox[Sample] = Mailbox(depth, on_close=lambda: self._forget(mailbox, *declared))
+        mailbox: Mailbox[Sample] = Mailbox(
+            depth, on_close=lambda: self._forget(mailbox, *declared), doorbell=self._doorbell
+        )
         take = Callback(partial(_take, mailbox), indirect=False)
         if delivery is Delivery.STATE:
             declared = _declare_state_subscriber(self._session, key_expr, take, mailbox)
