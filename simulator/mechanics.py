@@ -40,7 +40,7 @@ class Mechanics:
     path_period: int
     body_clearance: float
     chase_slack: float
-    push_iterations: int
+    push_rounds: int
     push_limit: float
     push_firm: float
     push_idle: float

@@ -252,11 +252,11 @@ class Ground:
         self.terrain = terrain
         self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
         self._blocked: dict[int, Ints] = {}
-        self._surfaces: dict[Layer, Surface] = {}
+        self._surfaces: list[Surface | None] = [None] * len(Layer)
 
     def surface(self, layer: Layer) -> Surface:
         """What units of a layer move on now."""
-        found = self._surfaces.get(layer)
+        found = self._surfaces[layer]
         if found is None:
             if layer is Layer.AIR or not self._blocked:
                 found = _bare_surface(self.terrain, layer)
@@ -280,7 +280,7 @@ class Ground:
 
     def _changed(self) -> None:
         self.walk = self._with_structures(self.terrain.walk)
-        self._surfaces.clear()
+        self._surfaces = [None] * len(Layer)
 
     def _with_structures(self, grid: Grid) -> Grid:
         grid = grid.copy()

@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from simulator.pathing import Surface
     from simulator.world import Ints, World
 
-CONTACT_SKIN = 0.2
-OVERLAP_ALLOWED = 1e-3
+CONTACT_SKIN = 0.1
+OVERLAP_ALLOWED = 0.005
 OVERLAP_PRESSED = 0.03
 SAME_POINT = 1e-9
+STIR = 1e3
 EDGE_MARGIN = 1e-6
 IMMOBILE_YIELDING = 1e-6
 LAYERS = tuple(Layer)
@@ -62,11 +63,11 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
     if pairs is None:
         return False
     start = after.copy()
-    deep = pairs.relax(after)
+    deep = pairs.relax(after, MECHANICS.push_rounds)
     if deep.size:
-        pressed = np.concatenate([pairs.first[deep], pairs.second[deep]])
+        pressed = pairs.one[deep]
         after[pressed] = start[pressed] = before[pressed]
-        pairs.relax(after)
+        pairs.relax(after, MECHANICS.push_rounds - 1)
     shift = after - start
     far = geometry.length(shift)
     if far.max() > MECHANICS.push_limit:
@@ -77,43 +78,32 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
 
 @dataclass(slots=True)
 class _Pairs:
-    """Pairs of bodies near each other, (k,) each, as indices into the living slots."""
+    """Bodies near each other, (k,) each, as indices into the living slots; every pair is there both ways round."""
 
-    first: Ints
-    second: Ints
+    one: Ints
+    other: Ints
     apart: Floats  # distance to keep
-    share_first: Floats  # part of an overlap that the first gives way
-    share_second: Floats
+    share: Floats  # part of an overlap that ``one`` gives way
 
-    def relax(self, at: Floats) -> Ints:
-        """Push overlapping pairs apart a few times over, in place; returns the pairs that stay deep in each other."""
-        x, y = np.ascontiguousarray(at[:, 0]), np.ascontiguousarray(at[:, 1])
-        n = len(at)
-        first, second, apart = self.first, self.second, self.apart
-        for _ in range(MECHANICS.push_iterations):
-            dx, dy = x.take(first) - x.take(second), y.take(first) - y.take(second)
-            distance = np.sqrt(dx * dx + dy * dy)
-            depth = apart - distance
-            if not some(depth > OVERLAP_ALLOWED):
+    def relax(self, at: Floats, rounds: int) -> Ints:
+        """Push overlapping pairs apart up to ``rounds`` times, in place; returns those that stay deep in each other."""
+        axes = np.ascontiguousarray(at.T)  # (2, n)
+        one, other, n = self.one, self.other, len(at)
+        while True:
+            offset = axes.take(one, 1) - axes.take(other, 1)
+            squared = offset * offset
+            distance = np.sqrt(squared[0] + squared[1])
+            depth = self.apart - distance
+            if rounds == 0 or not some(depth > OVERLAP_ALLOWED):
                 break
-            if distance.min() < SAME_POINT:
-                dx, dy, distance = self._part_same(dx, dy, distance)
+            rounds -= 1
             push = np.maximum(depth, 0.0) / distance
-            push_first, push_second = push * self.share_first, push * self.share_second
-            x += np.bincount(first, dx * push_first, n) - np.bincount(second, dx * push_second, n)
-            y += np.bincount(first, dy * push_first, n) - np.bincount(second, dy * push_second, n)
-        else:
-            dx, dy = x.take(first) - x.take(second), y.take(first) - y.take(second)
-            depth = apart - np.sqrt(dx * dx + dy * dy)
-        at[:, 0], at[:, 1] = x, y
+            push *= self.share
+            offset *= push
+            axes[0] += np.bincount(one, offset[0], n)
+            axes[1] += np.bincount(one, offset[1], n)
+        at[:] = axes.T
         return which(depth > OVERLAP_PRESSED)
-
-    def _part_same(self, dx: Floats, dy: Floats, distance: Floats) -> tuple[Floats, Floats, Floats]:
-        """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
-        same = distance < SAME_POINT
-        direction = EIGHT_DIRECTIONS[(self.first * 3 + self.second) % 8]
-        dx, dy = np.where(same, direction[:, 0], dx), np.where(same, direction[:, 1], dy)
-        return dx, dy, np.where(same, 1.0, distance)
 
 
 def _contacts(world: World, slots: Ints, at: Floats) -> _Pairs | None:
@@ -129,33 +119,42 @@ def _contacts(world: World, slots: Ints, at: Floats) -> _Pairs | None:
     squared += dy
     if not some(squared < touching):
         return None
-    first, second = np.nonzero(squared < near)
-    return _Pairs(first, second, apart[first, second], *_shares(world, slots.take(first), slots.take(second)))
+    one, other = np.nonzero(squared < near)
+    if squared[one, other].min() < SAME_POINT:
+        _stir(at, one, other, squared)
+    return _Pairs(one, other, apart[one, other], _shares(world, slots.take(one), slots.take(other)))
+
+
+def _stir(at: Floats, one: Ints, other: Ints, squared: Floats) -> None:
+    """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
+    same = one[squared[one, other] < SAME_POINT]
+    at[same] += EIGHT_DIRECTIONS[same % 8] * (1.0 + same[:, None]) * SAME_POINT * STIR
 
 
 def pair_table(world: World) -> tuple[Floats, Floats, Floats]:
     """Three distances of every pair of living units: touching squared, worth looking at squared, and to be kept.
 
-    The squared ones are -1 for pairs that never meet and in the lower half. Bodies collide when they share a layer;
-    what stands on a footprint is a wall, not a body.
+    The squared ones are -1 for pairs that never meet. Bodies collide when they share a layer; what stands on a
+    footprint is a wall, not a body.
     """
     slots = world.live
     bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
     radius = world.separation[slots]
     apart = radius[:, None] + radius
-    meets = np.triu((bits[:, None] & bits) != 0, 1)
+    meets = (bits[:, None] & bits) != 0
+    np.fill_diagonal(meets, val=False)
     touching = np.where(meets, np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2, -1.0)
     return touching, np.where(meets, (apart + CONTACT_SKIN) ** 2, -1.0), apart
 
 
-def _shares(world: World, first: Ints, second: Ints) -> tuple[Floats, Floats]:
-    """How much of an overlap each of a pair gives way, adding up to 1."""
-    friends = world.owner.take(first) == world.owner.take(second)
+def _shares(world: World, one: Ints, other: Ints) -> Floats:
+    """How much of an overlap the first of each pair gives way; what is left is the other one's."""
+    friends = world.owner.take(one) == world.owner.take(other)
     yielding, yielding_to_friend = _yielding(world)
-    a = np.where(friends, yielding_to_friend.take(first), yielding.take(first))
-    b = np.where(friends, yielding_to_friend.take(second), yielding.take(second))
-    a /= a + b
-    return a, 1.0 - a
+    mine = np.where(friends, yielding_to_friend.take(one), yielding.take(one))
+    theirs = np.where(friends, yielding_to_friend.take(other), yielding.take(other))
+    share: Floats = mine / (mine + theirs)
+    return share
 
 
 def _yielding(world: World) -> tuple[Floats, Floats]:
