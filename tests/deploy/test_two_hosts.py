@@ -1,0 +1,178 @@
+"""One match on two machines: two network namespaces with a cable between them, and the commands a person would type.
+
+On the first machine are router and host, on the second the agents and their model.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+    from pathlib import Path
+
+pytestmark = [pytest.mark.netns, pytest.mark.game]
+
+ROUTER = "tcp/192.0.2.1:7447"  # addresses of this range belong to nobody (RFC 5737)
+RUN = "two-hosts"
+AGENTS = ("Stalkers", "Zealots")
+READY_S, MATCH_S, END_S = 30.0, 60.0, 15.0
+
+
+@dataclass
+class Command:
+    """A running `khala` command."""
+
+    process: asyncio.subprocess.Process
+    log: Path
+
+    async def line(self) -> Any:
+        """What its next line on stdout says, as JSON."""
+        assert self.process.stdout is not None
+        async with asyncio.timeout(READY_S):
+            line = await self.process.stdout.readline()
+        assert line, self.log.read_text()
+        return json.loads(line)
+
+    async def said(self, text: str) -> None:
+        """Waits until this stands on its stderr."""
+        assert self.process.stderr is not None
+        async with asyncio.timeout(READY_S):
+            async for line in self.process.stderr:
+                self._keep(line)
+                if text in line.decode():
+                    return
+        pytest.fail(f"it never said {text!r}: {self.log.read_text()}")
+
+    async def result(self, within_s: float) -> Any:
+        """What it says as JSON when it has ended well."""
+        async with asyncio.timeout(within_s):
+            out, err = await self.process.communicate()
+        self._keep(err)
+        assert self.process.returncode == 0, self.log.read_text()
+        return json.loads(out)
+
+    def _keep(self, said: bytes) -> None:
+        with self.log.open("ab") as log:
+            log.write(said)
+
+
+@dataclass
+class Machine:
+    """A network namespace."""
+
+    name: str
+    address: str
+    directory: Path
+    commands: list[Command] = field(default_factory=list)
+
+    async def khala(self, *arguments: str) -> Command:
+        """Starts a command there."""
+        process = await asyncio.create_subprocess_exec(
+            *("ip", "netns", "exec", self.name, sys.executable, "-m", "khala", *arguments),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={name: value for name, value in os.environ.items() if not name.startswith("KHALA_")}
+            | {"KHALA_CACHE": str(self.directory / "cache")},
+        )
+        command = Command(process, self.directory / f"{self.name}-{len(self.commands)}-{arguments[0]}.log")
+        self.commands.append(command)
+        return command
+
+    def ip(self, *arguments: str) -> None:
+        """Changes its network."""
+        _ip("-n", self.name, *arguments)
+
+    async def off(self) -> None:
+        """Ends all that runs there."""
+        for command in self.commands:
+            if command.process.returncode is None:
+                command.process.kill()
+                await command.process.communicate()
+
+
+def _ip(*arguments: str) -> None:
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+
+
+@pytest.fixture
+async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine]]:
+    """Two machines that reach each other and nobody else."""
+    if os.geteuid() != 0 or shutil.which("ip") is None:
+        pytest.skip("network namespaces need root and iproute2")
+    first, second = (Machine(f"khala-{os.getpid()}-{n}", f"192.0.2.{n}", tmp_path) for n in (1, 2))
+    async with contextlib.AsyncExitStack() as stack:
+        for machine in (first, second):
+            try:
+                _ip("netns", "add", machine.name)
+            except subprocess.CalledProcessError as error:
+                pytest.skip(f"no network namespaces here: {error.stderr.strip()}")
+            stack.callback(_ip, "netns", "delete", machine.name)
+            stack.push_async_callback(machine.off)
+        cable = ("type", "veth", "peer", "name", "cable", "netns", second.name)
+        _ip("link", "add", "name", "cable", "netns", first.name, *cable)
+        for machine in (first, second):
+            machine.ip("address", "add", f"{machine.address}/24", "dev", "cable")
+            machine.ip("link", "set", "cable", "up")
+            machine.ip("link", "set", "lo", "up")
+        yield first, second
+
+
+async def _router_and_agents(first: Machine, second: Machine, *, latency_s: float) -> Command:
+    """A router here, both agents and their model there, ready to play."""
+    router = await first.khala("router", "--listen", ROUTER, "--insecure", "--json")
+    model = await second.khala("llm", "--port", "0", "--latency", str(latency_s), "--json")
+    await router.line()
+    check = await second.khala("router", "--check", "--connect", ROUTER, "--json")
+    where = ("--run", RUN, "--connect", ROUTER, "--base-url", (await model.line())["base_url"])
+    agents = await second.khala("agent", *AGENTS, *where, "--json")
+    assert len((await check.result(READY_S))["routers"]) == 1
+    await agents.said("waiting for the host")
+    return agents
+
+
+async def _host(first: Machine, *options: str) -> Command:
+    out = str(first.directory / "runs")
+    return await first.khala("host", "2s3z_pair", "--run", RUN, "--connect", ROUTER, "--out", out, "--json", *options)
+
+
+async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, Machine]) -> None:
+    first, second = machines
+    agents = await _router_and_agents(first, second, latency_s=0)
+    played = await (await _host(first)).result(MATCH_S)
+
+    (result,) = played["results"]
+    assert result["steps"] > 10
+    assert result["statuses"] == {name: {"ok": result["steps"]} for name in AGENTS}
+    did = (await agents.result(END_S))["agents"]
+    assert {name: (done["replies"], done["ended"]) for name, done in did.items()} == {
+        name: ({"ok": result["steps"]}, "result") for name in AGENTS
+    }
+    assert (first.directory / "runs" / RUN / "recording.mcap").stat().st_size > 0
+
+
+async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tuple[Machine, Machine]) -> None:
+    first, second = machines
+    agents = await _router_and_agents(first, second, latency_s=0.2)  # so that the match is young when it happens
+    host = await _host(first, "--max-wait", str(2 * MATCH_S))  # so that no deadline can end the wait
+    await host.said("step 0, ")
+    second.ip("link", "set", "cable", "down")
+
+    (result,) = (await host.result(MATCH_S))["results"]
+    assert {name: set(statuses) for name, statuses in result["statuses"].items()} == {
+        name: {"ok", "gone"} for name in AGENTS
+    }
+    agents.process.send_signal(signal.SIGTERM)
+    assert {done["ended"] for done in (await agents.result(END_S))["agents"].values()} == {"stopped"}
