@@ -87,9 +87,10 @@ class Traced(Protocol):
 
 
 class FunctionPolicy:
-    """Decides with a function. One that is not `async` runs in a thread, where it holds nobody up.
+    """Decides with a function. One that is not `async` runs in a thread, where it may block and holds nobody up.
 
-    A thread cannot be cancelled: what it still does after the deadline is thrown away.
+    A thread cannot be cancelled: what it still does after the deadline is thrown away. An `async` function runs on
+    the loop of all agents of the process, and must not block.
     """
 
     def __init__(self, function: Callable[[Briefing, Observation], Answer | Awaitable[Answer]]) -> None:

@@ -24,7 +24,7 @@ from agents.links import Links, join
 from agents.policy import Answer, Closing, Decision, Policy, Prepared, Traced
 from protocol import speech
 from protocol.codec import decode_as, encode
-from protocol.errors import BusClosed, PeerError
+from protocol.errors import BusClosed, BusError, PeerError
 from protocol.messages import Briefing, Exchange, Message, Observation, Reply, Result, Run, Usage, Wire
 
 if TYPE_CHECKING:
@@ -222,6 +222,8 @@ class Worker:
             await self._send(observation, decision, links, latency_s=self._clock() - arrived)
         except BusClosed:
             self._end("bus closed")
+        except BusError as error:  # the host will find this step unanswered, and the next may get through
+            log.warning("agent %s: the reply to step %d could not be sent: %s", self._name, observation.step, error)
 
     async def _decide(self, observation: Observation) -> Answer:
         briefing = await self._briefing_of(observation.episode)
@@ -289,14 +291,22 @@ class Worker:
 
     async def _publish_exchanges(self, links: Links) -> None:
         while True:
-            await links.exchanges.put(encode(await self._exchanges.get()))
+            await self._publish(await self._exchanges.get(), links)
 
     async def _flush(self, links: Links) -> None:
         try:
             while not self._exchanges.empty():
-                await links.exchanges.put(encode(self._exchanges.get_nowait()))
+                await self._publish(self._exchanges.get_nowait(), links)
         except BusClosed:
             log.info("agent %s: the bus was closed before all exchanges were sent", self._name)
+
+    async def _publish(self, exchange: Exchange, links: Links) -> None:
+        try:
+            await links.exchanges.put(encode(exchange))
+        except BusClosed:
+            raise
+        except BusError as error:
+            log.warning("agent %s: an exchange of step %d is lost: %s", self._name, exchange.step, error)
 
     # --- ending -------------------------------------------------------------------------------------
 

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from agents.llm.client import LLMError, Refused
+from agents.llm.limits import Budget, Limits
+from agents.llm.pricing import Prices
 from agents.llm_policy import LLMPolicy
 from agents.policy import Answer, Decision, FunctionPolicy
 from agents.scripted.policies import Fixed
 from agents.worker import Tally, run_worker, run_workers
+from protocol.errors import BusError
 from protocol.keys import Topic, every_agent
 from protocol.messages import Exchange, Message, Reply, Usage
 
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
 
     from agents.policy import Policy
+    from protocol.bus import Delivery
     from protocol.bus.memory import MemoryBroker, MemoryBus
     from protocol.messages import Briefing, Observation, Result, Run
 
@@ -403,6 +407,24 @@ async def test_a_request_that_the_deadline_cut_off_is_counted_as_unknown_and_not
     assert (exchange.status, exchange.completion) == ("cancelled", None)
 
 
+async def test_an_agent_without_money_goes_on_with_its_default_reply(
+    host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation], caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    model = listed_model("one", "two", "three")
+    limits = Limits(prices=Prices(prompt=1, completion=1), budget=Budget(1.0, source="--budget-usd"))
+    await players.start(LLMPolicy(model, limits=limits), default_reply="Actions:")
+    await host.say(briefing())
+    for step in range(5):
+        await host.say(observation(step))
+        await host.replies(step + 1)
+    said = [(r.text, r.status, r.detail, r.attempts) for r in host.of(Reply)]
+    assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("Actions:", "fallback", "budget", 0)] * 3]
+    assert len(model.requests) == 2
+    (record,) = caplog.records
+    assert "the limit budget_usd = 1 of --budget-usd is reached (1)" in record.getMessage()
+
+
 async def test_a_policy_is_prepared_at_each_episode_and_closed_at_the_end(
     host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing]
 ) -> None:
@@ -475,6 +497,51 @@ async def test_a_worker_ends_when_its_bus_is_closed(
     await asyncio.sleep(1)
     await players.buses[0].close()
     assert (await task).ended == "bus closed"
+
+
+class FailingOnce:
+    """A bus whose publishers cannot put the first time."""
+
+    def __init__(self, bus: MemoryBus) -> None:
+        self._bus = bus
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+    async def publisher(self, key: str, delivery: Delivery) -> Any:
+        publisher = await self._bus.publisher(key, delivery)
+        put, failed = publisher.put, False
+
+        async def put_later(payload: bytes) -> None:
+            nonlocal failed
+            if not failed:
+                failed = True
+                raise BusError("the link is congested")
+            await put(payload)
+
+        publisher.put = put_later  # type: ignore[method-assign]  # this one publisher only
+        return publisher
+
+
+async def test_a_reply_that_cannot_be_sent_costs_its_step_and_not_the_worker(
+    broker: MemoryBroker, host: Any, listed_model: Any, briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation], caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    stop = asyncio.Event()
+    bus: Any = FailingOnce(broker.session())
+    playing = asyncio.create_task(run_worker(bus, RUN, SIDE, AGENT, LLMPolicy(listed_model("one", "two")), stop=stop))
+    await host.say(briefing())
+    await host.say(observation(0))
+    await asyncio.sleep(1)
+    await host.say(observation(1))
+    await host.replies(1)
+    stop.set()
+    await playing
+    assert [reply.step for reply in host.of(Reply)] == [exchange.step for exchange in host.of(Exchange)] == [1]
+    assert sorted(record.getMessage() for record in caplog.records) == [
+        "agent Stalkers: an exchange of step 0 is lost: the link is congested",
+        "agent Stalkers: the reply to step 0 could not be sent: the link is congested",
+    ]
 
 
 async def test_several_agents_play_in_one_process_each_with_its_own_policy(

@@ -238,6 +238,18 @@ async def test_a_request_is_sent_as_the_profile_says(profile: Profile, params: d
     assert model.params == {**params, "top_p": 0.9}, "what is recorded"
 
 
+async def test_a_proxy_of_the_environment_is_used_except_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with Recorder() as proxy, Recorder() as here:
+        monkeypatch.setenv("HTTP_PROXY", proxy.base_url.removesuffix("/v1"))
+        monkeypatch.setenv("http_proxy", proxy.base_url.removesuffix("/v1"))
+        monkeypatch.delenv("no_proxy", raising=False)
+        monkeypatch.delenv("NO_PROXY", raising=False)
+        await ask(client("http://model.invalid/v1"))
+        await ask(client(here.base_url))
+    assert [headers["host"] for _, headers, _ in proxy.requests] == ["model.invalid"]
+    assert len(here.requests) == 1
+
+
 async def test_no_key_sends_no_authorization() -> None:
     async with Recorder() as server:
         await ask(client(server.base_url))
