@@ -11,18 +11,20 @@ import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_SIGNED = r"(-?\d+(?:\.\d+)?)"
 _SECTION = re.compile(r"\n(?=\S)")
 _TEAM = re.compile(r"Team (\S+)")
 _UNITS = re.compile(r"^    (Your|Allied|Enemy) units:\n((?:        .*\n?)*)", re.MULTILINE)
 _UNIT = re.compile(
-    r"^        \w+ \| tag (0x[0-9a-f]+) \| screen \[(-?[\d.]+), (-?[\d.]+)\][^|\n]*"
-    r"(?:\| distance ([\d.]+) )?\| health ([\d.]+)/[\d.]+(?: \| shield ([\d.]+))?",
-    re.MULTILINE,
+    rf"^        \w+ \| tag (0x[0-9a-f]+) \| screen \[{_SIGNED}, {_SIGNED}\][^|\n]*"
+    rf"(?:\| distance {_NUMBER} )?\| health {_NUMBER}/[\d.]+(?: \| shield {_NUMBER})?",
+    re.MULTILINE | re.ASCII,
 )
-_SCREEN = re.compile(r"    Screen on the map: x (-?[\d.]+) to (-?[\d.]+), y (-?[\d.]+) to (-?[\d.]+)")
+_SCREEN = re.compile(rf"    Screen on the map: x {_SIGNED} to {_SIGNED}, y {_SIGNED} to {_SIGNED}", re.ASCII)
 _VALID = re.compile(r"^    Team (\S+): (.*)", re.MULTILINE)
 _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
-_MAX_ACTIONS = re.compile(r"At most (\d+) actions? per team")
+_MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
 _WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTILINE)
 _NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from agents.scripted.players import PLAYERS, focus_fire, in_reach, random_legal, silent
 from agents.scripted.reading import Action, Situation, Unit, read
@@ -131,3 +133,16 @@ def test_the_host_writes_what_players_can_read(page: Path) -> None:
     assert all(team.actions for team in teams)
     speech = parse(focus_fire(text, quiet()))
     assert (len(speech.calls), speech.faults) == (len(teams), ())
+
+
+@given(st.data())
+def test_no_prompt_upsets_a_player(data: st.DataObject) -> None:
+    lines = OBSERVATION.splitlines()
+    pieces = st.one_of(st.sampled_from(lines), st.text(), st.sampled_from(OBSERVATION.split()))
+    text = "".join(data.draw(st.lists(st.tuples(pieces, st.sampled_from(["\n", " ", "", "."]))).map(_joined)))
+    for player in PLAYERS.values():
+        assert player(text, random.Random(0)).startswith("Analysis: ")
+
+
+def _joined(parts: list[tuple[str, str]]) -> str:
+    return "".join(text + end for text, end in parts)
