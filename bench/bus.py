@@ -11,8 +11,6 @@ with the host itself as the router, and with a router process between them. Agen
 session each, over TCP on this machine. No codec and no work are in it: it is what the bus costs.
 """
 
-# ruff: noqa: D102  the methods are those of `Host`
-
 from __future__ import annotations
 
 import argparse
@@ -306,7 +304,7 @@ async def run(arguments: argparse.Namespace) -> dict[str, Any]:
             rounds = max(TURN_ROUNDS, round(ROUNDS.get(agents, 100) * arguments.scale))
             took = await measure(agents, separate=separate, workers=arguments.workers, sizes=sizes, rounds=rounds)
             results.append(summary(agents, separate, took))
-            print(row(results[-1]), file=sys.stderr, flush=True)
+            print(row(results[-1]), file=arguments.table, flush=True)
     machine = {"cpus": os.cpu_count(), "python": platform.python_version(), "system": platform.platform()}
     return {"bench": "bus", "machine": machine, "workers": arguments.workers, "sizes": vars(sizes), "results": results}
 
@@ -346,7 +344,8 @@ def main() -> None:
     if arguments.process:
         asyncio.run(be_process(*arguments.process))
         return
-    print(HEADER, file=sys.stderr)
+    arguments.table = sys.stderr if arguments.json else sys.stdout
+    print(HEADER, file=arguments.table)
     result = asyncio.run(run(arguments))
     if arguments.json:
         print(json.dumps(result))

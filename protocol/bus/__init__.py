@@ -1,8 +1,9 @@
 """The bus: bytes under keys, with promises. Two implementations keep the same promises and pass the same tests.
 
-`protocol.bus.memory.MemoryBus` lives in one process and is what tests use; `protocol.bus.zenoh.ZenohBus`
-joins machines. Nothing here knows what the bytes mean (`protocol.codec` does) or how keys are built
-(`protocol.keys` does). Everything runs on one asyncio loop; nothing of a bus may be touched from another thread.
+`protocol.bus.memory.MemoryBus` lives in one process and is what tests use; `protocol.bus.zenoh.ZenohBus` joins
+machines. The tests are shipped, `protocol.bus.testing`. Nothing here knows what the bytes mean (`protocol.codec` does)
+or how keys are built (`protocol.keys` does). Everything runs on one asyncio loop; nothing of a bus may be touched from
+another thread, or after a fork.
 
     ┌──────────┬─────────────────────────────────────┬──────────────────────┬──────────────────────────────┐
     │ Delivery │ used for                            │ a slow receiver      │ a receiver that joins later  │
@@ -15,9 +16,12 @@ joins machines. Nothing here knows what the bytes mean (`protocol.codec` does) o
     │ LOG      │ exchange, report                    │ loses, silently      │ gets nothing from before     │
     └──────────┴─────────────────────────────────────┴──────────────────────┴──────────────────────────────┘
 
-Samples of one publisher arrive in order and at most once; so do the samples of all SPEECH publishers of one
-bus, whatever their keys, which is why a reply may be taken as the end of the messages sent before it. No
-promise covers a link that is down: whoever needs an answer correlates and counts.
+Slow is a link that is full or a process that stands still. A process that only does not take what arrived never slows a
+sender: its subscriptions keep the newest `depth` items and count the rest.
+
+Samples of one publisher arrive in order and at most once; so do the samples of all SPEECH publishers of one bus,
+whatever their keys, in the order in which their puts returned. This is why a reply may be taken as the end of the
+messages sent before it. No promise covers a link that is down: whoever needs an answer correlates and counts.
 """
 
 from __future__ import annotations
@@ -54,8 +58,10 @@ class Liveness:
 
     Attributes:
         key: the token's key.
-        alive: False when the session that declared it closed, died or was cut off.
-        link_up: False when it is our own link that is down, so that the other side may well be alive.
+        alive: False when the session that declared it closed, died (told within 50 ms) or was cut off or stopped (told
+            within the lease of its link, 2.5 s by default).
+        link_up: False when it is our own link that is down, so that the other side may well be alive. When our link is
+            back, those that are still there are reported `alive` again; of the others nothing more is heard.
     """
 
     key: str
@@ -74,8 +80,10 @@ class Publisher(Protocol):
     async def put(self, payload: bytes) -> None:
         """Sends `payload`; returns when it is on its way, which is no proof of arrival.
 
+        A put that is cancelled may still be sent.
+
         Raises:
-            BusClosed: the bus is closed.
+            BusClosed: the bus or the publisher is closed.
         """
         ...
 
@@ -86,6 +94,8 @@ class Publisher(Protocol):
 
 class Subscription(Protocol[T_co]):
     """What arrives, as an asynchronous iterator that ends when the subscription or the bus is closed.
+
+    What had arrived before is still handed out after that. A wait that is cancelled loses nothing.
 
     Attributes:
         dropped: items that arrived and were thrown away here, because nobody took them in time.
@@ -127,10 +137,11 @@ class Bus(Protocol):
     """A session on the bus."""
 
     async def publisher(self, key: str, delivery: Delivery) -> Publisher:
-        """Declares a publisher for one key.
+        """Declares a publisher for one key. It is open until it or the bus is closed, even if nobody refers to it.
 
         Raises:
             BusClosed: the bus is closed.
+            WrongKey: this is no key.
         """
         ...
 
@@ -139,19 +150,34 @@ class Bus(Protocol):
 
         Args:
             key_expr: a key, or an expression with `*` (one part) and `**` (any number of parts).
-            delivery: as the publishers of these keys declare it.
+            delivery: as the publishers of these keys declare it; STATE if they differ, which hears them all.
             depth: samples that wait here before the oldest is dropped; 1 keeps the newest only.
+
+        Raises:
+            BusClosed: the bus is closed.
+            WrongKey: this is no key expression.
+            ValueError: `depth` is less than 1.
         """
         ...
 
     async def announce(self, key: str) -> Token:
-        """Declares a liveliness token."""
+        """Declares a liveliness token. Two of one key look like one, so that a key names an instance.
+
+        Raises:
+            BusClosed: the bus is closed.
+            WrongKey: this is no key.
+        """
         ...
 
     async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
-        """Reports tokens: those that are there already at first, then every change."""
+        """Reports tokens: those that are there already at first, then every change.
+
+        Raises:
+            BusClosed: the bus is closed.
+            WrongKey: this is no key expression.
+        """
         ...
 
     async def close(self) -> None:
-        """Closes everything that was declared here; returns within two seconds. May be called twice."""
+        """Closes everything that was declared here, after what was put; within two seconds. May be called twice."""
         ...

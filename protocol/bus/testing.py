@@ -397,6 +397,18 @@ class BusConformance:
         await second.announce("alive/a")
         assert await take(watch, 1) == [Liveness("alive/a", alive=True)]
 
+    async def test_two_tokens_of_one_key_look_like_one_until_both_are_gone(self, connect: Connect) -> None:
+        host, first, second = await connect(), await connect(), await connect()
+        watch = await host.watch("alive/*")
+        tokens = [await session.announce("alive/a") for session in (first, second)]
+        await first.announce("alive/b")
+        assert {report.key for report in await take(watch, 2)} == {"alive/a", "alive/b"}
+        await tokens[0].close()
+        await second.announce("alive/c")
+        assert await take(watch, 1) == [Liveness("alive/c", alive=True)]
+        await tokens[1].close()
+        assert await take(watch, 1) == [Liveness("alive/a", alive=False)]
+
     async def test_tokens_are_no_samples_and_samples_no_tokens(self, connect: Connect) -> None:
         one, two = await connect(), await connect()
         subscription, watch = await one.subscribe("**", Delivery.STATE), await one.watch("**")
