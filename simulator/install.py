@@ -76,11 +76,14 @@ def _is_ours(executable: Path) -> bool:
 def _write_launcher(path: Path) -> None:
     package_root = Path(__file__).absolute().parent.parent
     # -I: the client's PYTHONPATH and its user site are not ours. exec: signals must reach the game itself.
+    # malloc: half a megabyte is made and freed for every observation; by default it goes back to the kernel each time,
+    # and fetching the pages again costs more (235 page faults, 0.5 ms) than drawing what is in them.
+    malloc = "export MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432"
     code = f"import sys; sys.path.insert(0, {str(package_root)!r}); from simulator.__main__ import main; main()"
     command = f'exec {shlex.quote(sys.executable)} -I -c {shlex.quote(code)} -executable "$0" "$@"'
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_suffix(".new")
-    fresh.write_text(f"#!/bin/sh\n{_MARK}\n{command}\n")
+    fresh.write_text(f"#!/bin/sh\n{_MARK}\n{malloc}\n{command}\n")
     fresh.chmod(0o755)
     fresh.replace(path)  # in one step: a client may be starting the game right now
 

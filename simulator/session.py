@@ -23,6 +23,8 @@ from simulator.status import Machine, Status, UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from simulator.api.wire import Part
+
 _BODY = {field.name: field.number for field in sc.Response.DESCRIPTOR.oneofs_by_name["response"].fields}
 _ID = sc.Response.DESCRIPTOR.fields_by_name["id"].number
 _STATUS = sc.Response.DESCRIPTOR.fields_by_name["status"].number
@@ -49,7 +51,7 @@ class Session:
             return self._respond([_error("The request is not a protobuf message of the SC2 API")], None)
         return self._respond(self._answer(request), request)
 
-    def _answer(self, request: sc.Request) -> list[bytes]:
+    def _answer(self, request: sc.Request) -> list[Part]:
         kind = request.WhichOneof("request")
         if kind is None:
             return [_error("The request is empty or of an unknown kind")]
@@ -61,7 +63,7 @@ class Session:
             traceback.print_exc()
             return [_error(f"The simulator failed in {kind}: {type(error).__name__}: {error}")]
 
-    def _dispatch(self, kind: str, request: sc.Request) -> list[bytes]:
+    def _dispatch(self, kind: str, request: sc.Request) -> list[Part]:
         move = "join_lan" if kind == "join_game" and request.join_game.HasField("server_ports") else kind
         self._machine.check(move)
         try:
@@ -72,10 +74,10 @@ class Session:
             self._machine.succeeded(move)
         if self._process.over:
             self._machine.end()
-        parts = [body.SerializeToString()] if isinstance(body, Message) else body
+        parts: list[Part] = [body.SerializeToString()] if isinstance(body, Message) else body
         return wire.embed(_BODY[kind], parts)
 
-    def _respond(self, parts: list[bytes], request: sc.Request | None) -> bytes:
+    def _respond(self, parts: list[Part], request: sc.Request | None) -> bytes:
         if request is not None and request.HasField("id"):
             parts = [*parts, wire.scalar(_ID, request.id)]
         return b"".join([*parts, wire.scalar(_STATUS, self._machine.status)])

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from simulator.api.game import Game
     from simulator.api.seat import Seat
+    from simulator.api.wire import Part
     from simulator.world import World
 
 MODS = ("Core", "Liberty", "Swarm", "Void", "VoidMulti")
@@ -38,7 +39,7 @@ class GameInfo:
         self._known: tuple[int, ...] | None = None
         self._paths = b""
 
-    def encode(self) -> list[bytes]:
+    def encode(self) -> list[Part]:
         """The parts of a `ResponseGameInfo`."""
         known = _known_structures(self._seat)
         if known != self._known:

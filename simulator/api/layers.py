@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from simulator.api.raster import Discs
     from simulator.api.sight import Sight
+    from simulator.api.wire import Part
     from simulator.world import World
 
     Bools = NDArray[np.bool_]
@@ -82,12 +83,12 @@ class FeatureLayers:
         self._screen = _Image(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
         self._minimap = _Image(spatial_pb2.FeatureLayersMinimap, shown, minimap.columns, minimap.rows)
 
-    def encode(self, frame: Frame) -> list[bytes]:
+    def encode(self, frame: Frame) -> list[Part]:
         """The parts of an `ObservationFeatureLayer`."""
         values = unit_values(frame.sight, frame.selected)
         return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
 
-    def _encode_screen(self, frame: Frame, values: Ints) -> list[bytes]:
+    def _encode_screen(self, frame: Frame, values: Ints) -> list[Part]:
         screen, image = self.screen, self._screen
 
         def axes() -> tuple[Floats, Floats]:
@@ -102,10 +103,10 @@ class FeatureLayers:
         discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
         layers = image.layers
         parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
-        parts += [layers["unit_density"].encode(discs.density), layers["unit_density_aa"].encode(discs.smooth)]
-        return parts + [layers[name].blank for name in BLANK]
+        parts += layers["unit_density"].encode(discs.density) + layers["unit_density_aa"].encode(discs.smooth)
+        return parts + [part for name in BLANK for part in layers[name].blank]
 
-    def _encode_minimap(self, frame: Frame, values: Ints) -> list[bytes]:
+    def _encode_minimap(self, frame: Frame, values: Ints) -> list[Part]:
         minimap, image = self.minimap, self._minimap
 
         def axes() -> tuple[Floats, Floats]:
@@ -119,9 +120,9 @@ class FeatureLayers:
         radius = frame.sight.radius[known] / minimap.scale
         discs = draw_discs(np.stack([x[known], y[known]], axis=1), radius, minimap.columns, minimap.rows)
         parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, known])
-        return [*parts, self._camera(frame), self._alerts(frame)]
+        return parts + self._camera(frame) + self._alerts(frame)
 
-    def _camera(self, frame: Frame) -> bytes:
+    def _camera(self, frame: Frame) -> list[Part]:
         view = self.screen.view(frame.camera)
         x0, y0 = self.minimap.to_pixels(view.x0, view.y1)
         x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
@@ -129,7 +130,7 @@ class FeatureLayers:
         image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
         return self._minimap.layers["camera"].encode(image)
 
-    def _alerts(self, frame: Frame) -> bytes:
+    def _alerts(self, frame: Frame) -> list[Part]:
         layer = self._minimap.layers["alerts"]
         if not len(frame.attacked):
             return layer.blank
@@ -147,33 +148,32 @@ class _Image:
         self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
         self._camera: tuple[float, float] | None = None
         self._walk: Bools | None = None
-        self._terrain: list[bytes] = []
+        self._terrain: list[Part] = []
+        self._visibility: list[Part] = []
 
-    def encode_units(self, discs: Discs, values: Ints) -> list[bytes]:
+    def encode_units(self, discs: Discs, values: Ints) -> list[Part]:
         """The layers that show units, from the values [k, n] of the discs' rows."""
         shown: list[bool] = np.any(values, axis=1).tolist()
-        spread = values[:, discs.rows]
-        return [
-            layer.encode_pixels(discs.pixels, spread[k]) if shown[k] else layer.blank for k, layer in self._of_units
-        ]
+        parts: list[Part] = []
+        for k, layer in self._of_units:
+            parts += layer.encode_pixels(discs.pixels, values[k].take(discs.rows)) if shown[k] else layer.blank
+        return parts
 
-    def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[bytes]:
+    def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
         """Terrain and visibility; drawn again only when the camera moved, the ground changed, or fog may have."""
-        world, layers = frame.world, self.layers
-        terrain, visibility = world.map.terrain, world.visibility[frame.player]
-        if self._camera != frame.camera or self._walk is not world.ground.walk:
+        world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
+        moved = self._camera != frame.camera or self._walk is not world.ground.walk
+        if moved or world.fog:
             x, y = axes()
-            self._camera, self._walk = frame.camera, world.ground.walk
-            self._terrain = [
-                layers["visibility_map"].encode(sample(visibility, x, y)),
-                layers["height_map"].encode(sample(terrain.height, x, y)),
-                layers["pathable"].encode(sample(world.ground.walk, x, y)),
-                layers["buildable"].encode(sample(terrain.build, x, y)),
-                layers["creep"].encode(sample(terrain.creep, x, y)),
-            ]
-        elif world.fog:
-            self._terrain[0] = layers["visibility_map"].encode(sample(visibility, *axes()))
-        return list(self._terrain)
+            self._visibility = layers["visibility_map"].encode(sample(world.visibility[frame.player], x, y))
+            if moved:
+                self._camera, self._walk = frame.camera, world.ground.walk
+                grids = {"height_map": terrain.height, "pathable": world.ground.walk, "buildable": terrain.build,
+                         "creep": terrain.creep}  # fmt: skip
+                self._terrain = [
+                    part for name, grid in grids.items() for part in layers[name].encode(sample(grid, x, y))
+                ]
+        return self._terrain + self._visibility
 
 
 def unit_values(sight: Sight, selected: Bools) -> Ints:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from simulator.api.game import Game
     from simulator.api.seat import Seat
     from simulator.api.sight import Sight
+    from simulator.api.wire import Part
 
 _OBSERVATION = sc.ResponseObservation.DESCRIPTOR.fields_by_name["observation"].number
 _LAYERS = sc.Observation.DESCRIPTOR.fields_by_name["feature_layer_data"].number
@@ -34,7 +35,7 @@ _ALARM_PAUSE_LOOPS = 160
 """Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
 
 
-def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[bytes]:
+def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
     """The parts of a `ResponseObservation`; takes along what is to be told only once."""
     world = game.world
     sight = seat.look(through_fog=disable_fog)
@@ -55,7 +56,7 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[bytes]
         observation.score.CopyFrom(holdings.score())
     if seat.options.raw:
         _write_raw(observation.raw_data, seat, sight, selected)
-    layers: list[bytes] = []
+    layers: list[Part] = []
     if seat.layers is not None:
         frame = Frame(world, seat.player, sight, selected, seat.camera, sight.pos[attacked])
         layers = wire.embed(_LAYERS, seat.layers.encode(frame))

@@ -17,9 +17,10 @@ from simulator.status import UsageError
 
 if TYPE_CHECKING:
     from simulator.api.process import Process
+    from simulator.api.wire import Part
 
 
-def game_info(process: Process, _: sc.RequestGameInfo) -> list[bytes]:
+def game_info(process: Process, _: sc.RequestGameInfo) -> list[Part]:
     """Players, options and the map."""
     return process.table.info.encode()
 
@@ -29,7 +30,7 @@ def tables(process: Process, request: sc.RequestData) -> sc.ResponseData:
     return data.answer(process.table.game.catalog, request)
 
 
-def observation(process: Process, request: sc.RequestObservation) -> list[bytes]:
+def observation(process: Process, request: sc.RequestObservation) -> list[Part]:
     """What the player knows now; with a game loop in real time, not before that loop."""
     table = process.table
     if table.clock is not None:

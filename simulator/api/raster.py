@@ -16,6 +16,8 @@ from simulator.api import wire
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from simulator.api.wire import Part
+
     Floats = NDArray[np.float64]
 
 _AT_ONCE = 8000
@@ -101,21 +103,20 @@ class Layer:
 
     def __init__(self, field: int, bits_per_pixel: int, columns: int, rows: int) -> None:
         self.bits_per_pixel = bits_per_pixel
-        self._dtype = _DTYPES[bits_per_pixel]
         self.area = columns * rows
+        self._dtype = _DTYPES[bits_per_pixel]
         size = (self.area * bits_per_pixel + 7) // 8
         shape = wire.scalar(1, columns) + wire.scalar(2, rows)
         header = wire.scalar(1, bits_per_pixel) + wire.head(2, len(shape)) + shape + wire.head(3, size)
-        self.head = wire.head(field, len(header) + size) + header
-        self.blank = self.head + bytes(size)
+        self._head = wire.head(field, len(header) + size) + header
+        self.blank: list[Part] = [self._head, bytes(size)]
 
-    def encode(self, image: NDArray[Any]) -> bytes:
-        """The field for an image, flat or [y, x]."""
-        if self.bits_per_pixel == 1:
-            return self.head + np.packbits(image, axis=None).tobytes()
-        return self.head + image.astype(self._dtype, copy=False).tobytes()
+    def encode(self, image: NDArray[Any]) -> list[Part]:
+        """The field for an image, flat or [y, x]; the image is not to change until it is sent."""
+        packed = np.packbits(image, axis=None) if self.bits_per_pixel == 1 else np.ascontiguousarray(image, self._dtype)
+        return [self._head, packed.data.cast("B")]
 
-    def encode_pixels(self, pixels: NDArray[np.intp], values: NDArray[np.int32]) -> bytes:
+    def encode_pixels(self, pixels: NDArray[np.intp], values: NDArray[np.int32]) -> list[Part]:
         """The field for an image that is 0 but at these pixels; of two values for one pixel the later one counts."""
         image = np.zeros(self.area, self._dtype)
         image[pixels] = values

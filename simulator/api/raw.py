@@ -42,14 +42,14 @@ class Units:
     def write(self, raw: raw_pb2.ObservationRaw) -> None:
         """Adds all units to an observation."""
         orders = self._orders()
-        for known, vital, level, slot in zip(self._known(), self._vitals(), self._levels(), self._slots(), strict=True):
+        for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
             unit = raw.units.add()
             _write_known(unit, *known)
             if unit.display_type == raw_pb2.Snapshot:
                 continue
             _write_vitals(unit, *vital)
-            self._write_side(unit, slot, *level)
-            if unit.alliance == raw_pb2.Self:
+            _write_side(unit, *side)
+            if slot in orders:
                 self._write_own(unit, slot)
                 for order, height in orders[slot]:
                     self._write_order(unit.orders.add(), order, height)
@@ -69,22 +69,13 @@ class Units:
         return _rows(s.life, s.life_max, s.shields, s.shields_max, s.energy, s.energy_max, s.flying, s.burrowed,
                      s.hallucination, s.active, self.selected)  # fmt: skip
 
-    def _levels(self) -> Iterator[tuple[int, ...]]:
-        tables = np.stack([self.types.levels(tuple(player.upgrades)) for player in self.world.players])
-        return _rows(*tables[self.world.owner[self.sight.slot], :, self.sight.row].T)
-
-    def _write_side(self, unit: raw_pb2.Unit, slot: int, attack: int, armor: int, shield: int) -> None:
-        types, row = self.types, int(self.world.type[slot])
-        mobile = unit.alliance != raw_pb2.Neutral and not types.structure[row]
-        unit.armor_upgrade_level, unit.shield_upgrade_level = armor, shield
-        if mobile or types.armed[row]:
-            unit.attack_upgrade_level = attack
-        if not mobile:
-            unit.is_powered = False
-        if types.minerals_in[row]:
-            unit.mineral_contents = int(types.resource[row])
-        if types.vespene_in[row]:
-            unit.vespene_contents = int(types.resource[row])
+    def _sides(self) -> Iterator[tuple[Any, ...]]:
+        s, types, row = self.sight, self.types, self.sight.row
+        tables = np.stack([types.levels(tuple(player.upgrades)) for player in self.world.players])
+        attack, armor, shield = tables[self.world.owner[s.slot], :, row].T
+        fixed = types.structure[row] | (s.alliance == Alliance.NEUTRAL)
+        minerals, vespene = types.resource[row] * types.minerals_in[row], types.resource[row] * types.vespene_in[row]
+        return _rows(attack, armor, shield, ~fixed | types.armed[row], fixed, minerals, vespene)
 
     def _write_own(self, unit: raw_pb2.Unit, slot: int) -> None:
         world, types, row = self.world, self.types, int(self.world.type[slot])
@@ -155,6 +146,20 @@ def _write_vitals(  # a row of the table, in the order of its columns
     unit.is_hallucination = hallucination
     unit.is_active = active
     unit.is_selected = selected
+
+
+def _write_side(
+    unit: raw_pb2.Unit, attack: int, armor: int, shield: int, fights: bool, fixed: bool, minerals: int, vespene: int
+) -> None:
+    unit.armor_upgrade_level, unit.shield_upgrade_level = armor, shield
+    if fights:
+        unit.attack_upgrade_level = attack
+    if fixed:
+        unit.is_powered = False
+    if minerals:
+        unit.mineral_contents = minerals
+    if vespene:
+        unit.vespene_contents = vespene
 
 
 def write_image(image: common_pb2.ImageData, grid: NDArray[Any], bits_per_pixel: int) -> None:

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from google.protobuf.message import Message
 
     from simulator.api.process import Process
+    from simulator.api.wire import Part
 
-    Handler = Callable[[Process, Any], Message | list[bytes]]
+    Handler = Callable[[Process, Any], Message | list[Part]]
 
 HANDLERS: Final[dict[str, Handler]] = {
     "ping": lobby.ping,

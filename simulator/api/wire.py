@@ -10,10 +10,10 @@ Everything that is small is built with the message classes; this module is for t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+Part: TypeAlias = bytes | memoryview
+"""A piece of a message; a view of an array is copied only when the pieces are joined."""
 
 _LENGTH_DELIMITED = 2
 
@@ -38,7 +38,6 @@ def head(field: int, size: int) -> bytes:
     return varint(field << 3 | _LENGTH_DELIMITED) + varint(size)
 
 
-def embed(field: int, parts: Iterable[bytes]) -> list[bytes]:
+def embed(field: int, parts: list[Part]) -> list[Part]:
     """Parts of a message, as parts of the message that holds it in this field."""
-    parts = list(parts)
     return [head(field, sum(map(len, parts))), *parts]

@@ -79,8 +79,8 @@ def test_samples_outside_of_the_map_are_zero() -> None:
     assert image.tolist() == [[0, 3, 4, 0], [0, 1, 2, 0], [0, 0, 0, 0]]
 
 
-def decode(data: bytes, name: str) -> common_pb2.ImageData:
-    image = getattr(spatial_pb2.FeatureLayers.FromString(data), name)
+def decode(parts: list[bytes | memoryview], name: str) -> common_pb2.ImageData:
+    image = getattr(spatial_pb2.FeatureLayers.FromString(b"".join(parts)), name)
     assert isinstance(image, common_pb2.ImageData)
     return image
 
