@@ -18,14 +18,16 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeVar
 
+from agents.briefings import Briefings
 from agents.deadline import time_to_decide_s
 from agents.guard import Guard
+from agents.ledger import Ledger
 from agents.links import Links, join
 from agents.policy import Answer, Closing, Decision, Policy, Prepared, Traced
 from protocol import speech
 from protocol.codec import decode_as, encode
 from protocol.errors import BusClosed, BusError, PeerError
-from protocol.messages import Briefing, Exchange, Message, Observation, Reply, Result, Run, Usage, Wire
+from protocol.messages import Briefing, Message, Observation, Reply, Result, Run, Usage, Wire
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Mapping
@@ -37,8 +39,6 @@ log = logging.getLogger(__name__)
 M = TypeVar("M", bound=Wire)
 Ending = Literal["result", "stopped", "bus closed"]
 
-BRIEFING_GRACE_S = 0.25
-"""Briefing and observation of a new episode travel on different topics: the briefing may come a moment later."""
 UNWIND_S = 1.0
 """What cancelled decisions get to end, when the worker ends."""
 
@@ -119,17 +119,15 @@ class Worker:
         self._guard = Guard(name, default_reply)
         self._clock = asyncio.get_running_loop().time
         self._ended = asyncio.Event()
-        self._briefing: Briefing | None = None
-        self._briefed = asyncio.Condition()
+        self._ledger = Ledger(name)
+        self._briefings = Briefings()
         self._card: Run | None = None
         self._last_result: int | None = None
         self._newest: tuple[int, int] | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
-        self._exchanges: asyncio.Queue[Exchange] = asyncio.Queue()
-        self._spent: list[Exchange] = []
         if isinstance(policy, Traced):
-            policy.trace = self._trace
+            policy.trace = self._ledger.note
 
     async def play(self, stop: asyncio.Event) -> Tally:
         """Joins, answers, and leaves; see `run_worker`."""
@@ -141,6 +139,7 @@ class Worker:
                 await self._serve(links, stop)
             except* BusClosed:
                 self.tally.ended = "bus closed"
+        self.tally.usage = self._ledger.usage
         return self.tally
 
     async def _serve(self, links: Links, stop: asyncio.Event) -> None:
@@ -150,7 +149,7 @@ class Worker:
                 group.create_task(self._hear_run(links)),
                 group.create_task(self._hear_results(links)),
                 group.create_task(self._hear_observations(links, group), name=f"observations {self._name}"),
-                group.create_task(self._publish_exchanges(links)),
+                group.create_task(self._ledger.publish(links.exchanges)),
                 group.create_task(self._watch(stop)),
             ]
             await self._ended.wait()
@@ -159,18 +158,14 @@ class Worker:
             if self._deciding:
                 await asyncio.wait({self._deciding})
             await self._guard.settle(UNWIND_S)
-            await self._flush(links)
+            await self._ledger.flush(links.exchanges)
 
     # --- hearing ------------------------------------------------------------------------------------
 
     async def _hear_briefings(self, links: Links, group: asyncio.TaskGroup) -> None:
         async for briefing in self._read(Briefing, links.briefings):
-            if briefing == self._briefing:
-                continue
-            async with self._briefed:
-                self._briefing = briefing
-                self._briefed.notify_all()
-            if isinstance(self._policy, Prepared):
+            is_new = await self._briefings.put(briefing)
+            if is_new and isinstance(self._policy, Prepared):
                 _cancel(self._preparing)
                 preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
                 self._preparing = group.create_task(preparing, name=f"prepare {self._name}")
@@ -214,7 +209,7 @@ class Worker:
     async def _answer(self, observation: Observation, links: Links) -> None:
         """One turn: decide, then send. Cancelled while deciding only."""
         arrived = self._clock()
-        self._spent = []
+        self._ledger.open((observation.episode, observation.step))
         time_s = time_to_decide_s(observation.answer_within_s)
         decision = await self._guard.within(time_s, self._decide(observation))
         self._deciding = None
@@ -226,23 +221,11 @@ class Worker:
             log.warning("agent %s: the reply to step %d could not be sent: %s", self._name, observation.step, error)
 
     async def _decide(self, observation: Observation) -> Answer:
-        briefing = await self._briefing_of(observation.episode)
+        briefing = await self._briefings.of(observation.episode)
         return await self._policy.decide(briefing, observation)
 
-    async def _briefing_of(self, episode: int) -> Briefing:
-        """The briefing of an episode; the last one there is, if that does not come in a moment."""
-        async with self._briefed:
-            try:
-                async with asyncio.timeout(BRIEFING_GRACE_S):
-                    await self._briefed.wait_for(
-                        lambda: self._briefing is not None and self._briefing.episode == episode
-                    )
-            except TimeoutError:
-                await self._briefed.wait_for(lambda: self._briefing is not None)
-        assert self._briefing is not None
-        return self._briefing
-
     async def _send(self, observation: Observation, decision: Decision, links: Links, *, latency_s: float) -> None:
+        attempts, usage = self._ledger.account()  # before anything is awaited, for another step may begin meanwhile
         spoken = speech.parse(decision.text)
         place = {
             "run": self._run,
@@ -254,7 +237,6 @@ class Worker:
         for said in spoken.messages:
             message = Message.model_validate({**place, "recipient": said.recipient, "text": said.text})
             await links.messages.put(encode(message))
-        spent = sum((exchange.usage for exchange in self._spent), Usage()) if self._spent else decision.usage
         reply = Reply.model_validate(
             {
                 **place,
@@ -263,8 +245,8 @@ class Worker:
                 "status": decision.status,
                 "detail": decision.detail,
                 "latency_s": latency_s,
-                "attempts": len(self._spent) or decision.attempts,
-                "usage": spent,
+                "attempts": attempts or decision.attempts,
+                "usage": usage if attempts else decision.usage,
             }
         )
         await links.replies.put(encode(reply))
@@ -280,33 +262,6 @@ class Worker:
         self.tally.replies[reply.status] += 1
         if reply.status == "fallback":
             self.tally.fallbacks[reply.detail] += 1
-
-    # --- what it took -------------------------------------------------------------------------------
-
-    def _trace(self, exchange: Exchange) -> None:
-        if (exchange.episode, exchange.step) == self._newest:
-            self._spent.append(exchange)
-        self.tally.usage += exchange.usage
-        self._exchanges.put_nowait(exchange)
-
-    async def _publish_exchanges(self, links: Links) -> None:
-        while True:
-            await self._publish(await self._exchanges.get(), links)
-
-    async def _flush(self, links: Links) -> None:
-        try:
-            while not self._exchanges.empty():
-                await self._publish(self._exchanges.get_nowait(), links)
-        except BusClosed:
-            log.info("agent %s: the bus was closed before all exchanges were sent", self._name)
-
-    async def _publish(self, exchange: Exchange, links: Links) -> None:
-        try:
-            await links.exchanges.put(encode(exchange))
-        except BusClosed:
-            raise
-        except BusError as error:
-            log.warning("agent %s: an exchange of step %d is lost: %s", self._name, exchange.step, error)
 
     # --- ending -------------------------------------------------------------------------------------
 
