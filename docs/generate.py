@@ -1,0 +1,62 @@
+"""Writes docs/reference: `python -m docs.generate`, and with `--check` says which pages are out of date.
+
+A page is a function in `docs.pages` that returns its text; here is only which function makes which page. Nothing in
+docs/reference is written by hand: a fact is changed where it is used, and its page follows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from docs.pages import cli, configs, game, language, messages, simulator
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+REFERENCE = Path(__file__).parent / "reference"
+
+PAGES: dict[str, Callable[[], str]] = {
+    "cli.md": cli.page,
+    "messages.md": messages.page,
+    "text-language.md": language.page,
+    "tasks.md": game.tasks,
+    "actions.md": game.actions,
+    "units.md": game.units,
+    "maps.md": game.maps,
+    "task-files.md": configs.task_files,
+    "model-files.md": configs.model_files_page,
+    "simulator.md": simulator.page,
+}
+
+
+def outdated(directory: Path = REFERENCE) -> list[str]:
+    """Names of pages that are missing, differ from what would be written, or are made by nobody."""
+    made = {name: page() for name, page in PAGES.items()}
+    found = {path.name: path.read_text(encoding="utf-8") for path in directory.glob("*.md")}
+    return sorted(name for name in made.keys() | found.keys() if made.get(name) != found.get(name))
+
+
+def write(directory: Path = REFERENCE) -> None:
+    """Writes every page."""
+    directory.mkdir(parents=True, exist_ok=True)
+    for name, page in PAGES.items():
+        (directory / name).write_text(page(), encoding="utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line; the exit code is 1 if pages are out of date."""
+    parser = argparse.ArgumentParser(prog="python -m docs.generate", description="Write the pages of docs/reference.")
+    parser.add_argument("--check", action="store_true", help="write nothing; fail if a page is out of date")
+    if not parser.parse_args(arguments).check:
+        write()
+        return 0
+    if old := outdated():
+        sys.stderr.write(f"out of date in docs/reference: {', '.join(old)}; `make docs` writes them\n")
+    return 1 if old else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+"""The pages of the files that a user writes: tasks, models, agents. Out of their models and the shipped files."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+from agents.config import CONFIGS, AgentsFile, ModelConfig, load_model, model_files
+from agents.llm.profiles import PROFILES, Profile
+from bridge import task
+from bridge.observe import teams
+from docs.pages.markdown import code, fence, head, join, prose, table
+from docs.pages.schema import Describer, about, parts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from pydantic import BaseModel
+
+NAMES: dict[object, str] = {
+    task.KeyName: "name",
+    task.UnitTypeName: "[unit type](units.md)",
+    task.ActionName: "[action](actions.md)",
+    task.MapName: "[map](maps.md)",
+}
+"""Names that are checked while a file is read; the first one may stand in a key of the bus."""
+DESCRIBER = Describer(NAMES)
+
+
+def task_files() -> str:
+    """What stands in a task file."""
+    example = CONFIGS / "tasks" / "llm_smac" / "2s3z_pair.yaml"
+    return join(
+        head("Task files", "the models in `bridge/task.py`"),
+        "YAML. A path to such a file can be given wherever a task is named; the shipped ones are [listed](tasks.md). "
+        "A mistake is reported with file, line and field. A name has 1 to 64 letters, digits, `_`, `.` or `-`.",
+        "Of the rules of the clock, `frozen` is the only one that is played so far.",
+        *_sections(task.TaskConfig, "##"),
+        "## Which unit answers to whom",
+        _grouping(),
+        "## Example",
+        *_file(example, "yaml task"),
+    )
+
+
+def model_files_page() -> str:
+    """What stands in a model file and in a file of agents, which ones ship, and what profiles differ in."""
+    return join(
+        head("Model files and agents files", "the models in `agents/config.py` and the files in `configs/`"),
+        "YAML. A model is given by the name of a shipped file or by a path that ends in `.yaml`. No file holds a key: "
+        "it names the environment variable that does.",
+        "## Shipped models",
+        _shipped(),
+        "## Model files",
+        *_sections(ModelConfig, "###"),
+        "### Example",
+        *_file(model_files()["openai"], "yaml model"),
+        "## Agents files",
+        "`khala agent --agents FILE` plays agents that decide in different ways in one process.",
+        *_sections(AgentsFile, "###"),
+        "### Example of an agents file",
+        *_file(CONFIGS / "agents" / "mixed.yaml", "yaml agents"),
+        "## Profiles",
+        _profiles(),
+    )
+
+
+def _sections(model: type[BaseModel], level: str) -> Iterator[str]:
+    """A section for a model, and one for each of its parts."""
+    for each in [model, *parts([model])]:
+        yield join(f"{level} {each.__name__}", about(each), DESCRIBER.fields(each))
+
+
+def _file(path: Path, language: str) -> tuple[str, str]:
+    return f"`{path.relative_to(CONFIGS.parent).as_posix()}`:", fence(path.read_text(encoding="utf-8"), language)
+
+
+def _grouping() -> str:
+    """The rules of `bridge.observe.teams`, without its title and its sources."""
+    _, *paragraphs = (inspect.getdoc(teams) or "").split("\n\n")
+    return prose("\n\n".join(text for text in paragraphs if not text.startswith("The head")))
+
+
+def _shipped() -> str:
+    rows = []
+    for name in model_files():
+        model = load_model(name)
+        prices = f"{model.prices.prompt:g} / {model.prices.completion:g}" if model.prices.known else "not given"
+        rows.append((code(name), model.profile, code(model.model), code(model.base_url), *_variables(model), prices))
+    return table(("name", "profile", "model", "base URL", "or at", "key in", "USD per million tokens, in / out"), rows)
+
+
+def _variables(model: ModelConfig) -> tuple[str, ...]:
+    return tuple(code(name) if name else "" for name in (model.base_url_env, model.api_key_env))
+
+
+def _profiles() -> str:
+    names = [field.name for field in fields(Profile)]
+    rows = [(code(name), *(_said(getattr(profile, field)) for field in names)) for name, profile in PROFILES.items()]
+    rows.append((code("anthropic"), "Anthropic's own messages API"))
+    attributes = (inspect.getdoc(Profile) or "").partition("Attributes:\n")[2]
+    meanings = [line.strip().split(": ", 1) for line in attributes.splitlines() if line.strip()]
+    wide = [(*row, *[""] * (len(names) + 1 - len(row))) for row in rows]
+    return join(
+        "What endpoints of one kind must be sent or asked differently.",
+        table(("profile", *names), wide),
+        table(("column", "meaning"), [(code(name), meaning) for name, meaning in meanings]),
+    )
+
+
+def _said(value: object) -> str:
+    if isinstance(value, tuple):
+        return code(".".join(map(str, value)))
+    return {True: "yes", False: "no"}[value] if isinstance(value, bool) else code(value)

@@ -1,0 +1,33 @@
+"""The page of the text language, out of the modules that read it."""
+
+from __future__ import annotations
+
+import inspect
+
+from docs.pages.markdown import fence, head, join
+from protocol import speech
+from protocol.speech import arguments, headings
+
+
+def page() -> str:
+    """What a reply looks like, and the rules of tolerance."""
+    _, example, *paragraphs = (inspect.getdoc(speech) or "").split("\n\n")
+    return join(
+        head("The text language", "the docstrings of `protocol/speech`"),
+        "What an agent says. Names of actions and what they take are in [the catalogue](actions.md).",
+        fence(inspect.cleandoc(example)),
+        *(text for text in paragraphs if text.startswith("`parse`")),
+        "Each rule below has a row in a table test, `tests/protocol/test_speech.py`.",
+        "## Calls and messages",
+        _table(speech),
+        "## Headings",
+        _table(headings),
+        "## Arguments",
+        _table(arguments),
+    )
+
+
+def _table(module: object) -> str:
+    """The table in the docstring of a module."""
+    lines = (inspect.getdoc(module) or "").splitlines()
+    return "\n".join(line for line in lines if line.startswith("|"))

@@ -1,0 +1,70 @@
+"""The page of the messages, out of their models."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from typing import TYPE_CHECKING
+
+from docs.pages.markdown import anchor, code, fence, head, join, prose, table
+from docs.pages.schema import Describer, about, parts, remarks
+from protocol import keys, messages
+from protocol.messages import MESSAGE_TYPES, Wire
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+DESCRIBER = Describer()
+LITERALS = {"AgentStatus": "AgentReport.status", "RejectionReason": "Rejection.reason"}
+"""Literals of the module whose values carry remarks, and the field that holds one."""
+
+
+def page() -> str:
+    """Keys, messages, their parts, and what single words mean."""
+    return join(
+        head("Messages", "`protocol/messages.py` and `protocol/keys.py`"),
+        "UTF-8 JSON, one object a message, told apart by `kind`. Unknown fields are errors, and so is another major "
+        "version `v`. How they are delivered: [the bus](../design/bus.md).",
+        "## Keys",
+        _keys(),
+        table(("message", "about"), [(f"[{m.__name__}]({anchor(m.__name__)})", _first(m)) for m in MESSAGE_TYPES]),
+        prose(_frames()),
+        f"Every message has `v` (integer, {messages.SCHEMA_VERSION}), `run` (name of the run) and `kind` (its name in "
+        "lower case); they are left out below.",
+        *(_section(model, "##") for model in MESSAGE_TYPES),
+        "## Parts",
+        *(_section(model, "###") for model in parts(MESSAGE_TYPES)),
+        "## Words",
+        *(_words(name, field) for name, field in LITERALS.items()),
+    )
+
+
+def _section(model: type[BaseModel], level: str) -> str:
+    without = [*Wire.model_fields, "kind"] if issubclass(model, Wire) else []
+    return join(f"{level} {model.__name__}", about(model), DESCRIBER.fields(model, without=without))
+
+
+def _keys() -> str:
+    """The forms of keys as their module draws them, and what a name may be."""
+    text = inspect.getdoc(keys) or ""
+    _, forms, *rest = text.split("\n\n")
+    return join(fence(inspect.cleandoc(forms)), prose("\n\n".join(rest)), _first(keys.check_name, "Raises:"))
+
+
+def _first(thing: object, stop: str | None = None) -> str:
+    """The first paragraph of a docstring, or its section under `stop`."""
+    text = inspect.getdoc(thing) or ""
+    if stop is None:
+        return text.split("\n\n", maxsplit=1)[0]
+    under = re.search(rf"{stop}\n\s+WrongKey: (.+)", text)
+    return f"A name is refused when {under.group(1)}" if under else ""
+
+
+def _frames() -> str:
+    """What the module says of frames and units, without its first sentence."""
+    return (inspect.getdoc(messages) or "").split("\n\n", 1)[1].partition("provider is imported here. ")[2]
+
+
+def _words(name: str, field: str) -> str:
+    rows = [(code(value), remark) for value, remark in remarks(messages, name)]
+    return join(f"### {code(field)}", table(("value", "meaning"), rows))

@@ -1,0 +1,134 @@
+"""The page of the simulator: what it models, what it estimates, what it refuses. Out of its own data and code."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import simulator.api
+from docs.pages.markdown import code, codes, head, join, prose, table
+from simulator.api import layers
+from simulator.api.abilities import ABILITIES
+from simulator.api.data import rows as api_rows
+from simulator.api.requests import HANDLERS
+from simulator.catalog import VERSION_OF_BUILD, load_catalog
+from simulator.install import BASE_BUILD
+from simulator.maps import load_map, map_names
+from simulator.mechanics import entries
+from simulator.tick import SYSTEMS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.mechanics import Entry
+    from simulator.world import World
+
+SOURCES = "SOURCES.md"
+REFUSAL = "not supported"
+"""What stands in a sentence with which the simulator refuses what the game can do."""
+SOURCED = {"catalog": "the game's data", "replay": "recorded games"}
+
+
+def page() -> str:
+    """Everything that a reader of results must know of the game that was played."""
+    return join(
+        head("The simulator", "`simulator/data` and the simulator's own tables"),
+        "How it is built: [design](../design/simulator.md). Where the data is from: "
+        "[SOURCES.md](../../simulator/data/SOURCES.md).",
+        _tables(),
+        "## One game loop",
+        "The laws of the world, in the order in which they apply.",
+        table(("law", "in words"), [(code(system.__module__.rpartition(".")[2]), _law(system)) for system in SYSTEMS]),
+        "## What a player can order",
+        _abilities(),
+        "## Requests",
+        f"Of the SC2 API it takes {codes(HANDLERS)}.",
+        "## What is an estimate",
+        _chapter("What is an estimate"),
+        "### Constants of the rules",
+        _constants(),
+        "### Weapons",
+        _weapons(),
+        "### Maps",
+        _maps(),
+        "## Constants that have a source",
+        _sourced(),
+        "## What is not modelled",
+        _chapter("Not modelled by the rules yet"),
+        "Refused with a sentence that says so:",
+        "\n".join(f"* {text}" for text in _refusals()),
+        f"Screen layers that are sent empty: {codes(layers.BLANK)}.",
+    )
+
+
+def _tables() -> str:
+    rows = []
+    for build, version in VERSION_OF_BUILD.items():
+        catalog = load_catalog(version)
+        played = "yes" if build == BASE_BUILD else ""
+        rows.append((version, build, len(catalog.units), len(catalog.weapons), len(catalog.upgrades), played))
+    return table(("tables of version", "build", "unit types", "weapons", "upgrades", "what clients see"), rows)
+
+
+def _law(system: Callable[[World], None]) -> str:
+    return (inspect.getdoc(sys.modules[system.__module__]) or "").split("\n\n", maxsplit=1)[0]
+
+
+def _abilities() -> str:
+    listed = {int(row["ability_id"]): row for row in api_rows("abilities")}
+    rows = [(code(ability.id), listed[ability.id]["friendly_name"]) for ability in ABILITIES]
+    return join(
+        f"The game's API lists {len(listed)} abilities. These are carried out, by their specific or their general id; "
+        "every other one is answered with `NotSupported`.",
+        table(("ability", "name"), rows),
+    )
+
+
+def _constants() -> str:
+    rows = [(code(e.name), _value(e), e.unit, e.note) for e in entries() if e.source not in SOURCED]
+    return table(("constant", "value", "unit", "meaning"), rows)
+
+
+def _sourced() -> str:
+    rows = [(code(e.name), _value(e), e.unit, e.note, SOURCED[e.source]) for e in entries() if e.source in SOURCED]
+    return table(("constant", "value", "unit", "meaning", "source"), rows)
+
+
+def _value(entry: Entry) -> object:
+    return {True: "yes", False: "no"}[entry.value] if isinstance(entry.value, bool) else entry.value
+
+
+def _weapons() -> str:
+    rows = [(code(weapon.id), ", ".join(weapon.estimates)) for weapon in load_catalog().weapons if weapon.estimates]
+    return table(("weapon", "estimated"), rows)
+
+
+def _maps() -> str:
+    found: dict[str, list[str]] = {}
+    for name in map_names():
+        for text in load_map(name).scenario.estimates:
+            found.setdefault(text, []).append(name)
+    rows = [(text, "every map" if names == list(map_names()) else codes(names)) for text, names in found.items()]
+    return table(("what a map's file does not say", "maps"), rows)
+
+
+def _chapter(title: str) -> str:
+    """A chapter of the data's own account of its sources."""
+    text = (resources.files("simulator.data") / SOURCES).read_text(encoding="utf-8")
+    return prose(text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip())
+
+
+def _refusals() -> list[str]:
+    """The sentences with which requests are refused, where the game would do what is asked."""
+    directory = Path(next(iter(simulator.api.__path__)))
+    constants = (
+        node.value
+        for path in sorted(directory.glob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+    return list(dict.fromkeys(text for text in constants if REFUSAL in text and "\n" not in text))
