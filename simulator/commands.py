@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from simulator.columns import NOBODY
 from simulator.orders import (
     ATTACK,
     HOLD_POSITION,
@@ -23,7 +24,7 @@ from simulator.orders import (
 )
 from simulator.players import GameResult
 from simulator.targets import disengage, engage
-from simulator.world import NO_TAG, NOBODY
+from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -128,6 +129,7 @@ def debug_kill(world: World, tags: Iterable[int]) -> None:
         slot = world.slot_of(tag)
         if slot != NOBODY:
             world.life[slot] = 0.0
+            world.attacker[slot] = NOBODY
 
 
 def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:

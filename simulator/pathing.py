@@ -123,9 +123,8 @@ class Surface:
         scale = SIDE_CLEARANCE / np.maximum(distance, SIDE_CLEARANCE)
         side = np.stack([-offset[:, 1] * scale, offset[:, 0] * scale], axis=1)
         line = start[:, None, :] + offset[:, None, :] * share[None, :, None]
-        left = self.flat[self.cell(line + side[:, None, :])].all(axis=1)
-        right = self.flat[self.cell(line - side[:, None, :])].all(axis=1)
-        result: Bools = left & right
+        both = self.flat.take(self.cell(line + side[:, None, :])) & self.flat.take(self.cell(line - side[:, None, :]))
+        result: Bools = np.logical_and.reduce(both, axis=1)
         return result
 
     # ways ---------------------------------------------------------------------------------------------------------

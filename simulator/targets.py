@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from simulator.columns import NOBODY
 from simulator.stats import GROUND_PLANE
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
     from simulator.world import World

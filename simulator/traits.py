@@ -33,7 +33,7 @@ def layer_of(unit: UnitType) -> Layer:
 
 
 def body_traits(world: World, slot: int) -> None:
-    """Write all traits of a slot; see ``world.TRAITS``."""
+    """Write all traits of a slot; see the traits of ``columns``."""
     unit = world.unit_type(slot)
     at = (int(world.owner[slot]), unit.row)
     turn_deg = unit.turn_deg_n / LOOPS_PER_NORMAL_SECOND

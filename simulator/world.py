@@ -4,21 +4,21 @@ State and bookkeeping only. What happens in it is in ``systems``, what players a
 ``tick`` advances it, and the API reads it. A slot is the index of a unit in every array; slots of dead units are used
 again with another tag, so whoever keeps a unit for longer than a loop keeps its tag.
 
-Everything that decides the future lies in ``COLUMNS``, the queues, the shots under way, the players, the random
-generator and the loop counter; ``digest`` covers exactly these. ``TRAITS`` only spare the systems a look-up.
+Everything that decides the future lies in the state columns, the queues, the shots under way, the players, the random
+generator and the loop counter; ``digest`` covers exactly these.
 """
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulator import geometry
 from simulator.catalog import load_catalog
+from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
@@ -29,104 +29,16 @@ from simulator.traits import body_traits
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from simulator.catalog import Catalog, UnitType
-    from simulator.geometry import Floats
     from simulator.maps import GameMap
 
-NOBODY: Final = -1  # no slot
+__all__ = ["NOBODY", "NO_TAG", "Death", "World"]
+
 NO_TAG: Final = 0
 TAG_BASE: Final = 1 << 32
 INDEX_SHIFT: Final = 18
-
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
-
-# name, dtype, width (0 is a plain column), value of an unused slot
-COLUMNS: Final[tuple[tuple[str, type, int, float], ...]] = (
-    ("alive", np.bool_, 0, 0),
-    ("tag", np.int64, 0, 0),
-    ("type", np.int64, 0, 0),
-    ("owner", np.int64, 0, 0),
-    ("pos", np.float64, 2, 0),
-    ("heading", np.float64, 2, 0),
-    ("speed", np.float64, 0, 0),
-    ("life", np.float64, 0, 0),
-    ("shields", np.float64, 0, 0),
-    ("energy", np.float64, 0, 0),
-    ("build_progress", np.float64, 0, 1),
-    ("cloaked", np.bool_, 0, 0),
-    ("burrowed", np.bool_, 0, 0),
-    ("hallucination", np.bool_, 0, 0),
-    ("born_loop", np.int64, 0, 0),
-    ("damaged_loop", np.int64, 0, -(1 << 30)),
-    ("order_kind", np.int64, 0, 0),
-    ("order_ability", np.int64, 0, 0),
-    ("order_target", np.int64, 0, NOBODY),
-    ("order_point", np.float64, 2, 0),
-    ("order_origin", np.float64, 2, 0),
-    ("target", np.int64, 0, NOBODY),
-    ("attacker", np.int64, 0, NOBODY),
-    ("scan_loop", np.int64, 0, 0),
-    ("guard", np.float64, 2, 0),
-    ("returning", np.bool_, 0, 0),
-    ("weapon", np.int64, 0, -1),
-    ("reach", np.float64, 0, 0),
-    ("reach_min", np.float64, 0, 0),
-    ("slop", np.float64, 0, 0),
-    ("aim_cos", np.float64, 0, -1),
-    ("cooldown", np.float64, 0, 0),
-    ("windup", np.float64, 0, -1),
-    ("backswing", np.float64, 0, 0),
-    ("help_loop", np.int64, 0, -(1 << 30)),
-    ("nav_point", np.float64, 2, 0),
-    ("nav_loop", np.int64, 0, 0),
-    ("nav_straight", np.bool_, 0, 0),
-    ("nav_end", np.bool_, 0, 0),
-    ("blocked", np.int64, 0, 0),
-    ("detour", np.int64, 0, 0),
-    ("detour_end", np.int64, 0, 0),
-    ("aside", np.float64, 2, 0),
-)
-# What follows from type, owner and upgrades, or is written anew in every loop before it is read.
-TRAITS: Final[tuple[tuple[str, type, int, float], ...]] = (
-    ("radius", np.float64, 0, 0),
-    ("separation", np.float64, 0, 0),
-    ("clearance", np.float64, 0, 0),
-    ("layer", np.int64, 0, 0),
-    ("layer_bits", np.int64, 0, 0),
-    ("plane_bits", np.int64, 0, 0),
-    ("step_max", np.float64, 0, 0),
-    ("step_gain", np.float64, 0, 0),
-    ("turn_cos", np.float64, 0, 0),
-    ("turn_sin", np.float64, 0, 0),
-    ("priority", np.float64, 0, 0),
-    ("ground_weapon", np.int64, 0, -1),
-    ("air_weapon", np.int64, 0, -1),
-    ("ground_scan", np.float64, 0, 0),
-    ("air_scan", np.float64, 0, 0),
-    ("acquires", np.bool_, 0, 0),
-    ("targetable", np.bool_, 0, 0),
-    ("walks", np.bool_, 0, 0),
-    ("looks_around", np.bool_, 0, 0),
-    ("holds", np.bool_, 0, 0),
-    ("needs_target", np.bool_, 0, 0),
-    ("gap", np.float64, 0, 0),
-    ("in_reach", np.bool_, 0, 0),
-    ("wants", np.bool_, 0, 0),
-    ("goal", np.float64, 2, 0),
-    ("stop_at", np.float64, 0, 0),
-    ("intended", np.float64, 2, 0),
-    ("creep_factor", np.float64, 0, 1),
-    ("life_max", np.float64, 0, 0),
-    ("life_regen", np.float64, 0, 0),
-    ("life_delay", np.float64, 0, 0),
-    ("shields_max", np.float64, 0, 0),
-    ("shield_regen", np.float64, 0, 0),
-    ("shield_delay", np.float64, 0, 0),
-    ("energy_max", np.float64, 0, 0),
-    ("energy_regen", np.float64, 0, 0),
-    ("walled", np.bool_, 0, 0),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,97 +52,16 @@ class Death:
     killer: int
 
 
-class World:
-    """One running game. Arrays have ``capacity`` rows; ``live`` lists the slots in use, ascending.
+class World(UnitColumns):
+    """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
 
     The world grows by itself; keep no reference to a column across ``spawn``.
     """
 
-    alive: Bools  # (capacity,)
-    tag: Ints  # (capacity,) the API's 64-bit tag, 0 where the slot is free
-    type: Ints  # (capacity,) row in catalog.units
-    owner: Ints  # (capacity,) player id, 0 neutral
-    pos: Floats  # (capacity, 2) world units
-    heading: Floats  # (capacity, 2) unit vector the body faces
-    speed: Floats  # (capacity,) world units per loop, now
-    life: Floats  # (capacity,)
-    shields: Floats  # (capacity,)
-    energy: Floats  # (capacity,)
-    build_progress: Floats  # (capacity,) 0..1, 1 is complete
-    cloaked: Bools  # (capacity,)
-    burrowed: Bools  # (capacity,)
-    hallucination: Bools  # (capacity,)
-    born_loop: Ints  # (capacity,)
-    damaged_loop: Ints  # (capacity,) last loop with damage to it
-    order_kind: Ints  # (capacity,) OrderKind
-    order_ability: Ints  # (capacity,) specific ability id, 0 when idle
-    order_target: Ints  # (capacity,) slot or NOBODY
-    order_point: Floats  # (capacity, 2)
-    order_origin: Floats  # (capacity, 2) the other end of a patrol
-    target: Ints  # (capacity,) slot the weapon is engaged with, or NOBODY
-    attacker: Ints  # (capacity,) slot that damaged it last, or NOBODY
-    scan_loop: Ints  # (capacity,) loop from which it looks for a target again
-    guard: Floats  # (capacity, 2) where an idle unit stood when it engaged somebody by itself
-    returning: Bools  # (capacity,) an idle unit that will go back there after the fight
-    weapon: Ints  # (capacity,) row of the weapon for that target, or -1
-    reach: Floats  # (capacity,) its range, edge to edge
-    reach_min: Floats  # (capacity,) and the range below which it can't fire, -inf without one
-    slop: Floats  # (capacity,) how far beyond its range a started attack still takes effect
-    aim_cos: Floats  # (capacity,) cosine of the largest angle between body and target, -1 for turrets
-    cooldown: Floats  # (capacity,) loops until the next attack may start
-    windup: Floats  # (capacity,) loops until the started attack takes effect, -1 when none is started
-    backswing: Floats  # (capacity,) loops the body stays in the finished attack unless ordered away
-    help_loop: Ints  # (capacity,) last loop this unit called for help
-    nav_point: Floats  # (capacity, 2) next corner of the path
-    nav_loop: Ints  # (capacity,) loop at which the path is looked over again
-    nav_straight: Bools  # (capacity,) the straight line to the goal is free
-    nav_end: Bools  # (capacity,) no way leads nearer to the goal
-    blocked: Ints  # (capacity,) loops without progress in a row
-    detour: Ints  # (capacity,) side on which it goes around bodies, -1 right, 1 left, 0 none
-    detour_end: Ints  # (capacity,) loop at which it forgets that side
-    aside: Floats  # (capacity, 2) heading around bodies, zero when the way itself is free
-
-    radius: Floats  # (capacity,) body for ranges
-    separation: Floats  # (capacity,) body for pushing
-    clearance: Floats  # (capacity,) body for cliffs
-    layer: Ints  # (capacity,) Layer the unit moves on
-    layer_bits: Ints  # (capacity,) stats.LAYERS it collides in
-    plane_bits: Ints  # (capacity,) planes on which it can be hit
-    step_max: Floats  # (capacity,) world units per loop
-    step_gain: Floats  # (capacity,) world units per loop, per loop
-    turn_cos: Floats  # (capacity,) cosine and
-    turn_sin: Floats  # (capacity,) sine of the largest turn per loop
-    priority: Floats  # (capacity,) as a target
-    ground_weapon: Ints  # (capacity,) row of the weapon against ground units, or -1
-    air_weapon: Ints  # (capacity,)
-    ground_scan: Floats  # (capacity,) how far it looks for ground targets, edge to edge, -1 without a weapon
-    air_scan: Floats  # (capacity,)
-    acquires: Bools  # (capacity,) it picks fights by itself
-    targetable: Bools  # (capacity,) it may be a target at all
-    walks: Bools  # (capacity,) its order is to walk to a point
-    looks_around: Bools  # (capacity,) its order lets it pick fights
-    holds: Bools  # (capacity,) its order is to stay on the spot
-    needs_target: Bools  # (capacity,) its order ends with its target
-    gap: Floats  # (capacity,) distance to its target this loop, edge to edge
-    in_reach: Bools  # (capacity,) its target is within the weapon's reach this loop
-    wants: Bools  # (capacity,) it wants to move this loop
-    goal: Floats  # (capacity, 2) and where to
-    stop_at: Floats  # (capacity,) distance from the goal, centre to centre, at which it stops
-    intended: Floats  # (capacity, 2) the step it takes this loop if nobody is in the way
-    creep_factor: Floats  # (capacity,) speed on creep, times the ordinary one
-    life_max: Floats  # (capacity,)
-    life_regen: Floats  # (capacity,) per loop
-    life_delay: Floats  # (capacity,) loops without damage before it begins
-    shields_max: Floats  # (capacity,)
-    shield_regen: Floats  # (capacity,) per loop
-    shield_delay: Floats  # (capacity,)
-    energy_max: Floats  # (capacity,)
-    energy_regen: Floats  # (capacity,) per loop
-    walled: Bools  # (capacity,) it stands on a footprint, which blocks the ground for others
-
     def __init__(
         self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
     ) -> None:
+        super().__init__()
         self.map: GameMap = game_map
         self.catalog: Catalog = catalog or load_catalog()
         self.seed = seed
@@ -254,7 +85,6 @@ class World:
         self.deaths_seen = 0  # how many of the deaths the triggers have been told about
         self.ended = False
         self.queue: list[list[Order]] = []
-        self.capacity = 0
         self.live: Ints = np.zeros(0, dtype=np.int64)
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
@@ -274,8 +104,7 @@ class World:
     def spawn(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float = 4.7124) -> int:
         """Put a complete unit into the world, exactly at ``point``; returns its slot."""
         slot = self._free_slot()
-        for name, _, _, empty in COLUMNS + TRAITS:
-            getattr(self, name)[slot] = empty
+        self.clear(slot)
         self.alive[slot] = True
         self.tag[slot] = TAG_BASE | slot << INDEX_SHIFT | int(self._recycles[slot])
         self.type[slot] = unit.row
@@ -289,6 +118,8 @@ class World:
         self.born_loop[slot] = self.loop
         self.queue[slot] = []
         self.looks_around[slot] = True
+        self.visible[:, slot] = not (self.fog or unit.cloaked or unit.burrowed)
+        self.visible[owner, slot] = True
         self.refresh(slot)
         self.ground.block(slot, self.footprint_cells(slot))
         self._population_changed()
@@ -296,8 +127,7 @@ class World:
 
     def remove(self, slot: int) -> None:
         """Take a unit out of the world; every reference to its slot becomes NOBODY."""
-        for name, _, _, empty in COLUMNS + TRAITS:
-            getattr(self, name)[slot] = empty
+        self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
         for column in (self.target, self.order_target, self.attacker):
@@ -397,9 +227,8 @@ class World:
     def digest(self) -> str:
         """SHA-256 over everything that decides the future, the same on every run with the same actions."""
         sha = hashlib.sha256(self.map.digest.encode())
-        sha.update(repr((self.loop, self.ended, self.rng.bit_generator.state)).encode())
-        for name, _, _, _ in COLUMNS:
-            sha.update(np.ascontiguousarray(getattr(self, name)[: self.top]).tobytes())
+        sha.update(repr((self.loop, self.ended, self.scan_now, self.hurt, self.rng.bit_generator.state)).encode())
+        sha.update(self.state_bytes(self.top))
         sha.update(self._recycles[: self.top].tobytes())
         sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
         sha.update(repr([player.counters() for player in self.players]).encode())
@@ -412,9 +241,8 @@ class World:
         self.population += 1
         self.pairs = None
         self.scan_now = True
-        self.regenerating = tuple(
-            bool(rate[: self.top].any()) for rate in (self.shield_regen, self.life_regen, self.energy_regen)
-        )
+        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
+        self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
 
     def _free_slot(self) -> int:
         free = np.flatnonzero(~self.alive[1 : self.top])
@@ -426,12 +254,6 @@ class World:
         return self.top - 1
 
     def _grow(self, capacity: int) -> None:
-        for name, dtype, width, empty in COLUMNS + TRAITS:
-            shape: Any = (capacity, width) if width else capacity
-            column = np.full(shape, empty, dtype=dtype)
-            if self.capacity:
-                column[: self.capacity] = getattr(self, name)
-            setattr(self, name, column)
         visible = np.zeros((len(self.players), capacity), dtype=np.bool_)
         visible[:, : self.capacity] = self.visible
         self.visible = visible
@@ -439,4 +261,4 @@ class World:
         recycles[: self.capacity] = self._recycles
         self._recycles = recycles
         self.queue += [[] for _ in range(capacity - self.capacity)]
-        self.capacity = capacity
+        self.grow(capacity)

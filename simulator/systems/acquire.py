@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator.arrays import some, which
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.targets import disengage, engage
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
-    from simulator.world import Bools, Ints, World
+    from simulator.world import World
 
 IDLE = int(OrderKind.IDLE)
 PRIORITY_WEIGHT = 1000.0

@@ -19,8 +19,9 @@ from simulator.mechanics import MECHANICS
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
-    from simulator.world import Bools, Ints, World
+    from simulator.world import World
 
 FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
 FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG])

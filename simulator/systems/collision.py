@@ -16,15 +16,16 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.systems import avoidance
 from simulator.traits import Layer
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
+    from simulator.columns import Ints
     from simulator.geometry import Floats
     from simulator.pathing import Surface
-    from simulator.world import Ints, World
+    from simulator.world import World
 
 CONTACT_SKIN = 0.1
 OVERLAP_ALLOWED = 0.005

@@ -14,15 +14,16 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.systems import weapons
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools, Ints
     from simulator.records import Affects, Sweep
     from simulator.stats import Damage
-    from simulator.world import Bools, Ints, World
+    from simulator.world import World
 
 BEHIND = 1e-9
 
@@ -109,10 +110,13 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
     world.shields[victim] = shields - absorbed
     world.life[victim] = life - wounded
     world.damaged_loop[victim] = world.loop
-    taken, dealt = world.players[side].score.damage_taken, world.players[owner].score.damage_dealt
-    for counter in (taken, dealt):
-        counter.shields += absorbed
-        counter.life += wounded
+    taken = world.players[side].score.damage_taken
+    taken.shields += absorbed
+    taken.life += wounded
+    if owner != side:
+        dealt = world.players[owner].score.damage_dealt
+        dealt.shields += absorbed
+        dealt.life += wounded
     if source != NOBODY:
         world.attacker[victim] = source
         world.hurt.append((victim, source))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simulator.arrays import some
-from simulator.world import NOBODY, Death
+from simulator.columns import NOBODY
+from simulator.world import Death
 
 if TYPE_CHECKING:
     from simulator.players import Spent

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator.arrays import some, which
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
-    from simulator.world import Ints, World
+    from simulator.columns import Ints
+    from simulator.world import World
 
 EDGE_TOLERANCE = 1e-9
 FOLLOW_GAP = 0.5

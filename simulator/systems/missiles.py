@@ -8,8 +8,8 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.columns import NOBODY
 from simulator.systems import damage
-from simulator.world import NOBODY
 
 if TYPE_CHECKING:
     from simulator.world import World

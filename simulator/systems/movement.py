@@ -14,8 +14,9 @@ from simulator import geometry
 from simulator.arrays import some, which
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
-    from simulator.world import Bools, Ints, World
+    from simulator.world import World
 
 
 def move(world: World) -> None:

@@ -16,8 +16,9 @@ from simulator.mechanics import MECHANICS
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
+    from simulator.columns import Ints
     from simulator.geometry import Floats
-    from simulator.world import Ints, World
+    from simulator.world import World
 
 CORNER_REACHED = 0.4
 NEAR_CORNER = 1.8

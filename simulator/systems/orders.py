@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 from simulator import commands
 from simulator.arrays import some, which
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
-from simulator.world import NO_TAG, NOBODY
+from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -18,11 +19,18 @@ PACKED_AFTER_LOOPS = 2
 
 def carry_out(world: World) -> None:
     """End every order whose point is reached or whose target is gone, and begin what waits behind it."""
-    n = world.top
-    finished = which(world.needs_target[:n] & (world.order_target[:n] == NOBODY)).tolist()
-    finished += _arrived(world)
-    for slot in finished:
+    for slot in _lost(world) + _arrived(world):
         _next(world, slot)
+
+
+def _lost(world: World) -> list[int]:
+    """Slots whose order's target is dead, or out of their owner's sight."""
+    slots = which(world.needs_target[: world.top])
+    if not slots.size:
+        return []
+    target = world.order_target.take(slots)
+    lost = (target == NOBODY) | ~world.visible[world.owner.take(slots), target]
+    return slots[lost].tolist() if some(lost) else []
 
 
 def _arrived(world: World) -> list[int]:

@@ -15,9 +15,10 @@ from simulator.stats import LAYERS, bit_set
 from simulator.traits import Layer, layer_of
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools
     from simulator.geometry import Floats
     from simulator.records import UnitType
-    from simulator.world import Bools, World
+    from simulator.world import World
 
 CANDIDATE_STEP = 0.25
 SEARCH_RADII = (3.0, 6.0, 12.0)

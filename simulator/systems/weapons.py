@@ -18,9 +18,10 @@ from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.stats import GROUND_PLANE, INSTANT_ACCELERATION_N
 
 if TYPE_CHECKING:
+    from simulator.columns import Bools, Ints
     from simulator.records import Hit, Weapon
     from simulator.systems.damage import Shot
-    from simulator.world import Bools, Ints, World
+    from simulator.world import World
 
 NOT_STARTED = -1.0
 LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadiusLarge

@@ -206,13 +206,13 @@ def test_several_actions_are_done_and_reported_in_their_order() -> None:
 
 
 def test_a_raw_command_is_also_told_as_a_click() -> None:
-    client = stage(*make(STALKER, 1, (16, 16)), *make(ZEALOT, 2, (19, 16)))
+    client = stage(*make(STALKER, 1, (16, 16)), *make(ZEALOT, 2, (24, 24)))
     (foe,) = tags(client, alliance=raw_pb2.Enemy)
     client.act(command(23, tags(client), target=foe))
     (echo,) = client.step().actions
     assert echo.action_raw.unit_command.target_unit_tag == foe
     pixel = echo.action_feature_layer.unit_command.target_screen_coord
-    assert (pixel.x, pixel.y) == (80, 64)
+    assert (pixel.x, pixel.y) == (106, 21)
 
 
 def test_a_click_beyond_the_screen_is_told_as_one_on_the_minimap() -> None:

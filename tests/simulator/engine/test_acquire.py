@@ -30,6 +30,7 @@ def test_the_scan_range_is_the_larger_of_range_and_the_least_scan(field: Any, na
         distance = gap + world.radius[unit] + 0.375
         foe = field.put("Zergling", 2, 5 + distance, 16)
         world.acquires[foe] = False
+        world.life[foe] = 1e6
         field.play(4)
         assert bool(world.target[unit] == foe) is seen
         commands.debug_kill(world, [world.tag_of(unit), world.tag_of(foe)])

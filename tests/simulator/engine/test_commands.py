@@ -140,3 +140,38 @@ def test_units_of_a_finished_game_stand_still(field: Any) -> None:
     commands.surrender(world, 2)
     assert advance(world, 10) == 0
     assert world.pos[unit].tolist() == [10, 16]
+
+
+def test_a_unit_killed_by_hand_is_nobodys_kill(field: Any) -> None:
+    world = field.world
+    stalker, foe = field.put("Stalker", 1, 10, 16), field.put("SpineCrawler", 2, 15, 16)
+    commands.attack_unit(world, [stalker], world.tag_of(foe))
+    field.play(20)
+    assert world.life[foe] < 300
+    commands.debug_kill(world, [world.tag_of(foe)])
+    field.play(1)
+    assert world.deaths[-1].killer == -1
+    assert world.players[1].score.killed_structures == 0
+    assert world.players[2].score.lost_structures == 1
+
+
+def test_an_attack_on_what_goes_out_of_sight_ends(make_field: Any) -> None:
+    field = make_field(fog=True)
+    world = field.world
+    zealot, runner = field.put("Zealot", 1, 4, 16), field.put("Zergling", 2, 11, 16)
+    world.acquires[runner] = False
+    field.play(4)
+    commands.attack_unit(world, [zealot], world.tag_of(runner))
+    commands.move(world, [runner], (31, 16))
+    field.play(150)
+    assert world.orders_of(zealot) == []
+
+
+def test_an_order_shows_the_target_and_the_queue(field: Any) -> None:
+    world = field.world
+    zealot, foe = field.put("Zealot", 1, 4, 16), field.put("SpineCrawler", 2, 25, 16)
+    commands.attack_unit(world, [zealot], world.tag_of(foe))
+    commands.patrol(world, [zealot], (4, 20), queue=True)
+    attack, patrol = world.orders_of(zealot)
+    assert (attack.kind, attack.target, attack.point) == (OrderKind.ATTACK_UNIT, world.tag_of(foe), None)
+    assert (patrol.kind, patrol.point, patrol.ability) == (OrderKind.PATROL, (4, 20), 17)

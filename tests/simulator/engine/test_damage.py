@@ -127,7 +127,8 @@ def test_damage_is_never_lost_or_made_up(
     lost_life, lost_shields = life - world.life[v], shields - world.shields[v]
     assert 0 <= lost_life <= life
     assert 0 <= lost_shields <= shields
-    assert 0 < lost_life + lost_shields <= hit.against(int(world.stats.attribute_bits[world.type[v]])) + 1e-9
+    most = hit.against(int(world.stats.attribute_bits[world.type[v]]))
+    assert 0 < lost_life + lost_shields <= most + 0.5  # the rest that shields leave is at least a half, too
     taken, dealt = world.players[2].score.damage_taken, world.players[1].score.damage_dealt
     assert (taken.life, taken.shields) == pytest.approx((lost_life, lost_shields))
     assert (dealt.life, dealt.shields) == pytest.approx((lost_life, lost_shields))

@@ -1,0 +1,159 @@
+"""Columns: what is known of every unit slot, one array each.
+
+Only the arrays: ``world`` says when units come and go, ``systems`` what the numbers do. Each line declares a column
+with the type of its numbers, what an unused slot holds (0 if nothing is said), and ``width=2`` for points and vectors,
+whose arrays are (capacity, 2); all others are (capacity,). Distances are world units, times game loops.
+
+``state`` is what decides the future and is part of the world's digest. ``trait`` follows from it: from type, owner,
+upgrades and order, or it is written anew in every loop before it is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+NOBODY: Final = -1  # no slot
+LONG_AGO: Final = -(1 << 30)
+DTYPES: Final[dict[type, type[np.generic]]] = {bool: np.bool_, int: np.int64, float: np.float64}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """How one column is made: its dtype, the value of an unused slot, numbers per slot, and whether it is state."""
+
+    dtype: type[np.generic]
+    empty: float
+    width: int
+    is_state: bool
+
+    def make(self, capacity: int) -> NDArray[Any]:
+        """A fresh array of unused slots."""
+        return np.full((capacity, self.width) if self.width else capacity, self.empty, dtype=self.dtype)
+
+
+def state(of: type, empty: float = 0, *, width: int = 0) -> Any:
+    """Declare a column that decides the future."""
+    return Column(DTYPES[of], empty, width, is_state=True)
+
+
+def trait(of: type, empty: float = 0, *, width: int = 0) -> Any:
+    """Declare a column that follows from others."""
+    return Column(DTYPES[of], empty, width, is_state=False)
+
+
+class UnitColumns:
+    """The columns, their growth and their emptying; slots are row numbers."""
+
+    alive: Bools = state(bool)
+    tag: Ints = state(int)  # the API's 64-bit tag, 0 where the slot is free
+    type: Ints = state(int)  # row in catalog.units
+    owner: Ints = state(int)  # player id, 0 neutral
+    pos: Floats = state(float, width=2)  # world units
+    heading: Floats = state(float, width=2)  # unit vector the body faces
+    speed: Floats = state(float)  # world units per loop, now
+    life: Floats = state(float)
+    shields: Floats = state(float)
+    energy: Floats = state(float)
+    build_progress: Floats = state(float, 1)  # 0..1, 1 is complete
+    cloaked: Bools = state(bool)
+    burrowed: Bools = state(bool)
+    hallucination: Bools = state(bool)
+    born_loop: Ints = state(int)
+    damaged_loop: Ints = state(int, LONG_AGO)  # last loop with damage to it
+    order_kind: Ints = state(int)  # OrderKind
+    order_ability: Ints = state(int)  # specific ability id, 0 when idle
+    order_target: Ints = state(int, NOBODY)  # slot or NOBODY
+    order_point: Floats = state(float, width=2)
+    order_origin: Floats = state(float, width=2)  # the other end of a patrol
+    target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
+    attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
+    scan_loop: Ints = state(int)  # loop from which it looks for a target again
+    guard: Floats = state(float, width=2)  # where an idle unit stood when it engaged somebody by itself
+    returning: Bools = state(bool)  # an idle unit that will go back there after the fight
+    weapon: Ints = state(int, -1)  # row of the weapon for that target, or -1
+    reach: Floats = state(float)  # its range, edge to edge
+    reach_min: Floats = state(float)  # and the range below which it can't fire, -inf without one
+    slop: Floats = state(float)  # how far beyond its range a started attack still takes effect
+    aim_cos: Floats = state(float, -1)  # cosine of the largest angle between body and target, -1 for turrets
+    cooldown: Floats = state(float)  # loops until the next attack may start
+    windup: Floats = state(float, -1)  # loops until the started attack takes effect, -1 when none is started
+    backswing: Floats = state(float)  # loops the body stays in the finished attack unless ordered away
+    help_loop: Ints = state(int, LONG_AGO)  # last loop this unit called for help
+    nav_point: Floats = state(float, width=2)  # next corner of the path
+    nav_loop: Ints = state(int)  # loop at which the path is looked over again
+    nav_straight: Bools = state(bool)  # the straight line to the goal is free
+    nav_end: Bools = state(bool)  # no way leads nearer to the goal
+    blocked: Ints = state(int)  # loops without progress in a row
+    detour: Ints = state(int)  # side on which it goes around bodies, -1 right, 1 left, 0 none
+    detour_end: Ints = state(int)  # loop at which it forgets that side
+    aside: Floats = state(float, width=2)  # heading around bodies, zero when the way itself is free
+    gap: Floats = state(float)  # distance to its target this loop, edge to edge
+    in_reach: Bools = state(bool)  # its target is within the weapon's reach this loop
+    intended: Floats = state(float, width=2)  # the step it takes this loop if nobody is in the way
+
+    radius: Floats = trait(float)  # body for ranges
+    separation: Floats = trait(float)  # body for pushing
+    clearance: Floats = trait(float)  # body for cliffs
+    layer: Ints = trait(int)  # Layer the unit moves on
+    layer_bits: Ints = trait(int)  # stats.LAYERS it collides in
+    plane_bits: Ints = trait(int)  # planes on which it can be hit
+    step_max: Floats = trait(float)  # world units per loop
+    step_gain: Floats = trait(float)  # world units per loop, per loop
+    turn_cos: Floats = trait(float)  # cosine and
+    turn_sin: Floats = trait(float)  # sine of the largest turn per loop
+    priority: Floats = trait(float)  # as a target
+    ground_weapon: Ints = trait(int, -1)  # row of the weapon against ground units, or -1
+    air_weapon: Ints = trait(int, -1)
+    ground_scan: Floats = trait(float)  # how far it looks for ground targets, edge to edge, -1 without a weapon
+    air_scan: Floats = trait(float)
+    acquires: Bools = trait(bool)  # it picks fights by itself
+    targetable: Bools = trait(bool)  # it may be a target at all
+    walks: Bools = trait(bool)  # its order is to walk to a point
+    looks_around: Bools = trait(bool)  # its order lets it pick fights
+    holds: Bools = trait(bool)  # its order is to stay on the spot
+    needs_target: Bools = trait(bool)  # its order ends with its target
+    wants: Bools = trait(bool)  # it wants to move this loop
+    goal: Floats = trait(float, width=2)  # and where to
+    stop_at: Floats = trait(float)  # distance from the goal, centre to centre, at which it stops
+    creep_factor: Floats = trait(float, 1)  # speed on creep, times the ordinary one
+    life_max: Floats = trait(float)
+    life_regen: Floats = trait(float)  # per loop
+    life_delay: Floats = trait(float)  # loops without damage before it begins
+    shields_max: Floats = trait(float)
+    shield_regen: Floats = trait(float)  # per loop
+    shield_delay: Floats = trait(float)
+    energy_max: Floats = trait(float)
+    energy_regen: Floats = trait(float)  # per loop
+    walled: Bools = trait(bool)  # it stands on a footprint, which blocks the ground for others
+
+    def __init__(self) -> None:
+        self.capacity = 0
+
+    def grow(self, capacity: int) -> None:
+        """Make room for ``capacity`` slots; what is there stays, the arrays are new."""
+        for name, column in COLUMNS.items():
+            array = column.make(capacity)
+            if self.capacity:
+                array[: self.capacity] = getattr(self, name)
+            setattr(self, name, array)
+        self.capacity = capacity
+
+    def clear(self, slot: int) -> None:
+        """Make a slot unused."""
+        for name, column in COLUMNS.items():
+            getattr(self, name)[slot] = column.empty
+
+    def state_bytes(self, slots: int) -> bytes:
+        """The state of the first ``slots`` slots, column by column."""
+        return b"".join(getattr(self, name)[:slots].tobytes() for name, column in COLUMNS.items() if column.is_state)
+
+
+COLUMNS: Final[dict[str, Column]] = {k: v for k, v in vars(UnitColumns).items() if isinstance(v, Column)}
