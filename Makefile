@@ -7,7 +7,7 @@ PYTHON ?= $(firstword $(foreach p,python3.13 python3.12 python3.11 python3 pytho
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
 
-.PHONY: help install check format types test test-all demo bench docs picture clean
+.PHONY: help install check format types test test-all demo bench docs golden picture clean
 
 help: ## What can be made
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -53,6 +53,11 @@ bench: install ## Measure what the README claims
 
 docs: install ## Write the generated pages of docs/reference
 	$(RUN)python -m docs.generate
+
+golden: install ## Record the battle anew that the tests replay, after a change that was meant
+	rm -rf runs/golden
+	$(RUN)khala run 2s3z_pair --run golden --latency 0
+	cp runs/golden/recording.mcap tests/khala/golden.mcap
 
 picture: install ## Play a battle and draw docs/images/2s3z.webp from its recording
 	$(RUN)python -m docs.picture

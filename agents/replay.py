@@ -58,7 +58,8 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
             )
         policy = policies[agent]
     broker = MemoryBroker()
-    stage = await _Stage.set(broker.session(), run, card.side, agent)
+    bus = broker.session()
+    stage = await _Stage.set(bus, run, card.side, agent)
     stop = asyncio.Event()
     worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, agent, policy, stop=stop))
     try:
@@ -66,6 +67,7 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
     finally:
         stop.set()
         await worker
+        await bus.close()
 
 
 class _Scene:
@@ -101,7 +103,9 @@ class _Stage:
         messages: Subscription[Sample],
     ) -> None:
         self._briefings, self._observations = briefings, observations
-        self._replies, self._messages = replies, messages
+        self._replies = replies
+        self._said: list[Message] = []
+        self._hearing = asyncio.create_task(self._hear(messages))
 
     @classmethod
     async def set(cls, bus: Bus, run: Run, side: str, agent: str) -> _Stage:
@@ -117,6 +121,10 @@ class _Stage:
             await bus.subscribe(key(Topic.MESSAGE), Delivery.SPEECH),
         )
 
+    async def _hear(self, messages: Subscription[Sample]) -> None:
+        async for sample in messages:
+            self._said.append(decode_as(Message, sample.payload))
+
     async def play(self, script: Iterator[Briefing | _Scene]) -> AsyncIterator[Difference]:
         for part in script:
             if isinstance(part, Briefing):
@@ -125,7 +133,7 @@ class _Stage:
             await self._observations.put(encode(part.observation))
             async with asyncio.timeout(PATIENCE_S):
                 reply = decode_as(Reply, (await anext(self._replies)).payload)
-                said = [decode_as(Message, (await anext(self._messages)).payload) for _ in part.messages]
+            said, self._said = self._said, []  # messages come before the reply that they were sent with
             for what, recorded, sent in (
                 ("reply", _words(part.reply), _words(reply)),
                 ("messages", _said(part.messages), _said(said)),
