@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +54,13 @@ def test_another_process_with_other_hashes_plays_the_same_game() -> None:
         for seed in ("1", "2")
     }
     assert digests == {played("3s5z", 7).digest() + "\n"}
+
+
+def test_the_game_is_the_same_on_every_python_and_numpy() -> None:
+    """Digests kept in a file; a change of the rules changes them, and then the file is to be written anew."""
+    kept = json.loads((Path(__file__).parent / "golden_digests.json").read_text(encoding="utf-8"))
+    now = {name: played(name, 3).digest() for name in kept}
+    assert now == kept, json.dumps(now, indent=1)
 
 
 def test_another_seed_plays_another_game() -> None:
