@@ -9,8 +9,11 @@ Above: `install.py`, `api/lobby.py`. Below: `maps.py`.
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
+
+from yaml import YAMLError
 
 from simulator.maps import GameMap, MapError, find_map, load_map, map_from, map_names
 from simulator.scenario import ScenarioError, parse_scenario
@@ -58,17 +61,19 @@ def read_map(data: bytes, path: str) -> GameMap:
             raise MapDataError(f"{path or 'the map'} is an archive that the simulator cannot read: {error}") from error
     if not data.startswith(_MARK):
         raise MapDataError(f"{path or 'the map'} holds neither a map of the simulator nor a StarCraft II archive")
-    return _read_text(data[len(_MARK) :], path)
-
-
-def _read_text(data: bytes, path: str) -> GameMap:
     try:
-        text = data.decode()
-        if is_placeholder(_MARK + data):
-            return load_map(text.strip())
-        return map_from(parse_scenario(text, path or "the map"), text)
-    except (UnicodeDecodeError, MapError, ScenarioError) as error:
-        raise MapDataError(f"{path or 'the map'}: {error}") from error
+        return _read_text(data, path or "the map")
+    except (MapError, ScenarioError) as error:
+        raise MapDataError(str(error)) from error
+    except (ValueError, YAMLError) as error:  # no UTF-8, control characters, an impossible date
+        raise MapDataError(f"{path or 'the map'} cannot be read: {error}") from error
+
+
+def _read_text(data: bytes, source: str) -> GameMap:
+    text = data.decode()
+    if is_placeholder(data):
+        return load_map(text[len(_MARK) :].strip())
+    return map_from(parse_scenario(text, source), text)  # the mark is a comment of YAML
 
 
 def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:
@@ -79,7 +84,7 @@ def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | 
     if path in saved:
         return saved[path]
     for file in _files(path, data_dir):
-        if file.is_file():
+        with contextlib.suppress(OSError, ValueError):  # not there, a directory, or no possible name at all
             return file.read_bytes()
     try:
         return _placeholder(find_map(path))
@@ -91,4 +96,4 @@ def _files(path: str, data_dir: Path) -> Iterator[Path]:
     maps = data_dir / "Maps"
     yield maps / path
     yield Path(path)
-    yield from sorted(maps.glob(f"*/{PurePosixPath(path).name}"))
+    yield from (folder / PurePosixPath(path).name for folder in sorted(maps.glob("*/")))

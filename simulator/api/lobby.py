@@ -16,6 +16,7 @@ from simulator.api.clock import Clock
 from simulator.api.game import Game, Setup
 from simulator.api.game_info import GameInfo
 from simulator.api.process import Failure, Playing, Process
+from simulator.catalog import CatalogError
 from simulator.mapfile import SUFFIX, MapDataError, find_data, read_map
 from simulator.maps import map_names
 
@@ -124,8 +125,11 @@ def join_game(process: Process, request: sc.RequestJoinGame) -> sc.ResponseJoinG
     if not places:
         raise _cannot_join(sc.ResponseJoinGame.GameFull, "No place for a participant is free")
     joined = _with_participant(setup, places[0], request)
+    try:
+        process.playing = _start(process, joined, places[0], request.options)
+    except CatalogError as error:
+        raise _cannot_join(sc.ResponseJoinGame.CannotOpenMap, f"{setup.path}: {error}") from error
     process.setup = joined
-    process.playing = _start(process, joined, places[0], request.options)
     return sc.ResponseJoinGame(player_id=places[0])
 
 

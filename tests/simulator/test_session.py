@@ -1,5 +1,7 @@
 """Bytes in, bytes out: the envelope, the walk through the states, and the sentences for what is wrong."""
 
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +11,7 @@ from s2clientprotocol import common_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.client import Client, ResponseError, interface
+from simulator.install import install
 from simulator.session import Session
 from simulator.status import Status
 
@@ -340,3 +343,60 @@ def test_a_fault_of_ours_is_told_and_does_not_end_the_process(
         playing.step()
     assert "Traceback" in capsys.readouterr().err
     assert playing.observe().observation.game_loop == 0
+
+
+@pytest.mark.parametrize("path", ["x" * 300, "\0", "/", "..", "**", "Maps"])
+def test_a_path_that_cannot_be_one_is_an_invalid_path(client: Client, path: str) -> None:
+    create = client.ask(create_game=sc.RequestCreateGame(local_map=at(path), player_setup=[PARTICIPANT])).create_game
+    assert create.error == CreateError.InvalidMapPath
+
+
+def test_a_map_is_found_in_the_install_by_path_and_by_name(tmp_path: Path) -> None:
+    root = install(tmp_path)
+    scenario = (files("simulator.data") / "maps/llm_smac/3s_vs_4z.yaml").read_bytes()
+    (root / "Maps/Melee/Own.SC2Map").write_bytes(b"# A map of Khala's simulator\n" + scenario)
+    for path in ("Melee/Own.SC2Map", "Own.SC2Map", str(root / "Maps/Melee/Own.SC2Map")):
+        client = Client(Session(root))
+        client.play(path, interface(screen=0))
+        assert len(client.observe().observation.raw_data.units) == 7
+
+
+HEAD = b"# A map of Khala's simulator\n"
+WHOLE = b"name: x\nfamily: y\ntitle: z\nterrain: %s\nplayers: {1: {race: zerg, control: agent}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "details"),
+    [
+        (b"name: x\nfamily: y\ntitle: z\nterrain: agria_open\nplayers: 5\n", "own.SC2Map:6: players: "),
+        (b"\0\nx: 1\n", "own.SC2Map cannot be read: "),
+        (b"\xff\nx: 1\n", "own.SC2Map cannot be read: "),
+        (b"x: 2020-99-99\ny: 1\n", "own.SC2Map cannot be read: "),
+        (b"x: [\ny: 1\n", "own.SC2Map:"),
+        (WHOLE % b"moon", "no terrain 'moon' is shipped"),
+        (b"nothing\n", "no map 'nothing'; shipped are "),
+    ],
+)
+def test_a_map_of_a_user_with_a_mistake_says_where(client: Client, text: bytes, details: str) -> None:
+    request = sc.RequestCreateGame(local_map=at("own.SC2Map", HEAD + text), player_setup=[PARTICIPANT])
+    create = client.ask(create_game=request).create_game
+    assert create.error == CreateError.InvalidMapData
+    assert create.error_details.startswith(details)
+
+
+def test_a_map_with_a_unit_that_is_not_there_cannot_be_joined(client: Client) -> None:
+    trigger = b"triggers: [{name: a, when: [start], do: [{create: {player: 1, unit: Foo, at: [9, 9]}}]}]\n"
+    request = sc.RequestCreateGame(
+        local_map=at("own.SC2Map", HEAD + WHOLE % b"agria_open" + trigger), player_setup=[PARTICIPANT]
+    )
+    client.ask(create_game=request)
+    joined = client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Zerg, options=interface(screen=0))).join_game
+    assert joined.error == JoinError.CannotOpenMap
+    assert joined.error_details == "own.SC2Map: no unit type 'Foo' in the tables of version 4.10"
+
+
+def test_an_archive_of_the_game_is_known_by_its_name(client: Client) -> None:
+    archive = at("llm_smac/3s_vs_5z.SC2Map", b"MPQ\x1b")
+    client.ask(create_game=sc.RequestCreateGame(local_map=archive, player_setup=[PARTICIPANT, COMPUTER]))
+    client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0)))
+    assert len(client.observe().observation.raw_data.units) == 8

@@ -1,0 +1,104 @@
+"""Requests made at random from the API's own descriptors: the session answers them all."""
+
+from typing import Any
+
+import pytest
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.message import Message
+from google.protobuf.message_factory import GetMessageClass
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.client import Client, interface
+from simulator.status import Status
+
+KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
+SCALARS: dict[int, st.SearchStrategy[Any]] = {
+    FieldDescriptor.CPPTYPE_INT32: st.sampled_from([0, 1, 3, 23, 3674]) | st.integers(-(2**31), 2**31 - 1),
+    FieldDescriptor.CPPTYPE_UINT32: st.sampled_from([0, 1, 2, 16, 74]) | st.integers(0, 2**32 - 1),
+    FieldDescriptor.CPPTYPE_INT64: st.integers(-(2**63), 2**63 - 1),
+    FieldDescriptor.CPPTYPE_UINT64: st.sampled_from([1 << 32 | s << 18 for s in range(8)]) | st.integers(0, 2**64 - 1),
+    FieldDescriptor.CPPTYPE_FLOAT: st.sampled_from([0.0, 9.0, 16.0, 23.5]) | st.floats(width=32),
+    FieldDescriptor.CPPTYPE_DOUBLE: st.floats(),
+    FieldDescriptor.CPPTYPE_BOOL: st.booleans(),
+}  # fmt: skip
+PATHS = st.sampled_from(["", "2s3z", "llm_smac/2s3z.SC2Map", "../x", "\0", "x" * 300, "/"])
+LONG = 200
+"""Loops in one step at most: the fuzzing is about requests, not about patience."""
+
+
+def value(field: FieldDescriptor, depth: int) -> st.SearchStrategy[Any]:
+    if field.message_type is not None:
+        return message(field.message_type, depth - 1)
+    if field.enum_type is not None:
+        return st.sampled_from([v.number for v in field.enum_type.values])
+    if field.type == FieldDescriptor.TYPE_STRING:
+        return PATHS | st.text(max_size=8)
+    if field.type == FieldDescriptor.TYPE_BYTES:
+        return st.binary(max_size=30)
+    return SCALARS[field.cpp_type]
+
+
+def message(descriptor: Descriptor | None, depth: int = 5) -> st.SearchStrategy[Message]:
+    assert descriptor is not None
+    fields = {}
+    for field in descriptor.fields:
+        if field.message_type is not None and depth <= 0:
+            continue
+        one = value(field, depth)
+        fields[field.name] = st.lists(one, max_size=3) if field.is_repeated else one
+
+    def build(chosen: dict[str, Any]) -> Message:
+        return GetMessageClass(descriptor)(**chosen)
+
+    return st.fixed_dictionaries({}, optional=fields).map(build)
+
+
+REQUESTS = {kind: message(sc.Request.DESCRIPTOR.fields_by_name[kind].message_type) for kind in KINDS}
+
+
+def prepare(state: Status) -> Client:
+    client = Client()
+    if state is Status.init_game:
+        client.create("2s3z")
+    elif state is not Status.launched:
+        client.play(options=interface(screen=32, minimap=32))
+    if state is Status.ended:
+        client.step(1440)
+    if state is Status.in_replay:
+        client.step(20)
+        replay = client.ask(save_replay=sc.RequestSaveReplay()).save_replay.data
+        options = interface(screen=32, minimap=32)
+        client.ask(start_replay=sc.RequestStartReplay(replay_data=replay, observed_player_id=1, options=options))
+    assert client.session.status is state
+    return client
+
+
+def tame(kind: str, body: Any) -> None:
+    """Leaves out what is legal and only takes long: endless steps, huge images, real time."""
+    if kind == "step":
+        body.count = min(body.count, LONG)
+    if kind == "create_game":
+        body.realtime = False
+    for size in ("resolution", "minimap_resolution"):
+        if kind in {"join_game", "start_replay"} and body.HasField("options"):
+            pixels = getattr(body.options.feature_layer, size)
+            assume(pixels.x * pixels.y < 2**16 or pixels.x > 2**20 or pixels.y > 2**20)
+
+
+@pytest.mark.parametrize("state", [s for s in Status if s is not Status.quit])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@given(data=st.data())
+def test_no_request_breaks_a_session(state: Status, data: st.DataObject) -> None:
+    client = prepare(state)
+    for _ in range(6):
+        kind = data.draw(st.sampled_from([k for k in KINDS if k != "quit"]))
+        body = data.draw(REQUESTS[kind])
+        tame(kind, body)
+        raw = client.session.handle(sc.Request(id=3, **{kind: body}).SerializeToString())  # type: ignore[arg-type]  # kind is a field's name
+        response = sc.Response.FromString(raw)
+        assert response.id == 3
+        assert Status(response.status) is client.session.status
+        assert bool(response.error) != response.HasField(kind)  # type: ignore[arg-type]  # kind is a field's name
+        assert not any(error.startswith("The simulator failed") for error in response.error)
