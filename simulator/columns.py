@@ -96,6 +96,7 @@ class UnitColumns:
     detour_end: Ints = state(int)  # loop at which it forgets that side
     aside: Floats = state(float, width=2)  # heading around bodies, zero when the way itself is free
     gap: Floats = state(float)  # distance to its target this loop, edge to edge
+    toward: Floats = trait(float, width=2)  # unit vector to its target this loop
     in_reach: Bools = state(bool)  # its target is within the weapon's reach this loop
     intended: Floats = state(float, width=2)  # the step it takes this loop if nobody is in the way
 

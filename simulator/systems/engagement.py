@@ -1,7 +1,7 @@
 """Engagement: how far away every fight is, and where everybody wants to be this loop.
 
 Between choosing targets (``acquire``, orders) and acting on them (``weapons``, ``movement``). Writes the columns
-``gap``, ``in_reach``, ``wants``, ``goal`` and ``stop_at``, which the later systems of the same loop read.
+``gap``, ``toward``, ``in_reach``, ``wants``, ``goal`` and ``stop_at``, which later systems of the same loop read.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator import geometry
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 EDGE_TOLERANCE = 1e-9
+ON_TARGET = 1e-9
 FOLLOW_GAP = 0.5
 FOLLOW = int(OrderKind.FOLLOW)
 
@@ -51,9 +53,14 @@ def _close_in(world: World, slots: Ints) -> None:
     target = world.target.take(slots)
     goal = world.pos.take(target, 0)
     offset = goal - world.pos.take(slots, 0)
-    offset *= offset
+    distance = geometry.length(offset)
+    on_target = distance < ON_TARGET
+    if some(on_target):
+        offset[on_target] = world.heading[slots[on_target]]
+        distance = np.where(on_target, 1.0, distance)
+    world.toward[slots] = offset / distance[:, None]
     bodies = world.radius.take(slots) + world.radius.take(target)
-    gap = np.sqrt(offset[:, 0] + offset[:, 1]) - bodies
+    gap = np.where(on_target, 0.0, distance) - bodies
     reach = world.reach.take(slots)
     swinging = world.windup.take(slots) >= 0.0
     allowed = reach + EDGE_TOLERANCE

@@ -78,8 +78,6 @@ def _face_targets(world: World) -> None:
     if not some(turning):
         return
     slots = fighters[turning]
-    offset = world.pos.take(world.target.take(slots), 0) - world.pos.take(slots, 0)
-    wanted = offset / np.maximum(geometry.length(offset), 1e-12)[:, None]
-    world.heading[slots] = geometry.turn_towards(
-        world.heading.take(slots, 0), wanted, world.turn_cos.take(slots), world.turn_sin.take(slots)
-    )
+    heading, wanted = world.heading.take(slots, 0), world.toward.take(slots, 0)
+    turned = geometry.turn_towards(heading, wanted, world.turn_cos.take(slots), world.turn_sin.take(slots))
+    world.heading[slots] = turned

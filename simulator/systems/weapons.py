@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
 from simulator.arrays import some, which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.stats import GROUND_PLANE, INSTANT_ACCELERATION_N
@@ -64,11 +63,8 @@ def _aimed(world: World, slots: Ints) -> Bools:
     turret = least <= -1.0
     if np.count_nonzero(turret) == len(turret):
         return turret
-    offset = world.pos.take(world.target.take(slots), 0) - world.pos.take(slots, 0)
-    facing = world.heading.take(slots, 0)
-    distance = geometry.length(offset)
-    along = offset[:, 0] * facing[:, 0] + offset[:, 1] * facing[:, 1]
-    aimed: Bools = turret | (along >= least * distance)
+    along = world.toward.take(slots, 0) * world.heading.take(slots, 0)
+    aimed: Bools = turret | (along[:, 0] + along[:, 1] >= least)
     return aimed
 
 
