@@ -1,0 +1,284 @@
+"""The documentation, executed: its Python runs, its commands parse, its files are valid, its links lead somewhere.
+
+The first word behind a fence is the language, the second says what a block is: `python compile` is not run, since it
+needs a network; `yaml task`, `yaml model` and `yaml agents` are files that are read as such.
+"""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import os
+import re
+import shlex
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pytest
+import typer
+
+from agents.config import AgentsFile, ModelConfig
+from agents.policy import FunctionPolicy
+from bridge.task import TaskConfig
+from docs.generate import PAGES, REFERENCE, main, outdated, write
+from docs.pages.markdown import anchor, cell, table
+from khala import testing
+from khala.cli import app
+from protocol import speech
+from protocol.codec import decode
+from protocol.configfile import loads
+from protocol.messages import Briefing
+from protocol.recording import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from _pytest.mark import ParameterSet
+    from pydantic import BaseModel
+
+    from protocol.messages import Observation
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+GOLDEN = ROOT / "tests" / "khala" / "golden.mcap"
+FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
+LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", *MODELS}
+OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "source", "ssh"}
+
+
+class Block(NamedTuple):
+    """A block of code on a page."""
+
+    page: Path
+    line: int
+    info: str
+    text: str
+
+    @property
+    def name(self) -> str:
+        return f"{self.page.relative_to(ROOT).as_posix()}:{self.line}"
+
+
+def all_blocks() -> Iterator[Block]:
+    for page in DOCUMENTS:
+        text = page.read_text(encoding="utf-8")
+        for found in FENCE.finditer(text):
+            yield Block(page, text[: found.start()].count("\n") + 1, found["info"].strip(), found["text"])
+
+
+BLOCKS = tuple(all_blocks())
+
+
+def blocks(*infos: str) -> list[ParameterSet]:
+    return [pytest.param(block, id=block.name) for block in BLOCKS if block.info in infos]
+
+
+# --- Python -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs in a directory with the files that the pages speak of."""
+    (tmp_path / "tests").mkdir()
+    for name in ("recording.mcap", "golden.mcap", "tests/golden.mcap"):
+        shutil.copy(GOLDEN, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def scene() -> tuple[Briefing, Observation]:
+    """What an agent was told, and what it saw in the middle of a battle."""
+    golden = Recording.open(GOLDEN)
+    observations = itertools.islice(golden.observations("Zealots"), 10, None)
+    return next(golden.of(Briefing, agent="Zealots")), next(seen for seen in observations if seen.view.teams[0].enemies)
+
+
+@pytest.mark.parametrize("block", blocks("python"))
+@pytest.mark.usefixtures("place")
+async def test_a_block_of_python_runs(block: Block, scene: tuple[Briefing, Observation]) -> None:
+    namespace = run(block)
+    for name, thing in namespace.items():
+        if name == "decide":
+            await check_policy(FunctionPolicy(thing), scene)
+        elif isinstance(thing, type) and thing.__module__ == block.name and hasattr(thing, "decide"):
+            await check_policy(thing(), scene)
+        elif name.startswith("test_"):
+            await thing(**{fixture: double(fixture) for fixture in inspect.signature(thing).parameters})
+
+
+@pytest.mark.parametrize("block", blocks("python compile"))
+def test_a_block_of_python_that_needs_a_network_compiles(block: Block) -> None:
+    compile(block.text, block.name, "exec")
+
+
+def run(block: Block) -> dict[str, Any]:
+    namespace: dict[str, Any] = {"__name__": block.name}
+    exec(compile("\n" * block.line + block.text, block.page, "exec"), namespace)
+    return dict(namespace)
+
+
+async def check_policy(policy: Any, scene: tuple[Briefing, Observation]) -> None:
+    """Decides once; what is said must be understood, and be among what the agent may say."""
+    briefing, observation = scene
+    if hasattr(policy, "prepare"):
+        await policy.prepare(briefing)
+    said = speech.parse(await policy.decide(briefing, observation))
+    assert not said.faults
+    assert {call.name for call in said.calls} <= {action.name for action in briefing.actions}
+    if hasattr(policy, "close"):
+        await policy.close()
+
+
+def double(fixture: str) -> Callable[..., Any]:
+    """A fixture of `khala.pytest_plugin` that finds no difference, if it is called as the real one may be."""
+    real = inspect.signature(getattr(testing, fixture))
+
+    async def find_none(*args: Any, **kwargs: Any) -> list[object]:
+        assert os.path.isfile(real.bind(*args, **kwargs).arguments["path"])  # noqa: ASYNC240, PTH113  # nothing waits here
+        return []
+
+    return find_none
+
+
+# --- commands -----------------------------------------------------------------------------------------
+
+
+def commands() -> list[ParameterSet]:
+    """Every line that a reader may type; of a session on the console, what stands behind the prompt."""
+    found = []
+    for block in BLOCKS:
+        prompt = {"bash": "", "console": "$ "}.get(block.info)
+        if prompt is None:
+            continue
+        for number, line in enumerate(block.text.splitlines(), start=block.line + 1):
+            if line.startswith(prompt) and line.strip() and not line.startswith("#"):
+                place = f"{block.page.relative_to(ROOT).as_posix()}:{number}"
+                found.append(pytest.param(line.removeprefix(prompt), id=place))
+    return found
+
+
+def parse(words: list[str]) -> None:
+    """Has the command line read words, without doing what they say. Raises what it raises."""
+    command: Any = typer.main.get_command(app)
+    name = "khala"
+    while hasattr(command, "commands"):
+        name, *words = words
+        command = command.commands[name]
+    command.make_context(name, words)
+
+
+@pytest.mark.parametrize("line", commands())
+def test_a_command_can_be_given(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in os.environ if name.startswith("KHALA_")]:
+        monkeypatch.delenv(name)
+    for part in re.sub(r"\$\([^)]*\)", "", line).split(" && "):
+        program, *words = itertools.dropwhile(lambda word: "=" in word, shlex.split(part, comments=True))
+        if program == "khala":
+            parse(words)
+        elif program == "make":
+            assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"make {words[0]}"
+        else:
+            assert program in OTHER_PROGRAMS
+
+
+@pytest.mark.parametrize(("words", "fault"), [("run", "task"), ("run 2s3z --sead 1", "--sead"), ("rum 2s3z", "rum")])
+def test_a_wrong_command_would_be_found(words: str, fault: str) -> None:
+    with pytest.raises(Exception, match=fault) as raised:
+        parse(words.split())
+    assert not isinstance(raised.value, AssertionError)
+
+
+# --- files and messages -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("block", blocks(*MODELS))
+def test_a_file_on_a_page_is_valid(block: Block) -> None:
+    loads(block.text, MODELS[block.info], source=block.name)
+
+
+@pytest.mark.parametrize("block", blocks("json"))
+def test_a_message_on_a_page_is_one_of_the_protocol(block: Block) -> None:
+    assert decode(block.text.encode()).run
+
+
+def test_every_block_says_what_it_is() -> None:
+    assert {block.info for block in BLOCKS} <= LANGUAGES
+    assert {block.info for block in BLOCKS} >= {"python", "bash", "console", "json", "yaml task", "yaml model"}
+
+
+# --- links --------------------------------------------------------------------------------------------
+
+
+def prose(page: Path) -> str:
+    return FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
+def anchors(page: Path) -> set[str]:
+    return {anchor(title) for title in re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = {found["target"] for found in LINK.finditer(prose(page))}
+    broken = []
+    for target in targets:
+        path, _, title = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if "://" in target:
+            continue
+        if not file.exists() or not file.is_relative_to(ROOT) or (title and f"#{title}" not in anchors(file)):
+            broken.append(target)
+    assert not broken
+
+
+def test_every_page_can_be_found_from_the_map_of_the_documentation() -> None:
+    start = ROOT / "docs" / "README.md"
+    named = {(start.parent / found["target"]).resolve() for found in LINK.finditer(prose(start))}
+    assert set(DOCUMENTS) - named == {ROOT / "README.md", start}
+
+
+# --- generated pages ----------------------------------------------------------------------------------
+
+
+def test_the_reference_is_up_to_date() -> None:
+    assert outdated() == [], "`make docs` writes these pages anew"
+
+
+def test_a_page_that_is_old_missing_or_foreign_is_found(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert outdated(tmp_path) == []
+    (tmp_path / "cli.md").write_text("old")
+    (tmp_path / "maps.md").unlink()
+    (tmp_path / "foreign.md").write_text("by hand")
+    assert outdated(tmp_path) == ["cli.md", "foreign.md", "maps.md"]
+
+
+def test_check_fails_and_says_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(PAGES, "cli.md", lambda: "new")
+    before = (REFERENCE / "cli.md").read_bytes()
+    assert main(["--check"]) == 1
+    assert "cli.md" in (said := capsys.readouterr().err)
+    assert "`make docs`" in said
+    assert (REFERENCE / "cli.md").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, ""),
+        (2.50, "2.5"),
+        ("two\nlines", "two lines"),
+        ("a | b", "a \\| b"),
+        ("<Stop()> and `<Stop()>`", "&lt;Stop()> and `<Stop()>`"),
+        ("``World`` in a docstring", "`World` in a docstring"),
+    ],
+)
+def test_a_value_stands_in_a_table(value: object, text: str) -> None:
+    assert cell(value) == text
+
+
+def test_a_column_that_is_empty_everywhere_is_left_out() -> None:
+    assert table(("a", "b", "c"), [(1, "", 2), (3, None, 4)]) == "| a | c |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |"
