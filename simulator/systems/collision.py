@@ -98,7 +98,7 @@ class _Pairs:
             if rounds == 0 or not some(depth > OVERLAP_ALLOWED):
                 break
             rounds -= 1
-            push = np.maximum(depth, 0.0) / distance
+            push = np.maximum(depth, 0.0) / np.maximum(distance, SAME_POINT)
             push *= self.share
             offset *= push
             axes[0] += np.bincount(one, offset[0], n)

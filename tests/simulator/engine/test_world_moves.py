@@ -100,6 +100,17 @@ def test_a_heap_of_created_units_falls_apart(field: Any) -> None:
     assert (world.pos[world.live] == before).all()
 
 
+@pytest.mark.parametrize("count", [2, 3, 5, 9])
+def test_units_on_one_point_that_walk_apart_are_parted(field: Any, count: int) -> None:
+    world = field.world
+    slots = commands.debug_create(world, 73, 1, (16.0, 16.0), count)
+    for i, slot in enumerate(slots):
+        commands.move(world, [slot], (16 + 3 * math.cos(i), 16 + 3 * math.sin(i)))
+    field.play(80)
+    assert np.isfinite(world.pos[slots]).all()
+    assert deepest_overlap(world) < 0.01
+
+
 def test_bodies_of_different_layers_pass_through_each_other(field: Any) -> None:
     world = field.world
     colossus, zealot = field.put("Colossus", 1, 10, 16), field.put("Zealot", 1, 22, 16)
