@@ -28,6 +28,7 @@ from khala.cli import app
 from protocol import speech
 from protocol.codec import decode
 from protocol.configfile import loads
+from protocol.errors import ConfigError
 from protocol.messages import Briefing
 from protocol.recording import Recording
 
@@ -197,6 +198,14 @@ def test_a_wrong_command_would_be_found(words: str, fault: str) -> None:
 @pytest.mark.parametrize("block", blocks(*MODELS))
 def test_a_file_on_a_page_is_valid(block: Block) -> None:
     loads(block.text, MODELS[block.info], source=block.name)
+
+
+def test_the_mistake_in_the_tutorial_is_reported_as_it_says() -> None:
+    page = ROOT / "docs" / "tutorial" / "first-battle.md"
+    (task,) = (block for block in BLOCKS if block.page == page and block.info == "yaml task")
+    with pytest.raises(ConfigError) as raised:
+        loads(task.text.replace("[Stalker]", "[Stlaker]", 1), TaskConfig, source="kite.yaml")
+    assert f"khala: {raised.value}\n" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("block", blocks("json"))
