@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -86,11 +87,9 @@ def main() -> None:
     parser.add_argument("--maps", nargs="*", default=list(map_names()), help="maps to play; none: only the armies")
     parser.add_argument("--sizes", nargs="*", type=int, default=list(ARMY_SIZES), help="units in the open battles")
     options = parser.parse_args()
-    rows = {name: measure(lambda seed, name=name: battle(name, seed), options.seconds) for name in options.maps}
+    rows = {name: measure(partial(battle, name), options.seconds) for name in options.maps}
     for size in options.sizes:
-        rows[f"open field, {size} units"] = measure(
-            lambda seed, size=size: armies(size, seed), options.seconds, max_loops=400
-        )
+        rows[f"open field, {size} units"] = measure(partial(armies, size), options.seconds, max_loops=400)
     if options.json:
         json.dump({"command": " ".join(sys.argv), "rows": rows}, sys.stdout)
         return
