@@ -22,7 +22,7 @@ def page() -> str:
         [(f"[`{path}`]({anchor(path)})", _first_line(command)) for path, command in found if path != "khala"],
     )
     sections = (_section(path, command) for path, command in found)
-    intro = "`khala COMMAND --help` says the same. Exit codes: 0, 1 with one sentence on stderr, 2 for a wrong "
+    intro = "Every command says the same with `--help`. Exit codes: 0, 1 with one sentence on stderr, 2 for a wrong "
     intro += "command line, 130 after Ctrl-C."
     return join(head("Command line", "the help of the commands"), intro, contents, *sections)
 

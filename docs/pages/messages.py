@@ -46,18 +46,15 @@ def _section(model: type[BaseModel], level: str) -> str:
 
 def _keys() -> str:
     """The forms of keys as their module draws them, and what a name may be."""
-    text = inspect.getdoc(keys) or ""
-    _, forms, *rest = text.split("\n\n")
-    return join(fence(inspect.cleandoc(forms)), prose("\n\n".join(rest)), _first(keys.check_name, "Raises:"))
+    _, forms, *rest = (inspect.getdoc(keys) or "").split("\n\n")
+    refused = re.search(r"WrongKey: (.+)", inspect.getdoc(keys.check_name) or "")
+    rule = f"A name is refused when {refused.group(1)}" if refused else ""
+    return join(fence(inspect.cleandoc(forms)), prose("\n\n".join(rest)), rule)
 
 
-def _first(thing: object, stop: str | None = None) -> str:
-    """The first paragraph of a docstring, or its section under `stop`."""
-    text = inspect.getdoc(thing) or ""
-    if stop is None:
-        return text.split("\n\n", maxsplit=1)[0]
-    under = re.search(rf"{stop}\n\s+WrongKey: (.+)", text)
-    return f"A name is refused when {under.group(1)}" if under else ""
+def _first(model: type) -> str:
+    """The first paragraph of a docstring."""
+    return (inspect.getdoc(model) or "").split("\n\n", maxsplit=1)[0]
 
 
 def _frames() -> str:

@@ -18,7 +18,7 @@ from pydantic_core import PydanticUndefined, to_jsonable_python
 from docs.pages.markdown import anchor, code, prose, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from types import ModuleType
 
     from pydantic.fields import FieldInfo
@@ -46,14 +46,10 @@ class Describer:
 
     Args:
         names: words for types that a reader knows by another name, such as an annotated string.
-        linked: whether a model has its own heading on the page.
     """
 
-    def __init__(
-        self, names: Mapping[object, str] | None = None, *, linked: Callable[[type[BaseModel]], bool] = lambda _: True
-    ) -> None:
-        self._names = dict(names or {})
-        self._linked = linked
+    def __init__(self, names: Mapping[object, str] | None = None) -> None:
+        self._words = {**(names or {}), **WORDS}
 
     def fields(self, model: type[BaseModel], *, without: Iterable[str] = ()) -> str:
         """A table of the fields of a model."""
@@ -100,15 +96,12 @@ class Describer:
             keys = "" if args[0] is str else f", by {self.shape(args[0])}"
             return f"object of {self.shape(args[1])}{keys}"
         if isinstance(hint, type) and issubclass(hint, BaseModel):
-            return f"[{hint.__name__}]({anchor(hint.__name__)})" if self._linked(hint) else hint.__name__
+            return f"[{hint.__name__}]({anchor(hint.__name__)})"
         raise TypeError(f"no words for {hint!r}")
 
     def _word(self, hint: object) -> str | None:
-        for words in (self._names, WORDS):
-            for known, word in words.items():
-                if known == hint:
-                    return word
-        return None
+        """By equality and not by hash: what annotates a type need not be hashable."""
+        return next((word for known, word in self._words.items() if known == hint), None)
 
 
 def about(model: type) -> str:

@@ -161,14 +161,19 @@ def commands() -> list[ParameterSet]:
     return found
 
 
-def parse(words: list[str]) -> None:
-    """Has the command line read words, without doing what they say. Raises what it raises."""
+def find(words: list[str]) -> tuple[Any, list[str]]:
+    """The command that the first words name, and the words behind them."""
     command: Any = typer.main.get_command(app)
-    name = "khala"
-    while hasattr(command, "commands"):
+    while hasattr(command, "commands") and words and not words[0].startswith("-"):
         name, *words = words
         command = command.commands[name]
-    command.make_context(name, words)
+    return command, words
+
+
+def parse(words: list[str]) -> None:
+    """Has the command line read words, without doing what they say. Raises what it raises."""
+    command, words = find(words)
+    command.make_context("khala", words)
 
 
 @pytest.mark.parametrize("line", commands())
@@ -183,6 +188,14 @@ def test_a_command_can_be_given(line: str, monkeypatch: pytest.MonkeyPatch) -> N
             assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"make {words[0]}"
         else:
             assert program in OTHER_PROGRAMS
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_commands_in_sentences_exist_with_their_options(page: Path) -> None:
+    for said in re.findall(r"`khala ([^`]+)`", prose(page)):
+        command, words = find(said.split())
+        options = {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        assert {word for word in words if word.startswith("-")} <= options, said
 
 
 @pytest.mark.parametrize(("words", "fault"), [("run", "task"), ("run 2s3z --sead 1", "--sead"), ("rum 2s3z", "rum")])
