@@ -56,19 +56,14 @@ class Action(Frozen):
         """How it is written: `<Attack_Unit(tag)>`."""
         return f"<{self.name}({', '.join(self.args)})>"
 
-    @property
+    @functools.cached_property
     def spec(self) -> ActionSpec:
         """What an agent is told of it."""
-        return _spec(self)
+        return ActionSpec(name=self.name, args=self.args, description=self.about)
 
     def fits(self, unit_type: str) -> bool:
         """Whether units of this type have it at all."""
         return not self.units or unit_type in self.units
-
-
-@functools.cache
-def _spec(action: Action) -> ActionSpec:
-    return ActionSpec(name=action.name, args=action.args, description=action.about)
 
 
 @functools.cache

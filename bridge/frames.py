@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from protocol.messages import Frames
@@ -112,6 +114,13 @@ class Camera:
         """Whether a world position is on the screen."""
         half = CAMERA_WIDTH / 2
         return -half <= x - self.x < half and -half < y - self.y <= half
+
+    def sees_all(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """`sees` of many world positions at once: (n, 2) → (n,)."""
+        half = CAMERA_WIDTH / 2
+        right, down = places[:, 0] - self.x, self.y - places[:, 1]
+        seen: NDArray[np.bool_] = (right >= -half) & (right < half) & (down >= -half) & (down < half)
+        return seen
 
     def bounds(self, world: MapFrame) -> tuple[float, float, float, float]:
         """The part of the screen that lies on the playable map: x0, y0, x1, y1 in screen cells."""

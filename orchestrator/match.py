@@ -19,11 +19,11 @@ from protocol.messages import AgentReport, Observation, Received, Report, Timing
 from protocol.speech import parse
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Mapping
+    from collections.abc import AsyncIterator, Iterator, Mapping
 
     from bridge.act import Actor, JointAction
     from bridge.game import OneSide, Turn
-    from bridge.observe import Observer, Sight
+    from bridge.observe import Observer
     from bridge.snapshot import Snapshot
     from orchestrator.config import MatchConfig
     from orchestrator.mailbox import Mailbox, Post
@@ -91,18 +91,15 @@ class Match:
         self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]
     ) -> tuple[Report, Snapshot, dict[str, Feedback]]:
         watch = Stopwatch()
-        sight = self.observer.observe(snapshot, feedback)
-        observations = self._observations(at, sight, feedback)
-        observe_s = watch.lap()
-        answers = await self.asking.ask(observations)
-        watch.lap()
+        answers = await self.asking.ask(self._observations(at, snapshot, feedback))
+        ask_s = watch.lap()
         speeches = self._speeches(answers)
-        joint = self.actor.joint(sight, speeches)
+        joint = self.actor.joint(self.observer.sight, speeches)
         post = self._deliver(answers, speeches)
         act_s = watch.lap()
         turn = await self.game.act(joint.commands)
         timings = Timings(
-            observe_s=observe_s,
+            observe_s=ask_s - answers.publish_s - answers.wait_s,
             publish_s=answers.publish_s,
             wait_s=answers.wait_s,
             act_s=act_s,
@@ -117,17 +114,18 @@ class Match:
         for agent in self.config.task.agents:
             await self.telling.brief(briefing(self.config.task, agent, self.config.run, episode))
 
-    def _observations(self, at: At, sight: Sight, feedback: Mapping[str, Feedback]) -> dict[Seat, Observation]:
-        task, observations = self.config.task, {}
-        for name, seen in sight.agents.items():
-            heard = feedback.get(name, Feedback())
-            observations[Seat(task.side, name)] = Observation(
+    def _observations(self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> Iterator[Observation]:
+        """One for each agent, made when it is asked for: the first agent thinks while others are looked for."""
+        task = self.config.task
+        for seen in self.observer.each(snapshot, feedback):
+            heard = feedback.get(seen.agent.name, Feedback())
+            yield Observation(
                 run=self.config.run,
-                agent=name,
+                agent=seen.agent.name,
                 side=task.side,
                 episode=at.episode,
                 step=at.step,
-                game_loop=sight.snapshot.game_loop,
+                game_loop=snapshot.game_loop,
                 answer_within_s=task.clock.max_wait_s,
                 text=seen.text,
                 view=seen.view,
@@ -135,7 +133,6 @@ class Match:
                 rejections=heard.rejections,
                 messages=heard.messages,
             )
-        return observations
 
     def _speeches(self, answers: Answers) -> dict[str, Speech]:
         default = self.config.task.default_reply

@@ -19,7 +19,7 @@ from protocol.messages import Message, Observation, Reply, Report
 from protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator
 
     from bridge.game import OneSide
     from protocol.messages import AgentReport, Briefing, Result
@@ -69,13 +69,13 @@ class RecordedTurn:
         for reply in recording.of(Reply):
             self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
 
-    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+    async def ask(self, observations: Iterable[Observation]) -> Answers:
         """Compares the observations with the recorded ones, and gives the recorded answers."""
-        first = next(iter(observations.values()))
+        first, *others = observations
         step = next(self._steps, None)
         if step is None or not step.of(Report):
             raise _EndOfRecording
-        self._compare(step, observations)
+        self._compare(step, [first, *others])
         if self.differences:
             raise _EndOfRecording
         (report,) = step.of(Report)
@@ -99,8 +99,8 @@ class RecordedTurn:
         reply = self._replies[report.episode, report.step, agent.agent] if taken else None
         return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
 
-    def _compare(self, step: Step, observations: Mapping[Seat, Observation]) -> None:
-        sent = {seat.agent: encode(observation).decode() for seat, observation in observations.items()}
+    def _compare(self, step: Step, observations: Iterable[Observation]) -> None:
+        sent = {observation.agent: encode(observation).decode() for observation in observations}
         for sample in step.samples:
             message = sample.message
             if not isinstance(message, Observation):

@@ -22,7 +22,7 @@ from protocol.keys import Topic, agent_key, every_agent, parse
 from protocol.messages import AgentStatus, Message, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from types import TracebackType
 
     from orchestrator.roster import Roster
@@ -71,7 +71,7 @@ class Answers:
 class Asking(Protocol):
     """What a match needs of a turn; a recording can stand in for live agents."""
 
-    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+    async def ask(self, observations: Iterable[Observation]) -> Answers:
         """Puts one observation before each agent and returns what they answered."""
         ...
 
@@ -80,17 +80,34 @@ class Asking(Protocol):
 class _Step:
     """The step that is open: who was asked, who is still waited for, what came."""
 
-    episode: int
-    number: int
+    episode: int = -1
+    number: int = -1
+    complete: bool = False
     asked_at: dict[Seat, float] = field(default_factory=dict)
     waiting: set[Seat] = field(default_factory=set)
     taken: dict[Seat, tuple[Reply, float]] = field(default_factory=dict)
     faults: dict[Seat, str] = field(default_factory=dict)
     settled: asyncio.Event = field(default_factory=asyncio.Event)
 
+    def open(self, seat: Seat, observation: Observation, now: float) -> Self:
+        """Begins to wait for one agent."""
+        self.episode, self.number = observation.episode, observation.step
+        self.asked_at[seat] = now
+        self.waiting.add(seat)
+        return self
+
+    def all_asked(self) -> None:
+        """From now on the step is settled when nobody is waited for."""
+        self.complete = True
+        self._settle()
+
     def stop_waiting(self, seat: Seat) -> None:
+        """Waits no more for one agent; it may still answer."""
         self.waiting.discard(seat)
-        if not self.waiting:
+        self._settle()
+
+    def _settle(self) -> None:
+        if self.complete and not self.waiting:
             self.settled.set()
 
 
@@ -128,29 +145,31 @@ class Turn:
         for publisher in self._publishers.values():
             await publisher.close()
 
-    async def ask(self, observations: Mapping[Seat, Observation]) -> Answers:
+    async def ask(self, observations: Iterable[Observation]) -> Answers:
         """Publishes the observations and waits for the replies, no longer than the observations allow.
 
         Args:
-            observations: one a seat, all of the same episode and step and with the same `answer_within_s`.
+            observations: one a seat, all of the same episode and step and with the same `answer_within_s`. They may
+                be made while they are taken: each is published before the next is asked for.
         """
         loop = asyncio.get_running_loop()
-        first = next(iter(observations.values()))
-        step = self._step = _Step(first.episode, first.step, waiting=set(observations))
-        began = loop.time()
-        for seat, observation in observations.items():
-            step.asked_at[seat] = loop.time()
+        step, within_s, publish_s = _Step(), None, 0.0
+        for observation in observations:
+            began = loop.time()
+            seat, within_s = Seat(observation.side, observation.agent), observation.answer_within_s
+            self._step = step.open(seat, observation, began)
             await self._publishers[seat].put(encode(observation))
-        published = loop.time()
-        for seat in observations:
             if not self._roster.present(seat):
                 step.stop_waiting(seat)
+            publish_s += loop.time() - began
+        began = loop.time()
+        step.all_asked()
         try:
-            async with asyncio.timeout(first.answer_within_s):
+            async with asyncio.timeout(within_s):
                 await step.settled.wait()
         except TimeoutError:
             log.info("step %d: no reply in time from %s", step.number, ", ".join(map(str, sorted(step.waiting))))
-        return self._close(step, publish_s=published - began, wait_s=loop.time() - published)
+        return self._close(step, publish_s=publish_s, wait_s=loop.time() - began)
 
     def _close(self, step: _Step, *, publish_s: float, wait_s: float) -> Answers:
         self._step = None

@@ -12,13 +12,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bridge.observe.sight import Sight, look
+from bridge.observe.sight import Scene
 from bridge.observe.teams import Roster
 from bridge.observe.text import Feedback, render
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
+    from bridge.observe.sight import AgentSight, Sight
     from bridge.snapshot import Snapshot
     from bridge.task import TaskConfig
 
@@ -42,12 +43,28 @@ class Observer:
             snapshot: what the game says.
             feedback: by agent; agents that are not in it are told nothing.
         """
+        for _ in self.each(snapshot, feedback):
+            pass
+        return self.sight
+
+    def each(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> Iterator[AgentSight]:
+        """The same, agent by agent in the order of the task: the first can be asked while others are still looked for.
+
+        The whole is in `sight` when the last agent has been taken.
+        """
         self._roster.update(snapshot.own, snapshot.response.observation.player_common)
-        sight = look(snapshot, self._task, self._roster, self._before)
-        self._before = sight
-        told = feedback or {}
-        agents = {
-            name: replace(agent, text=render(agent, self._task, told.get(name, Feedback())))
-            for name, agent in sight.agents.items()
-        }
-        return replace(sight, agents=agents)
+        scene = Scene(snapshot, self._task.frames)
+        before, told = self._before.agents if self._before else {}, feedback or {}
+        agents: dict[str, AgentSight] = {}
+        for config in self._task.agents:
+            seen = scene.agent(config, self._roster, before.get(config.name))
+            text = render(seen, self._task, told.get(config.name, Feedback()))
+            agents[config.name] = replace(seen, text=text)
+            yield agents[config.name]
+        self._before = scene.sight(agents)
+
+    @property
+    def sight(self) -> Sight:
+        """What was seen last."""
+        assert self._before is not None, "nothing has been observed in this episode"
+        return self._before

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 from s2clientprotocol import raw_pb2
 
 from bridge.catalog import catalogue
@@ -30,10 +31,11 @@ if TYPE_CHECKING:
 
     from bridge.catalog import Action
     from bridge.observe.teams import Roster, Team
-    from bridge.task import AgentConfig, TaskConfig
-    from protocol.messages import ActionSpec, Alliance, Point
+    from bridge.task import AgentConfig
+    from protocol.messages import ActionSpec, Alliance, Frames, Point
 
 UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
+_FRIENDS = (raw_pb2.Self, raw_pb2.Ally)
 _CLOAKED = (raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied)
 
 
@@ -67,39 +69,51 @@ class Sight:
     agents: dict[str, AgentSight]
 
 
-def look(snapshot: Snapshot, task: TaskConfig, roster: Roster, before: Sight | None) -> Sight:
-    """The view of every agent.
+@dataclass(frozen=True, slots=True)
+class _Body:
+    """A unit as every team sees it: all of its view that does not depend on who looks."""
 
-    Args:
-        snapshot: what the game says; `roster` has been updated with it.
-        task: the agents and the frames.
-        roster: who has which unit.
-        before: the sight of the observation before, for events; None at the beginning of an episode.
-    """
-    world = MapFrame.of(snapshot.info, task.frames)
-    scene = _Scene(snapshot, world, task.frames.screen)
-    agents = {}
-    for agent in task.agents:
-        earlier = {} if before is None else {t.view.name: t.view for t in before.agents[agent.name].teams}
-        teams = tuple(scene.team(agent, team, earlier.get(team.name)) for team in roster.teams(agent.name))
-        view = scene.view(teams)
-        agents[agent.name] = AgentSight(agent, view, teams, roster.idle_teams(agent.name))
-    return Sight(snapshot, world, agents)
+    tag: int
+    x: float
+    y: float
+    name: str
+    alliance: int
+    view: UnitView
 
 
-class _Scene:
-    """One snapshot while views are made of it."""
+class Scene:
+    """One snapshot while views are made of it; what all teams see alike is made once."""
 
-    def __init__(self, snapshot: Snapshot, world: MapFrame, screen_size: float) -> None:
+    def __init__(self, snapshot: Snapshot, frames: Frames) -> None:
+        """Takes a snapshot and the frames that its views are given in."""
         self._snapshot = snapshot
-        self._world = world
-        self._screen_size = screen_size
+        self._world = MapFrame.of(snapshot.info, frames)
+        self._screen_size = frames.screen
+        self._bodies = {tag: self._body(unit) for tag, unit in snapshot.units.items()}
+        self._order = tuple(self._bodies.values())
+        self._places = np.array([(body.x, body.y) for body in self._order]).reshape(-1, 2)  # (units, 2), world
         self._dead = {hex(tag) for tag in snapshot.dead}
         observation = snapshot.response.observation
         self._common = observation.player_common
         self._upgrades = tuple(upgrade_name(number) for number in sorted(observation.raw_data.player.upgrade_ids))
 
-    def view(self, teams: Iterable[TeamSight]) -> View:
+    def sight(self, agents: dict[str, AgentSight]) -> Sight:
+        """The sight of the side, when all its agents have been looked for."""
+        return Sight(self._snapshot, self._world, agents)
+
+    def agent(self, agent: AgentConfig, roster: Roster, before: AgentSight | None) -> AgentSight:
+        """What one agent sees.
+
+        Args:
+            agent: whose teams they are.
+            roster: who has which unit; it has been updated with the snapshot.
+            before: what the agent saw before, for events; None at the beginning of an episode.
+        """
+        earlier = {} if before is None else {team.view.name: team.view for team in before.teams}
+        teams = tuple(self._team(agent, team, earlier.get(team.name)) for team in roster.teams(agent.name))
+        return AgentSight(agent, self._view(teams), teams, roster.idle_teams(agent.name))
+
+    def _view(self, teams: Iterable[TeamSight]) -> View:
         common = self._common
         return View(
             time_s=round(self._snapshot.game_loop / LOOPS_PER_S, 3),
@@ -113,25 +127,29 @@ class _Scene:
             teams=tuple(team.view for team in teams),
         )
 
-    def team(self, agent: AgentConfig, team: Team, before: TeamView | None) -> TeamSight:
-        members = [self._snapshot.units[tag] for tag in team.tags]
-        camera = Camera(members[0].pos.x, members[0].pos.y, self._screen_size)
-        mean = WorldPoint(_mean([u.pos.x for u in members]), _mean([u.pos.y for u in members]))
-        inside = [u for u in self._snapshot.units.values() if camera.sees(u.pos.x, u.pos.y) and u.tag not in team.tags]
-        friends = [u for u in inside if u.alliance in (raw_pb2.Self, raw_pb2.Ally)]
-        foes = [u for u in inside if u.alliance == raw_pb2.Enemy and unit_name(u.unit_type) not in UNSEEN_TYPES]
-        enemies = [self._unit(u, camera, "enemy", mean) for u in foes]
-        allies = [self._unit(u, camera, "ally") for u in friends]
+    def _team(self, agent: AgentConfig, team: Team, before: TeamView | None) -> TeamSight:
+        members = [self._bodies[tag] for tag in team.tags]
+        camera = Camera(members[0].x, members[0].y, self._screen_size)
+        mean = WorldPoint(_mean([body.x for body in members]), _mean([body.y for body in members]))
+        others = [body for body in self._seen_by(camera) if body.tag not in team.tags]
+        friends = [body for body in others if body.alliance in _FRIENDS]
+        foes = [body for body in others if body.alliance == raw_pb2.Enemy and body.name not in UNSEEN_TYPES]
+        enemies = [self._unit(body, camera, "enemy", mean) for body in foes]
+        allies = [self._unit(body, camera, "ally") for body in friends]
         view = TeamView(
             name=team.name,
             minimap=_rounded(self._world.minimap(camera.x, camera.y), self._world.minimap_size),
-            units=tuple(self._unit(unit, camera, "own") for unit in members),
+            units=tuple(self._unit(body, camera, "own") for body in members),
             allies=tuple(sorted(allies, key=lambda unit: unit.type)),
             enemies=tuple(sorted(enemies, key=lambda unit: (unit.type, unit.distance))),
-            actions=self._actions(agent, [unit_name(unit.unit_type) for unit in members]),
+            actions=self._actions(agent, [body.name for body in members]),
             bounds=_edges(camera.bounds(self._world)),
         )
         return TeamSight(team, camera, view.model_copy(update={"events": events(before, view, self._dead)}))
+
+    def _seen_by(self, camera: Camera) -> list[_Body]:
+        """The units on a camera's screen, in the order of their tags."""
+        return [self._order[index] for index in np.flatnonzero(camera.sees_all(self._places)).tolist()]
 
     def _actions(self, agent: AgentConfig, types: list[str]) -> tuple[ActionSpec, ...]:
         valid: dict[str, Action] = {}
@@ -141,16 +159,24 @@ class _Scene:
                     valid.setdefault(name, catalogue()[name])
         return tuple(action.spec for action in valid.values())
 
-    def _unit(self, unit: raw_pb2.Unit, camera: Camera, alliance: Alliance, mean: WorldPoint | None = None) -> UnitView:
-        pos, name = unit.pos, unit_name(unit.unit_type)
+    def _unit(self, body: _Body, camera: Camera, alliance: Alliance, mean: WorldPoint | None = None) -> UnitView:
+        seen: dict[str, object] = {
+            "alliance": alliance,
+            "screen": _rounded(camera.screen(body.x, body.y), self._screen_size),
+        }
+        if mean is not None:
+            seen["distance"] = round(math.hypot(body.x - mean.x, body.y - mean.y), 1)
+        return body.view.model_copy(update=seen)
+
+    def _body(self, unit: raw_pb2.Unit) -> _Body:
+        x, y, name = unit.pos.x, unit.pos.y, unit_name(unit.unit_type)
         mine = unit.alliance == raw_pb2.Self
-        return UnitView(
+        view = UnitView(
             tag=hex(unit.tag),
             type=name,
-            alliance=alliance,
-            screen=_rounded(camera.screen(pos.x, pos.y), self._screen_size),
-            minimap=_rounded(self._world.minimap(pos.x, pos.y), self._world.minimap_size),
-            distance=None if mean is None else round(math.hypot(pos.x - mean.x, pos.y - mean.y), 1),
+            alliance="neutral",
+            screen=(0.0, 0.0),
+            minimap=_rounded(self._world.minimap(x, y), self._world.minimap_size),
             health=round(unit.health, 1),
             health_max=unit.health_max,
             shield=round(unit.shield, 1),
@@ -165,6 +191,7 @@ class _Scene:
             buffs=tuple(buff_name(buff) for buff in unit.buff_ids),
             order=order_name(unit.orders[0].ability_id) if mine and unit.orders else None,
         )
+        return _Body(unit.tag, x, y, name, unit.alliance, view)
 
 
 def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None:

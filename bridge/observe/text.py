@@ -14,6 +14,7 @@ decides nothing and reads no game: a page is a pure function of a sight, its tas
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -113,10 +114,7 @@ def unit_knowledge(page: Page) -> Iterator[str]:
     if known:
         yield "Unit knowledge"
     for name, kind in known:
-        yield f"{INDENT}{name}: {kind.about}"
-        yield f"{INDENT * 2}{_body(kind)}"
-        for weapon in kind.weapons:
-            yield f"{INDENT * 2}{_weapon(weapon)}"
+        yield from _known(name)
         if name in mine:
             yield from (f"{INDENT * 2}{ability}: {what}" for ability, what in kind.abilities.items())
 
@@ -233,26 +231,38 @@ def _listed(heading: str, lines: Iterable[str]) -> Iterator[str]:
 
 def _unit_line(unit: UnitView, size: float) -> str:
     off = "" if all(0 <= value < size for value in unit.screen) else " (off screen)"
-    fields = [unit.type, f"tag {unit.tag}", f"screen {_point(unit.screen)}{off}"]
+    where = f"{unit.type} | tag {unit.tag} | screen {_point(unit.screen)}{off}"
     if unit.distance is not None:
-        fields.append(f"distance {_n(unit.distance)}")
-    fields.append(f"health {_whole(unit.health)}/{_whole(unit.health_max)}")
-    if unit.shield_max:
-        fields.append(f"shield {_whole(unit.shield)}/{_whole(unit.shield_max)}")
-    if full := unit.health_max + unit.shield_max:
-        fields.append(f"total {_whole(100 * (unit.health + unit.shield) / full)}%")
-    if unit.energy_max:
-        fields.append(f"energy {_whole(unit.energy)}/{_whole(unit.energy_max)}")
-    if unit.build_progress < 1:
-        fields.append(f"built {round(100 * unit.build_progress)}%")
-    if unit.weapon_cooldown_s is not None:
-        fields.append(f"weapon in {_n(unit.weapon_cooldown_s)} s" if unit.weapon_cooldown_s else "weapon ready")
-    if unit.order:
-        fields.append(f"order {unit.order}")
-    fields += [word for word, is_so in (("cloaked", unit.cloaked), ("hallucination", unit.hallucination)) if is_so]
-    if unit.buffs:
-        fields.append(f"effects {', '.join(unit.buffs)}")
-    return " | ".join(fields)
+        where += f" | distance {_n(unit.distance)}"
+    return where + _condition(
+        unit.health, unit.health_max, unit.shield, unit.shield_max, unit.energy, unit.energy_max, unit.build_progress,
+        unit.weapon_cooldown_s, unit.order, unit.cloaked, unit.hallucination, unit.buffs,
+    )  # fmt: skip
+
+
+@functools.lru_cache(4096)
+def _condition(
+    health: float, health_max: float, shield: float, shield_max: float, energy: float, energy_max: float, built: float,
+    cooldown_s: float | None, order: str | None, cloaked: bool, hallucination: bool, buffs: tuple[str, ...],
+) -> str:  # fmt: skip
+    """How a unit is: the same for every team that sees it, and for most units from one step to the next."""
+    fields = [f"health {_whole(health)}/{_whole(health_max)}"]
+    if shield_max:
+        fields.append(f"shield {_whole(shield)}/{_whole(shield_max)}")
+    if full := health_max + shield_max:
+        fields.append(f"total {_whole(100 * (health + shield) / full)}%")
+    if energy_max:
+        fields.append(f"energy {_whole(energy)}/{_whole(energy_max)}")
+    if built < 1:
+        fields.append(f"built {round(100 * built)}%")
+    if cooldown_s is not None:
+        fields.append(f"weapon in {_n(cooldown_s)} s" if cooldown_s else "weapon ready")
+    if order:
+        fields.append(f"order {order}")
+    fields += [word for word, is_so in (("cloaked", cloaked), ("hallucination", hallucination)) if is_so]
+    if buffs:
+        fields.append(f"effects {', '.join(buffs)}")
+    return "".join(f" | {field}" for field in fields)
 
 
 _VERBS = {
@@ -278,6 +288,14 @@ def _event_lines(events: Sequence[Event]) -> Iterator[str]:
         sign = {"hurt": " -", "healed": " +"}.get(members[0].what, "")
         names = ", ".join(event.tag + (f"{sign}{_whole(event.amount)}" if event.amount else "") for event in members)
         yield f"{alliance} {unit_type} {verb}: {names}"
+
+
+@functools.cache
+def _known(name: str) -> tuple[str, ...]:
+    """What is known of a type, the same on every page."""
+    kind = knowledge()[name]
+    weapons = (f"{INDENT * 2}{_weapon(weapon)}" for weapon in kind.weapons)
+    return (f"{INDENT}{name}: {kind.about}", f"{INDENT * 2}{_body(kind)}", *weapons)
 
 
 def _body(kind: UnitType) -> str:

@@ -21,10 +21,10 @@ def broker() -> MemoryBroker:
 
 
 @pytest.fixture
-def observe() -> Callable[..., dict[Seat, Observation]]:
-    def make(*seats: Seat, step: int = 0, within_s: float | None = None) -> dict[Seat, Observation]:
-        return {
-            seat: Observation(
+def observe() -> Callable[..., list[Observation]]:
+    def make(*seats: Seat, step: int = 0, within_s: float | None = None) -> list[Observation]:
+        return [
+            Observation(
                 run=RUN,
                 side=seat.side,
                 agent=seat.agent,
@@ -36,6 +36,6 @@ def observe() -> Callable[..., dict[Seat, Observation]]:
                 view=View(time_s=0.0),
             )
             for seat in seats
-        }
+        ]
 
     return make

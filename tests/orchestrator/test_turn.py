@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from protocol.bus.memory import MemoryBroker, MemoryBus
 
-    Observe = Callable[..., dict[Seat, Observation]]
+    Observe = Callable[..., list[Observation]]
 
 RUN = "test"
 ZEALOTS, STALKERS = Seat("p1", "Zealots"), Seat("p1", "Stalkers")
