@@ -2,7 +2,7 @@
 
 What is drawn where is decided here, from what a player perceives; how a disc becomes pixels and pixels become bytes
 is `raster.py`. Terrain that does not change is drawn once per camera position. Heights have the scale of
-`terrain_height`: z = -16 + 32 v / 255 (the API's own text and a recorded frame disagree on it, see docs).
+`terrain_height`: z = -16 + 32 v / 255. That is a choice: the API's own text and a recorded frame contradict each other.
 
 Above: `observation.py`.
 """

@@ -26,9 +26,18 @@ class Running:
         self.url = f"http://127.0.0.1:{sock.getsockname()[1]}"
         self.http = http
         self.task = asyncio.create_task(serve(sock, Session(".")))
+        self.clients: list[Ws] = []
 
     async def connect(self) -> Ws:
-        return await self.http.ws_connect(f"{self.url}/sc2api", max_msg_size=0)
+        self.clients.append(await self.http.ws_connect(f"{self.url}/sc2api", max_msg_size=0))
+        return self.clients[-1]
+
+    async def close(self) -> None:
+        for client in self.clients:
+            await client.close()
+        self.task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await self.task
 
 
 @pytest.fixture
@@ -36,9 +45,7 @@ async def running() -> AsyncIterator[Running]:
     async with aiohttp.ClientSession() as http:
         server = Running(listen("127.0.0.1", 0), http)
         yield server
-        server.task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await server.task
+        await server.close()
 
 
 async def ask(ws: Ws, request: sc.Request, *, text: bool = False) -> sc.Response:

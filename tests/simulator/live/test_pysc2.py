@@ -116,6 +116,7 @@ def test_clicks_on_units_command_them(make_env: MakeEnv) -> None:
     assert len(timestep.observation.multi_select) == 5
 
 
+@pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning")  # PySC2 names the file by it
 def test_a_replay_is_written_where_pysc2_wants_it(make_env: MakeEnv, tmp_path: Path) -> None:
     env = make_env(save_replay_episodes=1, replay_dir=str(tmp_path), game_steps_per_episode=40)
     timestep = env.reset()[0]
