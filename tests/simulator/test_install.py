@@ -1,6 +1,6 @@
 """The directory that clients take for StarCraft II."""
 
-import os
+import errno
 import re
 import stat
 import subprocess
@@ -92,8 +92,21 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
         install(tmp_path / "game")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_directory_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(InstallError, match=r"cannot be written; choose a directory of yours"):
+@pytest.mark.parametrize(
+    ("number", "sentence"),
+    [
+        (errno.EACCES, "cannot be written; choose a directory of yours or change its permissions"),
+        (errno.EROFS, "cannot be written; choose a directory of yours or change its permissions"),
+        (errno.ENOSPC, "No space left on device"),
+    ],
+)
+def test_a_directory_that_cannot_be_written_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, sentence: str
+) -> None:
+    def fail(path: Path, **_: object) -> None:
+        raise OSError(number, "", str(path))
+
+    monkeypatch.setattr(Path, "mkdir", fail)  # a real directory without permission would not stop root
+    with pytest.raises(InstallError, match=sentence) as caught:
         install(tmp_path / "game")
+    assert str(caught.value).startswith(str(tmp_path / "game"))
