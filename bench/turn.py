@@ -4,9 +4,9 @@ Host, agents (in two processes) and endpoint share this machine; observations ar
 sixth second, each agent with an observer and an actor of its own. Beside it, in the same run, stands the way of the
 first implementation: threads that poll (`bench.original`). The parts are those of the agent whose reply came last:
 
-    build     observers: views and texts of all agents          agent    prompt, parsing and sending, without HTTP
-    publish   until its observation was put                     http     the request beyond the endpoint's latency
+    before    until its observation was made and published       http     the request beyond the endpoint's latency
     bus       the way to it and back, with coding               merge    speech, recognition and translation of all
+    agent     prompt, parsing and sending, without HTTP         build    views and texts of all agents, within `before`
 
 Run `python -m bench.turn`; `--json` for one JSON object.
 """
@@ -23,7 +23,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -44,17 +44,20 @@ from protocol.bus.config import BusConfig
 from protocol.bus.zenoh import open_bus
 from protocol.codec import decode_as
 from protocol.keys import Topic, every_agent
+from protocol.keys import parse as parse_key
 from protocol.messages import Exchange, Observation, Run
 from protocol.speech import parse
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from bridge.snapshot import Snapshot
     from bridge.task import TaskConfig
     from orchestrator.turn import Answer, Answers
     from protocol.bus import Bus, Sample, Subscription
 
 GOALS_MS = {1: 10, 8: 20, 32: 45, 128: 150}
-PARTS = ("build", "publish", "bus", "agent", "http", "merge")
+PARTS = ("before", "bus", "agent", "http", "merge", "build")
 AGENT_PROCESSES = 2
 LATENCY_S = 1.0
 BATTLE_STEPS = 12
@@ -86,7 +89,7 @@ class Bench:
         self.seats = [Seat(task.side, f"Agent{number}") for number in range(agents)]
         self.observers = {seat: Observer(task) for seat in self.seats}
         self.actors = {seat: Actor(task) for seat in self.seats}
-        self.exchanges: dict[str, Exchange] = {}
+        self.exchanges: dict[str, bytes] = {}
         self.arrived = asyncio.Event()
 
     async def measure(self, steps: int, children: Children, options: list[str]) -> Measured:
@@ -115,21 +118,18 @@ class Bench:
 
     async def _step(self, turn: Turn, number: int, measured: Measured) -> None:
         began = time.perf_counter()
-        sights = {seat: observer.observe(self.snapshot) for seat, observer in self.observers.items()}
-        observations = {seat: self._observation(seat, number, sights[seat].agents) for seat in self.seats}
-        built = time.perf_counter()
-        answers = await turn.ask(observations)
+        answers = await turn.ask(self._observations(number, measured))
         asked = time.perf_counter()
         for seat, answer in answers.by_seat.items():
             assert answer.status == "ok", answer
-            self.actors[seat].joint(sights[seat], {self.task.agents[0].name: parse(answer.text or "")})
+            speech = parse(answer.text or "")
+            self.actors[seat].joint(self.observers[seat].sight, {self.task.agents[0].name: speech})
         ended = time.perf_counter()
         measured.step_s.append(ended - began)
-        measured.observation_bytes = len(next(iter(observations.values())).model_dump_json())
         await self._told()
-        for part, value in self._last(answers, asked - built).items():
+        for part, value in self._last(answers, asked - began).items():
             measured.parts_s[part].append(value)
-        measured.parts_s["build"].append(built - began)
+        measured.parts_s["build"].append(asked - began - answers.publish_s - answers.wait_s)
         measured.parts_s["merge"].append(ended - asked)
 
     def _last(self, answers: Answers, ask_s: float) -> dict[str, float]:
@@ -140,25 +140,27 @@ class Bench:
 
         seat, answer = max(answers.by_seat.items(), key=arrival)
         assert answer.reply is not None and answer.latency_s is not None
-        request = self.exchanges[seat.agent]
+        request = decode_as(Exchange, self.exchanges[seat.agent])
         return {
-            "publish": ask_s - answer.latency_s,
+            "before": ask_s - answer.latency_s,  # until its own observation was made and put
             "bus": answer.latency_s - answer.reply.latency_s,
             "agent": answer.reply.latency_s - request.latency_s,
             "http": request.latency_s - LATENCY_S,
         }
 
-    def _observation(self, seat: Seat, number: int, agents: Any) -> Observation:
-        (seen,) = agents.values()
-        return Observation(
-            run=self.run, agent=seat.agent, side=seat.side, episode=0, step=number, game_loop=8 * number,
-            answer_within_s=30, text=seen.text, view=seen.view,
-        )  # fmt: skip
+    def _observations(self, number: int, measured: Measured) -> Iterator[Observation]:
+        for seat, observer in self.observers.items():
+            (seen,) = observer.each(self.snapshot)
+            observation = Observation(
+                run=self.run, agent=seat.agent, side=seat.side, episode=0, step=number, game_loop=8 * number,
+                answer_within_s=30, text=seen.text, view=seen.view,
+            )  # fmt: skip
+            measured.observation_bytes = measured.observation_bytes or len(observation.model_dump_json())
+            yield observation
 
     async def _listen(self, log: Subscription[Sample]) -> None:
         async for sample in log:
-            exchange = decode_as(Exchange, sample.payload)
-            self.exchanges[exchange.agent] = exchange
+            self.exchanges[parse_key(sample.key).agent or ""] = sample.payload  # as a host does, which only records it
             self.arrived.set()
 
     async def _told(self) -> None:
@@ -212,9 +214,9 @@ async def measure(agents: list[int], steps: int, original_steps: int) -> list[Me
 
 def table(rows: list[dict[str, float]]) -> Table:
     """The figures, in milliseconds over the endpoint's latency."""
-    shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms")
+    shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms", box=None)
     for column in ("agents", "over", "goal", *PARTS, "original"):
-        shown.add_column(column, justify="right")
+        shown.add_column(column, justify="right", no_wrap=True)
     for row in rows:
         shown.add_row(*(f"{row[column]:.0f}" if column in {"agents", "goal"} else f"{row[column]:.1f}"
                         for column in ("agents", "over", "goal", *PARTS, "original")))  # fmt: skip
