@@ -146,6 +146,13 @@ class TaskConfig(Frozen):
     max_steps: int | None = Field(default=None, ge=1)
     """Decisions after which an episode ends without a result; None leaves it to the map."""
 
+    @field_validator("clock")
+    @classmethod
+    def _clock(cls, clock: Clock) -> Clock:
+        if clock.rule != "frozen":
+            raise ValueError(f"the clock rule '{clock.rule}' is not there yet, only 'frozen' is")
+        return clock
+
     @field_validator("agents")
     @classmethod
     def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:

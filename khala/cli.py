@@ -71,7 +71,9 @@ RunName = Annotated[
 MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
 StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
 MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after so many steps.")]
-ExecutorName = Annotated[str | None, typer.Option(help="raw or screen; see docs/design/turn.md.", metavar="EXECUTOR")]
+ExecutorName = Annotated[
+    str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
+]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
 Out = Annotated[Path, typer.Option(help="Directory that gets a directory for the run.", metavar="DIR")]
 

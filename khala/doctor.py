@@ -114,7 +114,10 @@ def _keys() -> Iterator[Finding]:
         yield Finding("model keys", "ok", ", ".join(given) + " set")
     else:
         yield Finding(
-            "model keys", "note", "none set", "the scripted model and local servers need none; see docs/models.md"
+            "model keys",
+            "note",
+            "none set",
+            "the scripted model and local servers need none; see docs/how-to/your-model.md",
         )
 
 

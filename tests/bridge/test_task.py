@@ -71,6 +71,12 @@ def test_a_task_may_change_who_the_opponent_is() -> None:
         ("control_group: 1", "control_group: 12", 8, "less than or equal to 9"),
         ("control_group: 1}", "control_group: 1}\n      - {name: A, unit_types: [Stalker]}", 5, "two of team A"),
         ("task: Win.\n", "", 1, "is required and not given"),
+        (
+            "task: Win.",
+            "clock: {rule: budget}\ntask: Win.",
+            3,
+            "the clock rule 'budget' is not there yet, only 'frozen'",
+        ),
         ("role: You lead.", "rolle: You lead.", 5, "is required and not given (and 1 more)"),
     ],
 )
