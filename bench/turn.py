@@ -1,7 +1,7 @@
 """What a turn costs besides the model: wall time of a step for 1 to 128 agents at an endpoint of fixed latency.
 
 Host, agents (in two processes) and endpoint share this machine; observations are those of a real battle, 2s3z in its
-sixth second, each agent with an observer and an actor of its own. Beside it, in the same run, stands the way of the
+sixth second, and every agent has all of the units. Beside it, in the same run, stands the way of the
 first implementation: threads that poll (`bench.original`). The parts are those of the agent whose reply came last:
 
     before    until its observation was made and published       http     the request beyond the endpoint's latency
@@ -21,7 +21,7 @@ import statistics
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,13 +31,15 @@ from rich.table import Table
 from bench.original import step_s
 from bridge.act import Actor
 from bridge.observe import Observer
+from bridge.observe.teams import Roster, Team
 from khala import games
 from khala.children import Children
 from khala.local import one_side, shares
 from orchestrator.announce import Announcer
 from orchestrator.brief import briefing
 from orchestrator.config import MatchConfig, load_task
-from orchestrator.roster import Roster, Seat
+from orchestrator.roster import Roster as Attendance
+from orchestrator.roster import Seat
 from orchestrator.turn import Turn
 from protocol.bus import Delivery
 from protocol.bus.config import BusConfig
@@ -49,10 +51,10 @@ from protocol.messages import Exchange, Observation, Run
 from protocol.speech import parse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from bridge.snapshot import Snapshot
-    from bridge.task import TaskConfig
+    from bridge.task import AgentConfig, TaskConfig
     from orchestrator.turn import Answer, Answers
     from protocol.bus import Bus, Sample, Subscription
 
@@ -85,10 +87,10 @@ class Bench:
     """Host's side of a turn, with the real parts around a snapshot that stays."""
 
     def __init__(self, bus: Bus, run: str, task: TaskConfig, snapshot: Snapshot, agents: int) -> None:
-        self.bus, self.run, self.task, self.snapshot = bus, run, task, snapshot
-        self.seats = [Seat(task.side, f"Agent{number}") for number in range(agents)]
-        self.observers = {seat: Observer(task) for seat in self.seats}
-        self.actors = {seat: Actor(task) for seat in self.seats}
+        self.bus, self.run, self.snapshot = bus, run, snapshot
+        self.task = crowd(task, agents)
+        self.seats = [Seat(task.side, agent.name) for agent in self.task.agents]
+        self.observer, self.actor = Observer(self.task, Everybodys), Actor(self.task)
         self.exchanges: dict[str, bytes] = {}
         self.arrived = asyncio.Event()
 
@@ -100,14 +102,13 @@ class Bench:
         measured = Measured(len(names))
         async with (
             Announcer(self.bus, self.run, self.seats) as announcer,
-            Roster(self.bus, self.run, self.seats) as roster,
+            Attendance(self.bus, self.run, self.seats) as roster,
             Turn(self.bus, self.run, roster) as turn,
         ):
             log = await self.bus.subscribe(every_agent(self.run, Topic.EXCHANGE), Delivery.LOG, depth=4096)
             listening = asyncio.create_task(self._listen(log))
             await announcer.run(_card(self.run, self.task))
-            for seat in self.seats:
-                agent = self.task.agents[0].model_copy(update={"name": seat.agent})
+            for agent in self.task.agents:
                 await announcer.brief(briefing(self.task, agent, self.run, 0))
             await roster.assemble(self.seats, 120)
             for number in range(steps + 1):
@@ -120,10 +121,9 @@ class Bench:
         began = time.perf_counter()
         answers = await turn.ask(self._observations(number, measured))
         asked = time.perf_counter()
-        for seat, answer in answers.by_seat.items():
-            assert answer.status == "ok", answer
-            speech = parse(answer.text or "")
-            self.actors[seat].joint(self.observers[seat].sight, {self.task.agents[0].name: speech})
+        assert {answer.status for answer in answers.by_seat.values()} == {"ok"}
+        speeches = {seat.agent: parse(answer.text or "") for seat, answer in answers.by_seat.items()}
+        self.actor.joint(self.observer.sight, speeches)
         ended = time.perf_counter()
         measured.step_s.append(ended - began)
         await self._told()
@@ -149,11 +149,10 @@ class Bench:
         }
 
     def _observations(self, number: int, measured: Measured) -> Iterator[Observation]:
-        for seat, observer in self.observers.items():
-            (seen,) = observer.each(self.snapshot)
+        for seen in self.observer.each(self.snapshot):
             observation = Observation(
-                run=self.run, agent=seat.agent, side=seat.side, episode=0, step=number, game_loop=8 * number,
-                answer_within_s=30, text=seen.text, view=seen.view,
+                run=self.run, agent=seen.agent.name, side=self.task.side, episode=0, step=number,
+                game_loop=8 * number, answer_within_s=30, text=seen.text, view=seen.view,
             )  # fmt: skip
             measured.observation_bytes = measured.observation_bytes or len(observation.model_dump_json())
             yield observation
@@ -169,6 +168,27 @@ class Bench:
             self.arrived.clear()
             async with asyncio.timeout(10):
                 await self.arrived.wait()
+
+
+class Everybodys(Roster):
+    """Gives the first agent's units to every agent: as many agents as one likes, each with a whole battle to see."""
+
+    def __init__(self, agents: Sequence[AgentConfig]) -> None:
+        super().__init__(agents[:1])
+        self._first = agents[0].name
+
+    def teams(self, agent: str) -> tuple[Team, ...]:
+        return tuple(replace(team, agent=agent) for team in super().teams(self._first))
+
+    def idle_teams(self, agent: str) -> tuple[str, ...]:  # noqa: ARG002  # all have the same
+        return super().idle_teams(self._first)
+
+
+def crowd(task: TaskConfig, agents: int) -> TaskConfig:
+    """The task with copies of its agent."""
+    (first,) = task.agents
+    copies = (first.model_copy(update={"name": f"Agent{number}"}) for number in range(agents))
+    return task.model_copy(update={"agents": tuple(copies), "communication": False})
 
 
 def _card(run: str, task: TaskConfig) -> Run:

@@ -10,7 +10,7 @@ Lengths are counted in game loops (22.4 a second at the speed called "faster") w
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -49,6 +49,18 @@ class Frozen(BaseModel):
     """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON has not) are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+    def but(self, **changes: object) -> Self:
+        """A copy with some fields replaced, unchecked.
+
+        For inner loops only: it takes 1 µs where `model_copy` takes 6, and a joint step of 128 agents makes 3500.
+        """
+        copy = object.__new__(type(self))
+        object.__setattr__(copy, "__dict__", self.__dict__ | changes)
+        object.__setattr__(copy, "__pydantic_fields_set__", self.__pydantic_fields_set__)
+        object.__setattr__(copy, "__pydantic_extra__", None)
+        object.__setattr__(copy, "__pydantic_private__", None)
+        return copy
 
 
 class Wire(Frozen):

@@ -17,23 +17,25 @@ from bridge.observe.teams import Roster
 from bridge.observe.text import Feedback, render
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from bridge.observe.sight import AgentSight, Sight
     from bridge.snapshot import Snapshot
-    from bridge.task import TaskConfig
+    from bridge.task import AgentConfig, TaskConfig
 
 
 class Observer:
     """The eyes of one side."""
 
-    def __init__(self, task: TaskConfig) -> None:
+    def __init__(self, task: TaskConfig, roster: Callable[[Sequence[AgentConfig]], Roster] = Roster) -> None:
+        """Takes a task, and whoever says which unit answers to which of its agents."""
         self._task = task
+        self._new_roster = roster
         self.begin()
 
     def begin(self) -> None:
         """Forgets the episode before."""
-        self._roster = Roster(self._task.agents)
+        self._roster = self._new_roster(self._task.agents)
         self._before: Sight | None = None
 
     def observe(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> Sight:

@@ -145,7 +145,7 @@ class Scene:
             actions=self._actions(agent, [body.name for body in members]),
             bounds=_edges(camera.bounds(self._world)),
         )
-        return TeamSight(team, camera, view.model_copy(update={"events": events(before, view, self._dead)}))
+        return TeamSight(team, camera, view.but(events=events(before, view, self._dead)))
 
     def _seen_by(self, camera: Camera) -> list[_Body]:
         """The units on a camera's screen, in the order of their tags."""
@@ -160,13 +160,9 @@ class Scene:
         return tuple(action.spec for action in valid.values())
 
     def _unit(self, body: _Body, camera: Camera, alliance: Alliance, mean: WorldPoint | None = None) -> UnitView:
-        seen: dict[str, object] = {
-            "alliance": alliance,
-            "screen": _rounded(camera.screen(body.x, body.y), self._screen_size),
-        }
-        if mean is not None:
-            seen["distance"] = round(math.hypot(body.x - mean.x, body.y - mean.y), 1)
-        return body.view.model_copy(update=seen)
+        screen = _rounded(camera.screen(body.x, body.y), self._screen_size)
+        distance = None if mean is None else round(math.hypot(body.x - mean.x, body.y - mean.y), 1)
+        return body.view.but(alliance=alliance, screen=screen, distance=distance)
 
     def _body(self, unit: raw_pb2.Unit) -> _Body:
         x, y, name = unit.pos.x, unit.pos.y, unit_name(unit.unit_type)
