@@ -260,9 +260,9 @@ def _until_interrupted(
     with show.Progress(screen, config.task.max_steps) as progress:
         results = asyncio.run(_cancelled_by_signals(play(progress)))
     if results is None:
-        screen.print(f"interrupted; what was played is in {config.record}")
+        screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)
         raise typer.Exit(INTERRUPTED)
-    screen.print(f"recorded in {config.record}; `khala replay {config.record}` tells it")
+    screen.print(f"recorded: `khala replay {config.record}` tells it", soft_wrap=True)
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))

@@ -81,8 +81,9 @@ class Progress:
 
     def _picture(self, report: Report) -> Panel:
         rows = Table(box=None, expand=True, pad_edge=False)
-        for name in ("agent", "status", "latency", "accepted", "rejected", "tokens", "last action"):
-            rows.add_column(name, style="dim" if name == "last action" else "", no_wrap=True)
+        for name in ("agent", "status", "latency", "accepted", "rejected", "tokens"):
+            rows.add_column(name, no_wrap=True)
+        rows.add_column("last action", style="dim", no_wrap=True, overflow="ellipsis", ratio=1)
         for agent in report.agents:
             rows.add_row(*self._row(agent))
         steps = f" of {self._max_steps}" if self._max_steps else ""
