@@ -17,6 +17,7 @@ import typer
 
 from agents.build import Workshop
 from agents.config import AgentsFile, WorkerSpec, load_agents
+from agents.policy import Checked
 from agents.scripted.endpoint import Behaviour, Endpoint
 from agents.scripted.faults import Faults, parse_faults
 from agents.scripted.players import PLAYERS
@@ -27,7 +28,7 @@ from protocol.errors import ConfigError
 from protocol.keys import check_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping, Sequence
+    from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from agents.policy import Policy
@@ -109,6 +110,7 @@ def _settle_memory() -> None:
 async def _play(
     config: BusConfig, run: str, side: str, policies: dict[str, Policy], default_reply: str, stop: asyncio.Event
 ) -> dict[str, Tally]:
+    await _check(policies.values())
     bus = await open_bus(config)
     try:
         _say(
@@ -118,6 +120,14 @@ async def _play(
         return await run_workers(bus, run, side, policies, default_reply=default_reply, stop=stop)
     finally:
         await bus.close()
+
+
+async def _check(policies: Iterable[Policy]) -> None:
+    """Lets policies that can find out what is wrong with them do so, before anybody counts on them."""
+    async with asyncio.TaskGroup() as group:
+        for policy in policies:
+            if isinstance(policy, Checked):
+                group.create_task(policy.check())
 
 
 def _sentence(name: str, tally: Tally) -> str:

@@ -62,6 +62,10 @@ class LLMPolicy:
         self._rng = rng or random.Random()
         self._prompt: tuple[Briefing, Prompt] | None = None
 
+    async def check(self) -> None:
+        """Makes sure that the endpoint takes the key."""
+        await self.client.check()
+
     async def prepare(self, briefing: Briefing) -> None:
         """Begins an episode: builds the prompt, forgets the last one, opens a fresh connection."""
         self._prompt_for(briefing)

@@ -62,6 +62,15 @@ class Policy(Protocol):
 
 
 @runtime_checkable
+class Checked(Protocol):
+    """A policy that can find out what is wrong with it before it joins a run."""
+
+    async def check(self) -> None:
+        """Raises a `KhalaError` for what the user has to mend."""
+        ...
+
+
+@runtime_checkable
 class Prepared(Protocol):
     """A policy that wants to know of a briefing before the first observation; also at each new episode."""
 

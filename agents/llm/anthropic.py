@@ -70,6 +70,10 @@ class Anthropic:
         answer = await self._http.post("/messages", to_json(body), request.timeout_s)
         return self._read(answer)
 
+    async def check(self) -> None:
+        """Asks whether the key is taken; see `LLMClient.check`."""
+        await self._http.check()
+
     async def refresh(self) -> None:
         """Drops old connections and makes a new one."""
         await self._http.refresh()

@@ -93,6 +93,14 @@ class LLMClient(Protocol):
         """
         ...
 
+    async def check(self) -> None:
+        """Finds out, without cost, what can be known to be wrong before the first request.
+
+        Raises:
+            Unauthorized: the endpoint refuses the key.
+        """
+        ...
+
     async def refresh(self) -> None:
         """Drops old connections and makes a new one, between episodes. Raises nothing."""
         ...

@@ -100,9 +100,23 @@ class HttpEndpoint:
     async def refresh(self) -> None:
         """Throws the connections away and opens a new one, so that the first request of an episode finds it warm."""
         await self.close()
+        with suppress(LLMError):
+            await self.check()
+
+    async def check(self) -> None:
+        """Asks for the list of models, which costs nothing, to see whether the key is taken.
+
+        Only a key that is refused is an error: an endpoint may come up later, or know no such list. (403 is none:
+        keys may be restricted to completions.)
+
+        Raises:
+            Unauthorized: the endpoint refuses the key.
+        """
         with suppress(httpx.HTTPError, TimeoutError):
             async with asyncio.timeout(_WARM_TIMEOUT_S):
-                await self._connected().get(self.address + "/models")
+                response = await self._connected().get(self.address + "/models")
+            if response.status_code == httpx.codes.UNAUTHORIZED:
+                raise error_for(self.address, response.status_code, response.headers, response.content)
 
     async def close(self) -> None:
         """Closes the connections; the next request opens new ones."""

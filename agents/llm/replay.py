@@ -62,6 +62,9 @@ class ReplayClient:
         was_repeated = (agent, episode, step, attempt + 1) in self._recorded
         raise _passing(exchange) if was_repeated else _Final.of(exchange)
 
+    async def check(self) -> None:
+        """Finds nothing wrong."""
+
     async def refresh(self) -> None:
         """Does nothing."""
 

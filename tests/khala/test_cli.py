@@ -8,7 +8,9 @@ import signal
 import socket
 import subprocess
 import sys
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -116,6 +118,31 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -
     assert replayed.returncode == 0
     assert "step 2" in replayed.stdout
     assert "step 3" not in replayed.stdout
+
+
+class Refusing(BaseHTTPRequestHandler):
+    """A model endpoint that takes no key."""
+
+    def do_GET(self) -> None:
+        self.send_response(401)
+        self.end_headers()
+        self.wfile.write(b'{"error": {"message": "Incorrect API key provided", "code": "invalid_api_key"}}')
+
+    def log_message(self, *_: object) -> None:
+        """Keeps quiet."""
+
+
+@pytest.mark.game
+def test_a_key_that_the_endpoint_refuses_ends_the_match_before_it_begins(tmp_path: Path) -> None:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Refusing) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        base_url = f"http://127.0.0.1:{server.server_port}/v1"
+        done = khala("run", "2s3z", "--model", "openai", "--base-url", base_url, cwd=tmp_path, OPENAI_API_KEY=KEY)
+        server.shutdown()
+    assert done.returncode == 1
+    assert "answered http 401: Incorrect API key provided; is the key right" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert KEY not in done.stderr
 
 
 POLICY = """
