@@ -63,8 +63,11 @@ class LLMPolicy:
         self._prompt: tuple[Briefing, Prompt] | None = None
 
     async def check(self) -> None:
-        """Makes sure that the endpoint takes the key."""
-        await self.client.check()
+        """Makes sure that the endpoint takes the key; leaves no connection open, since nobody may come to close it."""
+        try:
+            await self.client.check()
+        finally:
+            await self.client.close()
 
     async def prepare(self, briefing: Briefing) -> None:
         """Begins an episode: builds the prompt, forgets the last one, opens a fresh connection."""
