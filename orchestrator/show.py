@@ -124,7 +124,8 @@ def table(result: Result) -> Panel:
         f"{kd}  (killed {_losses(result.killed.units, result.killed.value)}, "
         f"lost {_losses(result.lost.units, result.lost.value)})",
     )
-    rows.add_row("steps", f"{result.steps}, {clock(result.game_loop)} of game in {result.wall_s:.1f} s")
+    took = f"{clock(result.game_loop)} of game in {result.wall_s:.1f} s, {result.env_steps} calls of SC2Env.step"
+    rows.add_row("steps", f"{result.steps}, {took}")
     if result.latency_p50_s is not None and result.latency_p95_s is not None:
         milliseconds = f"median {result.latency_p50_s * 1000:.0f} ms, 95 % below {result.latency_p95_s * 1000:.0f} ms"
         rows.add_row("latency", milliseconds)

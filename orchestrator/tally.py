@@ -30,12 +30,13 @@ class Tally:
         self._rejections: Counter[str] = Counter()
         self._latencies_s: list[float] = []
         self._accepted = 0
-        self._steps = 0
+        self._steps = self._env_steps = 0
         self._note(snapshot)
 
     def add(self, report: Report, after: Snapshot) -> None:
         """Counts one step, and what the game looked like after it."""
         self._steps += 1
+        self._env_steps += report.env_steps
         for agent in report.agents:
             name = agent.agent
             self._usage[name] += agent.usage
@@ -64,6 +65,7 @@ class Tally:
             outcome=outcome,
             cause=cause,
             steps=self._steps,
+            env_steps=self._env_steps,
             game_loop=self._last.game_loop,
             game_s=self._last.game_loop / LOOPS_PER_S,
             wall_s=wall_s,

@@ -475,6 +475,9 @@ class Result(Wire):
     cause: str
     """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`."""
     steps: int
+    """Decisions of the agents."""
+    env_steps: int = 0
+    """Calls of `SC2Env.step` that they took: one each with the raw executor, many with the screen executor."""
     game_loop: int
     game_s: float
     wall_s: float

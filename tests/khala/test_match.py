@@ -93,6 +93,7 @@ async def test_both_agents_play_and_their_calls_are_executed_in_one_step(game: O
     assert result.statuses == {"Stalkers": {"ok": 10}, "Zealots": {"ok": 10}}
     assert result.accepted == sum(len(a.accepted) for report in table.reports for a in report.agents) > 10
     assert {report.env_steps for report in table.reports} == {1}
+    assert result.env_steps == result.steps
     assert max(len(report.functions) for report in table.reports) == 3
 
 

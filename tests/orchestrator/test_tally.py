@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc_pb
+
+from bridge.snapshot import Snapshot
+from orchestrator.tally import Tally
+from protocol.messages import AgentReport, Rejection, Report, Usage
+
+if TYPE_CHECKING:
+    from protocol.messages import AgentStatus, Outcome, Result
+
+
+def snapshot(
+    own: set[int], enemy: set[int], *, dead: set[int] | None = None, killed: float = 0, lost: float = 0, loop: int = 0,
+    outcome: Outcome | None = None,
+) -> Snapshot:  # fmt: skip
+    response = sc_pb.ResponseObservation()
+    response.observation.game_loop = loop
+    for tags, alliance in ((own, raw_pb2.Self), (enemy, raw_pb2.Enemy)):
+        for tag in sorted(tags):
+            response.observation.raw_data.units.add(tag=tag, alliance=alliance, display_type=raw_pb2.Visible)
+    details = response.observation.score.score_details
+    details.killed_minerals.army, details.lost_minerals.army = killed * 0.75, lost * 0.75
+    details.killed_vespene.army, details.lost_vespene.army = killed * 0.25, lost * 0.25
+    return Snapshot(response, sc_pb.ResponseGameInfo(), dead=frozenset(dead or ()), outcome=outcome)
+
+
+def report(step: int, status: AgentStatus = "ok", latency_s: float | None = 1.0, rejected: int = 0) -> Report:
+    fault = Rejection(reason="unknown_target", message="No.", text="<A(0x1)>", start=0)
+    agent = AgentReport(
+        agent="A", side="blue", status=status, latency_s=latency_s, accepted=("A <Stop()>",),
+        rejections=(fault,) * rejected, usage=Usage(requests=1, prompt_tokens=100, completion_tokens=10, cost_usd=0.5),
+    )  # fmt: skip
+    return Report(run="r", episode=0, step=step, game_loop=8 * step, agents=(agent,), env_steps=3)
+
+
+def result(*afters: Snapshot, reports: list[Report] | None = None) -> Result:
+    tally = Tally(snapshot({1, 2, 3}, {11, 12}, killed=50, lost=25))
+    for step, after in enumerate(afters):
+        tally.add(reports[step] if reports else report(step), after)
+    return tally.result("r", 0, wall_s=2.0)
+
+
+def test_deaths_are_counted_by_side_and_values_since_the_beginning() -> None:
+    found = result(
+        snapshot({1, 3}, {11, 12}, dead={2}, killed=50, lost=125),
+        snapshot({1, 3}, set(), dead={11, 12, 99}, killed=350, lost=125, loop=160, outcome="win"),
+    )
+    assert (found.lost.units, found.lost.value, found.killed.units, found.killed.value) == (1, 100, 2, 300)
+    assert (found.outcome, found.cause, found.kd) == ("win", "enemy defeated", 3.0)
+
+
+def test_units_that_came_later_are_counted_too() -> None:
+    found = result(snapshot({1, 2, 3, 4}, {11}), snapshot({1, 2, 3}, {11}, dead={4}))
+    assert found.lost.units == 1
+
+
+def test_nothing_lost_has_no_ratio() -> None:
+    assert result(snapshot({1, 2, 3}, set(), dead={11, 12}, killed=250, lost=25, outcome="win")).kd is None
+
+
+@pytest.mark.parametrize(
+    ("outcome", "told", "cause"),
+    [("win", "win", "enemy defeated"), ("loss", "loss", "defeated"), ("draw", "draw", "time limit"),
+     (None, "draw", "step limit")],
+)  # fmt: skip
+def test_the_cause_goes_with_the_outcome(outcome: Outcome | None, told: str, cause: str) -> None:
+    found = result(snapshot({1}, {11}, outcome=outcome))
+    assert (found.outcome, found.cause) == (told, cause)
+
+
+def test_steps_usage_statuses_and_rejections_are_added_up() -> None:
+    now = snapshot({1}, {11}, loop=224)
+    reports = [report(0, rejected=2), report(1, "late", None), report(2, latency_s=3.0)]
+    found = result(now, now, now, reports=reports)
+    assert (found.steps, found.env_steps, found.accepted) == (3, 9, 3)
+    assert found.statuses == {"A": {"ok": 2, "late": 1}}
+    assert found.rejections == {"unknown_target": 2}
+    assert found.usage["A"] == Usage(requests=3, prompt_tokens=300, completion_tokens=30, cost_usd=1.5)
+    assert (found.latency_p50_s, found.latency_p95_s) == (2.0, 3.0)
+    assert (found.game_loop, found.game_s) == (224, 10.0)
