@@ -3,6 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 PYTHON ?= $(firstword $(foreach p,python3.13 python3.12 python3.11 python3 python,$(shell $(p) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(p))))
+PYTHONS ?= 3.11 3.12 3.13
 # uv from PATH when it is there, else one of our own in .uv
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
@@ -41,11 +42,13 @@ format: install ## Format the code and mend what the linter can
 	$(RUN)ruff format .
 	$(RUN)ruff check --fix .
 
-test-all: .uv/bin/uv ## The tests on every Python that is installed: 3.11, 3.12, 3.13
-	@for v in 3.11 3.12 3.13; do \
-	  p=$$($(UV) python find --no-python-downloads $$v 2>/dev/null) || { echo "no Python $$v here"; continue; }; \
-	  echo "== Python $$v"; \
-	  UV_PROJECT_ENVIRONMENT=.venv-$$v $(UV) sync --quiet --frozen --python $$p && .venv-$$v/bin/pytest -q || exit 1; \
+test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all PYTHONS="3.12 /opt/python3.13/bin/python"
+	@for wanted in $(PYTHONS); do \
+	  python=$$($(UV) python find --no-python-downloads $$wanted 2>/dev/null) || { echo "== no Python $$wanted here"; continue; }; \
+	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
+	  echo "== Python $$version"; \
+	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
+	  $(UV) sync --quiet --frozen --python $$python && .venv-$$version/bin/pytest -q || exit 1; \
 	done
 
 bench: install ## Measure what the README claims
