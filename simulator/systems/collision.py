@@ -120,15 +120,16 @@ def _contacts(world: World, slots: Ints, at: Floats) -> _Pairs | None:
     squared += dy
     if not some(squared < touching):
         return None
-    one, other = np.nonzero(squared < near)
-    if squared[one, other].min() < SAME_POINT:
-        _stir(at, one, other, squared)
-    return _Pairs(one, other, apart[one, other], _shares(world, slots.take(one), slots.take(other)))
+    flat = which((squared < near).ravel())  # one index into a table costs a third of two
+    one, other = np.divmod(flat, len(slots))
+    same = squared.take(flat) < SAME_POINT
+    if some(same):
+        _stir(at, one[same])
+    return _Pairs(one, other, apart.take(flat), _shares(world, slots, one, other))
 
 
-def _stir(at: Floats, one: Ints, other: Ints, squared: Floats) -> None:
+def _stir(at: Floats, same: Ints) -> None:
     """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
-    same = one[squared[one, other] < SAME_POINT]
     at[same] += EIGHT_DIRECTIONS[same % 8] * (1.0 + same[:, None]) * SAME_POINT * STIR
 
 
@@ -148,40 +149,56 @@ def pair_table(world: World) -> tuple[Floats, Floats, Floats]:
     return touching, np.where(meets, (apart + CONTACT_SKIN) ** 2, -1.0), apart
 
 
-def _shares(world: World, one: Ints, other: Ints) -> Floats:
+def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
     """How much of an overlap the first of each pair gives way; what is left is the other one's."""
-    friends = world.owner.take(one) == world.owner.take(other)
-    yielding, yielding_to_friend = _yielding(world)
-    mine = np.where(friends, yielding_to_friend.take(one), yielding.take(one))
-    theirs = np.where(friends, yielding_to_friend.take(other), yielding.take(other))
+    yielding, yielding_to_friend = _yielding(world, slots)
+    mine, theirs = yielding.take(one), yielding.take(other)
+    if yielding_to_friend is not None:
+        owner = world.owner.take(slots)
+        friends = owner.take(one) == owner.take(other)
+        mine = np.where(friends, yielding_to_friend.take(one), mine)
+        theirs = np.where(friends, yielding_to_friend.take(other), theirs)
     share: Floats = mine / (mine + theirs)
     return share
 
 
-def _yielding(world: World) -> tuple[Floats, Floats]:
-    """(top,) how easily each unit is pushed by an enemy, and by a friend."""
-    n = world.top
-    firm = np.where(world.wants[:n], 1.0, MECHANICS.push_firm)
-    firm[world.step_max[:n] <= 0.0] = IMMOBILE_YIELDING
-    idle = (world.target[:n] == NOBODY) & ~world.holds[:n] & (firm == MECHANICS.push_firm)
+def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
+    """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
+    firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
+    immobile = world.step_max.take(slots) <= 0.0
+    if some(immobile):
+        firm[immobile] = IMMOBILE_YIELDING
+    idle = world.target.take(slots) == NOBODY
+    if not some(idle):
+        return firm, None
+    idle &= ~world.holds.take(slots)
+    idle &= firm == MECHANICS.push_firm
     return firm, np.where(idle, MECHANICS.push_idle, firm)
 
 
 def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:
     layers = world.layer.take(slots)
-    moved = (before[:, 0] != after[:, 0]) | (before[:, 1] != after[:, 1])
     for layer in LAYERS:
-        mine = which(moved & (layers == layer))
+        mine = which(layers == layer)
         if not mine.size:
             continue
         if layer is AIR:
             x0, y0, x1, y1 = world.map.terrain.playable
+            mine = _moved(mine, before, after)
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
         surface = world.ground.surface(layer)
-        near = mine[~surface.open.take(surface.cell(after.take(mine, 0)))]
-        if near.size:
-            after[near] = _off_walls(surface, before[near], after[near], world.clearance[slots[near]])
+        free = surface.open.take(surface.cell(after.take(mine, 0)))
+        if np.count_nonzero(free) < len(free):
+            near = _moved(mine[~free], before, after)
+            if near.size:
+                after[near] = _off_walls(surface, before[near], after[near], world.clearance[slots[near]])
+
+
+def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
+    """Those that are not where they were; only they are put right."""
+    changed = before.take(bodies, 0) != after.take(bodies, 0)
+    return bodies[changed[:, 0] | changed[:, 1]]
 
 
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
