@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from aiohttp import WSMsgType, web
 
+from simulator.orphan import orphaned
 from simulator.session import Session
 from simulator.status import Status
 
@@ -47,6 +48,10 @@ class Server:
             await self._answer(client)
         return client
 
+    def has_client(self) -> bool:
+        """Whether a client is connected now."""
+        return self._transport is not None and not self._transport.is_closing()
+
     async def _answer(self, client: web.WebSocketResponse) -> None:
         async for frame in client:
             if frame.type not in _REQUESTS:
@@ -70,14 +75,17 @@ def run(sock: socket.socket, arguments: Arguments) -> None:
 
 
 async def serve(sock: socket.socket, session: Session) -> None:
-    """Serves the session on a listening socket until a client says quit."""
+    """Serves the session on a listening socket until a client says quit, or nobody is left who could."""
     server = Server(session)
     app = web.Application()
     app.router.add_get(ENDPOINT, server.connect)
     runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
+    ends = [asyncio.create_task(server.done.wait()), asyncio.create_task(orphaned(server.has_client))]
     try:
         await web.SockSite(runner, sock).start()
-        await server.done.wait()
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
     finally:
+        for end in ends:
+            end.cancel()
         await runner.cleanup()
