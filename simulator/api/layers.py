@@ -116,7 +116,7 @@ class FeatureLayers:
             return columns, lines
 
         x, y = minimap.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1])
-        known = np.flatnonzero(frame.sight.display != Display.HIDDEN)
+        known = np.flatnonzero(frame.sight.display != Display.HIDDEN.value)
         radius = frame.sight.radius[known] / minimap.scale
         discs = draw_discs(np.stack([x[known], y[known]], axis=1), radius, minimap.columns, minimap.rows)
         parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, known])
@@ -191,7 +191,7 @@ def unit_values(sight: Sight, selected: Bools) -> Ints:
     values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
     values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
     values[10] = sight.hallucination
-    values[11] = (sight.cloak != Cloak.NOT_CLOAKED) & (sight.cloak != Cloak.UNKNOWN)
+    values[11] = (sight.cloak != Cloak.NOT_CLOAKED.value) & (sight.cloak != Cloak.UNKNOWN.value)
     values[12] = sight.active
     values[13] = (sight.build_progress < 1) * sight.build_progress * 255
     return values

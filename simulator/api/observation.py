@@ -85,7 +85,7 @@ def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
     world = seat.world
     if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
         return np.zeros(0, np.intp)
-    own = sight.alliance == Alliance.SELF
+    own = sight.alliance == Alliance.SELF.value
     rows = np.flatnonzero(own & (world.damaged_loop[sight.slot] > seat.observed_loop))
     if rows.size:
         seat.alarm_loop = world.loop

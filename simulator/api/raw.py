@@ -73,7 +73,7 @@ class Units:
         s, types, row = self.sight, self.types, self.sight.row
         tables = np.stack([types.levels(tuple(player.upgrades)) for player in self.world.players])
         attack, armor, shield = tables[self.world.owner[s.slot], :, row].T
-        fixed = types.structure[row] | (s.alliance == Alliance.NEUTRAL)
+        fixed = types.structure[row] | (s.alliance == Alliance.NEUTRAL.value)
         minerals, vespene = types.resource[row] * types.minerals_in[row], types.resource[row] * types.vespene_in[row]
         return _rows(attack, armor, shield, ~fixed | types.armed[row], fixed, minerals, vespene)
 
@@ -100,7 +100,7 @@ class Units:
 
     def _orders(self) -> dict[int, list[tuple[Order, float]]]:
         """The orders of own units by slot, each with the ground height at its point."""
-        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF].tolist()
+        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
         orders = {slot: self.world.orders_of(slot) for slot in own}
         points = [order.point or (0.0, 0.0) for some in orders.values() for order in some]
         heights = iter(self.world.map.terrain.ground_z(np.array(points)).tolist() if points else ())

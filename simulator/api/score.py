@@ -38,7 +38,7 @@ class Holdings:
         names, columns = _columns(types)
         totals = np.bincount(rows, minlength=len(columns)) @ columns
         self.totals: dict[str, float] = dict(zip(names, totals.tolist(), strict=True))
-        idle = (world.order_kind[slots] == OrderKind.IDLE) & types.worker[rows]
+        idle = (world.order_kind[slots] == OrderKind.IDLE.value) & types.worker[rows]
         self.idle_workers = int(idle.sum())
 
     def common(self) -> sc2api_pb2.PlayerCommon:

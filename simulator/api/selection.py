@@ -51,7 +51,8 @@ class Selection:
         """Which rows of a sight are selected."""
         if not self.tags:
             return np.zeros(len(sight), np.bool_)
-        return np.isin(sight.tag, self.tags)
+        tags = frozenset(self.tags)  # np.isin takes 45 us for ten units
+        return np.array([tag in tags for tag in sight.tag.tolist()], np.bool_)
 
     def choose(self, tags: Iterable[int], *, add: bool = False) -> None:
         """Selects units, or adds them."""

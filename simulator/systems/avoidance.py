@@ -109,7 +109,7 @@ def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
     free = np.ones(points.shape[:2], dtype=np.bool_)
     layers = world.layer.take(slots)
     for layer in LAYERS:
-        mine = layers == layer
+        mine = layers == layer.value
         if layer is not AIR and some(mine):
             surface = world.ground.surface(layer)
             free[mine] = surface.flat[surface.cell(points[mine])]

@@ -179,7 +179,7 @@ def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
 def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:
     layers = world.layer.take(slots)
     for layer in LAYERS:
-        mine = which(layers == layer)
+        mine = which(layers == layer.value)
         if not mine.size:
             continue
         if layer is AIR:

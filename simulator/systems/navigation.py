@@ -43,7 +43,7 @@ def find_ways(world: World) -> None:
     walkers = walkers[due]
     layers = world.layer.take(walkers)
     for layer in LAYERS:
-        on_layer = walkers[layers == layer]
+        on_layer = walkers[layers == layer.value]
         if on_layer.size:
             _look_over(world, on_layer, layer)
     left = geometry.length(world.nav_point.take(walkers, 0) - world.pos.take(walkers, 0))
