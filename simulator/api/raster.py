@@ -59,15 +59,17 @@ def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Disc
         order = np.argsort(disc, kind="stable")
         pixels, disc, inside, cover = pixels[order], disc[order], inside[order], cover[order]
     area = columns * rows
-    smooth = np.bincount(pixels, weights=cover, minlength=area)
+    smooth = _bytes(np.bincount(pixels, weights=cover * 16, minlength=area), pixels)
     pixels, disc = pixels[inside], disc[inside]
-    density = np.bincount(pixels, minlength=area)
-    return Discs(pixels, disc, _bytes(density), _bytes(smooth * 16))
+    density = _bytes(np.bincount(pixels, minlength=area), pixels)
+    return Discs(pixels, disc, density, smooth)
 
 
-def _bytes(image: NDArray[Any]) -> NDArray[np.uint8]:
-    capped: NDArray[np.uint8] = np.minimum(image, 255).astype(np.uint8)
-    return capped
+def _bytes(sums: NDArray[Any], pixels: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """An image of sums that are 0 but at these pixels; ten units cover a fiftieth of it, so only those are converted."""
+    image = np.zeros(len(sums), np.uint8)
+    image[pixels] = np.minimum(sums.take(pixels), 255)
+    return image
 
 
 def _draw_size(
@@ -79,13 +81,13 @@ def _draw_size(
     row = np.floor(y).astype(np.intp) + dy
     distance = np.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)  # rounds alike everywhere, unlike hypot
     size = radius[disc, None]
-    cover = np.clip(size - distance + 0.5, 0, 1)
+    cover = np.minimum(np.maximum(size - distance + 0.5, 0), 1)
     centre = (dx == 0) & (dy == 0)
     inside = (distance <= size) | centre
     on_image = (column >= 0) & (column < shape[0]) & (row >= 0) & (row < shape[1])
-    drawn = (inside | (cover > 0)) & on_image
-    which = np.broadcast_to(disc[:, None], drawn.shape)
-    return (row * shape[0] + column)[drawn], which[drawn], inside[drawn], cover[drawn]
+    drawn = np.flatnonzero((inside | (cover > 0)) & on_image)
+    pixels = row * shape[0] + column
+    return pixels.take(drawn), disc.take(drawn // len(dx)), inside.take(drawn), cover.take(drawn)
 
 
 def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
