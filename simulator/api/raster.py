@@ -66,7 +66,7 @@ def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Disc
 
 
 def _bytes(sums: NDArray[Any], pixels: NDArray[np.intp]) -> NDArray[np.uint8]:
-    """An image of sums that are 0 but at these pixels; ten units cover a fiftieth of it, so only those are converted."""
+    """An image of sums that are 0 but at these pixels: only those are converted, ten units cover a fiftieth of it."""
     image = np.zeros(len(sums), np.uint8)
     image[pixels] = np.minimum(sums.take(pixels), 255)
     return image

@@ -198,7 +198,8 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
 def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
     """Those that are not where they were; only they are put right."""
     changed = before.take(bodies, 0) != after.take(bodies, 0)
-    return bodies[changed[:, 0] | changed[:, 1]]
+    moved: Ints = bodies[changed[:, 0] | changed[:, 1]]
+    return moved
 
 
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
