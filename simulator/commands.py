@@ -230,7 +230,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.looks_around[slot] = order.kind in LOOKS_AROUND
     world.holds[slot] = order.kind is OrderKind.HOLD
     world.needs_target[slot] = order.kind in NEEDS_TARGET
-    world.scan_now = True
+    world.scan_now = world.orders_changed = True
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0
     world.returning[slot] = world.nav_end[slot] = False

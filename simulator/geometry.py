@@ -42,8 +42,8 @@ def turn_towards(current: Floats, wanted: Floats, cos_step: Floats, sin_step: Fl
     wx, wy = wanted[:, 0], wanted[:, 1]
     cos_error = cx * wx + cy * wy
     reached = cos_error >= cos_step
-    nowhere = (wx == 0.0) & (wy == 0.0)
-    if np.count_nonzero(nowhere):
+    zero = wanted == 0.0
+    if np.count_nonzero(zero) and np.count_nonzero(nowhere := zero[:, 0] & zero[:, 1]):
         wanted = np.where(nowhere[:, None], current, wanted)
         reached |= nowhere
     if np.count_nonzero(reached) == len(reached):

@@ -95,6 +95,7 @@ class World(UnitColumns):
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
         self.stirred = True  # somebody walked in the last loop
         self.scan_now = True  # somebody lost a target or got an order since the last scan
+        self.orders_changed = True  # somebody got an order, was born or died since orders were last looked over
         self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
         self.population = 0  # counts births and deaths, for what is worth remembering between them
         self._grow(64)
@@ -240,7 +241,7 @@ class World(UnitColumns):
         self.live = np.flatnonzero(self.alive)
         self.population += 1
         self.pairs = None
-        self.scan_now = True
+        self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
         self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
 

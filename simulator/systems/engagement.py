@@ -79,8 +79,9 @@ def _close_in(world: World, slots: Ints) -> None:
 def _follow(world: World) -> None:
     """Units that follow another one walk until they are beside it."""
     n = world.top
-    slots = which((world.order_kind[:n] == FOLLOW) & (world.order_target[:n] >= 0))
-    if slots.size:
+    following = world.order_kind[:n] == FOLLOW
+    if some(following):
+        slots = which(following & (world.order_target[:n] >= 0))
         leader = world.order_target[slots]
         offset = world.pos[leader] - world.pos[slots]
         stop_at = world.separation[slots] + world.separation[leader] + FOLLOW_GAP

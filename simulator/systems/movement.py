@@ -23,19 +23,35 @@ def move(world: World) -> None:
     """Choose this loop's steps and turn; writes ``intended``, ``speed`` and ``heading``."""
     n = world.top
     wants = world.wants[:n]
+    slots, wanted = _fighting_on_the_spot(world)
     if some(wants):
         world.speed[:n] *= wants
         world.intended[:n] = 0.0
-        _walk(world, which(wants))
+        walkers = which(wants)
+        direction = _walk(world, walkers)
+        slots, wanted = np.concatenate((walkers, slots)), np.concatenate((direction, wanted))
         world.stirred = True
     elif world.stirred:
         world.speed[:n] = 0.0
         world.intended[:n] = 0.0
         world.stirred = False
-    _face_targets(world)
+    if slots.size:
+        world.heading[slots] = geometry.turn_towards(
+            world.heading.take(slots, 0), wanted, world.turn_cos.take(slots), world.turn_sin.take(slots)
+        )
 
 
-def _walk(world: World, walkers: Ints) -> None:
+def _fighting_on_the_spot(world: World) -> tuple[Ints, Floats]:
+    """Those who stand and fight, with the direction of their target; what can't turn keeps its heading."""
+    fighters = world.fighters
+    turning = world.aim_cos.take(fighters) > -1.0
+    turning &= ~world.wants.take(fighters)
+    slots = fighters[turning]
+    return slots, world.toward.take(slots, 0)
+
+
+def _walk(world: World, walkers: Ints) -> Floats:
+    """Choose the steps of all who walk; returns the directions (k, 2) to turn to."""
     pos = world.pos.take(walkers, 0)
     offset = world.nav_point.take(walkers, 0) - pos
     distance = geometry.length(offset)
@@ -50,13 +66,10 @@ def _walk(world: World, walkers: Ints) -> None:
         direction = np.where(turned[:, None], aside, direction)
     world.speed[walkers] = speed
     world.intended[walkers] = direction * step[:, None]
-    facing = world.heading.take(walkers, 0)
     moving = step > 0.0
     if np.count_nonzero(moving) < len(moving):
-        direction = np.where(moving[:, None], direction, facing)
-    world.heading[walkers] = geometry.turn_towards(
-        facing, direction, world.turn_cos.take(walkers), world.turn_sin.take(walkers)
-    )
+        direction = np.where(moving[:, None], direction, world.heading.take(walkers, 0))
+    return direction
 
 
 def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
@@ -67,17 +80,3 @@ def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
         y = np.clip(pos[:, 1].astype(np.int64), 0, height - 1)
         speed = np.where(world.map.terrain.creep[y, x], speed * world.creep_factor.take(walkers), speed)
     return speed
-
-
-def _face_targets(world: World) -> None:
-    """Turn those who stand and fight towards their target; what can't turn keeps its heading."""
-    fighters = world.fighters
-    if not fighters.size:
-        return
-    turning = (world.aim_cos.take(fighters) > -1.0) & ~world.wants.take(fighters)
-    if not some(turning):
-        return
-    slots = fighters[turning]
-    heading, wanted = world.heading.take(slots, 0), world.toward.take(slots, 0)
-    turned = geometry.turn_towards(heading, wanted, world.turn_cos.take(slots), world.turn_sin.take(slots))
-    world.heading[slots] = turned

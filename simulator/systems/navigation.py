@@ -33,10 +33,8 @@ def find_ways(world: World) -> None:
     walkers = which(world.wants[:n])
     if not walkers.size:
         return
-    straight = world.nav_straight.take(walkers)
-    world.nav_point[walkers] = np.where(
-        straight[:, None], world.goal.take(walkers, 0), world.nav_point.take(walkers, 0)
-    )
+    straight = walkers[world.nav_straight.take(walkers)]
+    world.nav_point[straight] = world.goal.take(straight, 0)
     due = world.nav_loop.take(walkers) <= (world.loop if world.loop % LOOK_PERIOD == 0 else 0)
     if not some(due):
         return

@@ -24,7 +24,10 @@ def carry_out(world: World) -> None:
 
 
 def _lost(world: World) -> list[int]:
-    """Slots whose order's target is dead, or out of their owner's sight."""
+    """Slots whose order's target is dead, or out of their owner's sight; without fog only a change can bring that."""
+    if not world.orders_changed and not world.fog:
+        return []
+    world.orders_changed = False
     slots = which(world.needs_target[: world.top])
     if not slots.size:
         return []
