@@ -191,15 +191,13 @@ class World(UnitColumns):
         if kind is OrderKind.IDLE:
             fights = self.target[slot] != NOBODY
             return [Order(OrderKind.ATTACK_UNIT, ATTACK, self.tag_of(int(self.target[slot])))] if fights else []
-        x, y = self.order_point[slot]
-        ox, oy = self.order_origin[slot]
         targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW)
         current = Order(
             kind=kind,
             ability=int(self.order_ability[slot]),
             target=self.tag_of(int(self.order_target[slot])) if targeted else NO_TAG,
-            point=None if targeted or kind is OrderKind.HOLD else (float(x), float(y)),
-            origin=(float(ox), float(oy)) if kind is OrderKind.PATROL else None,
+            point=None if targeted or kind is OrderKind.HOLD else _point(self.order_point, slot),
+            origin=_point(self.order_origin, slot) if kind is OrderKind.PATROL else None,
         )
         return [current, *self.queue[slot]]
 
@@ -263,3 +261,8 @@ class World(UnitColumns):
         self._recycles = recycles
         self.queue += [[] for _ in range(capacity - self.capacity)]
         self.grow(capacity)
+
+
+def _point(column: Floats, slot: int) -> tuple[float, float]:
+    x, y = column[slot].tolist()
+    return x, y

@@ -99,12 +99,15 @@ class Units:
             point.z = height
 
     def _orders(self) -> dict[int, list[tuple[Order, float]]]:
-        """The orders of own units by slot, each with the ground height at its point."""
+        """The orders of own units by slot, each with the ground height at its point, if it has one."""
         own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
         orders = {slot: self.world.orders_of(slot) for slot in own}
-        points = [order.point or (0.0, 0.0) for some in orders.values() for order in some]
+        points = [order.point for some in orders.values() for order in some if order.point is not None]
         heights = iter(self.world.map.terrain.ground_z(np.array(points)).tolist() if points else ())
-        return {slot: [(order, next(heights)) for order in some] for slot, some in orders.items()}
+        return {
+            slot: [(order, 0.0 if order.point is None else next(heights)) for order in some]
+            for slot, some in orders.items()
+        }
 
 
 def _rows(*columns: NDArray[Any]) -> Iterator[tuple[Any, ...]]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator import geometry
 from simulator.orders import OrderKind
 from simulator.world import NOBODY
 
@@ -123,7 +124,7 @@ def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, 
         cloak=cloak,
         pos=pos,
         z=world.map.terrain.ground_z(pos) + types.height[row],
-        facing=world.facing()[slot],
+        facing=geometry.facing(world.heading[slot]),
         radius=types.radius[row],
         life=world.life[slot] * clear,
         life_max=stats.life_max[owner, row] * clear,
