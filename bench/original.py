@@ -2,7 +2,7 @@
 
 It starts a thread per agent; in it, a second thread makes a blocking HTTP request, and its result is looked for
 every 50 ms (the original: every 100 ms). The main loop looks for finished agents every millisecond. No bus, no
-other process: what this costs is what threads and polling cost.
+other process: what this costs is what threads and polling cost. What agents see and what their words do is ours.
 """
 
 from __future__ import annotations
@@ -11,7 +11,11 @@ import http.client
 import json
 import threading
 import time
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
 POLL_S = 0.05
 HOST_POLL_S = 0.001
@@ -46,16 +50,29 @@ class _Agent:
             connection.close()
 
 
-def step_s(base_url: str, model: str, texts: list[str], steps: int) -> list[float]:
-    """Wall time of each step of `len(texts)` agents, in seconds."""
-    agents = [_Agent(base_url, model) for _ in texts]
+def step_s(
+    base_url: str, model: str, build: Callable[[], Iterable[str]], act: Callable[[list[str]], object], steps: int
+) -> list[float]:
+    """Wall time of each step, in seconds.
+
+    Args:
+        base_url: of the endpoint.
+        model: its model.
+        build: makes the text of one agent after the other, as the original does before it starts the agent's thread.
+        act: takes all replies.
+        steps: how many to measure.
+    """
+    agents: list[_Agent] = []
     times = []
     for _ in range(steps):
         began = time.perf_counter()
-        for agent, text in zip(agents, texts, strict=True):
-            agent.waiting = True
-            threading.Thread(target=agent.query, args=(text,)).start()
+        for number, text in enumerate(build()):
+            if number == len(agents):
+                agents.append(_Agent(base_url, model))
+            agents[number].waiting = True
+            threading.Thread(target=agents[number].query, args=(text,)).start()
         while any(agent.waiting for agent in agents):
             time.sleep(HOST_POLL_S)
+        act([agent.answer or "" for agent in agents])
         times.append(time.perf_counter() - began)
     return times

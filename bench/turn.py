@@ -132,6 +132,18 @@ class Bench:
         measured.parts_s["build"].append(asked - began - answers.publish_s - answers.wait_s)
         measured.parts_s["merge"].append(ended - asked)
 
+    def original_s(self, base_url: str, steps: int) -> list[float]:
+        """Durations of the same steps in the way of the original."""
+
+        def build() -> Iterator[str]:
+            return (seen.text for seen in self.observer.each(self.snapshot))
+
+        def act(replies: list[str]) -> None:
+            speeches = {seat.agent: parse(reply) for seat, reply in zip(self.seats, replies, strict=True)}
+            self.actor.joint(self.observer.sight, speeches)
+
+        return step_s(base_url, "silent", build, act, steps)
+
     def _last(self, answers: Answers, ask_s: float) -> dict[str, float]:
         """The parts of the agent whose reply came last."""
 
@@ -224,10 +236,7 @@ async def measure(agents: list[int], steps: int, original_steps: int) -> list[Me
             async with Children(logs) as workers:
                 bench = Bench(bus, f"bench-{count}", task, snapshot, count)
                 measured = await bench.measure(steps, workers, [*options, "--model-name", "silent"])
-            text = next(iter(Observer(task).observe(snapshot).agents.values())).text
-            measured.original_s = await asyncio.to_thread(
-                step_s, llm["base_url"], "silent", [text] * count, original_steps
-            )
+            measured.original_s = await asyncio.to_thread(bench.original_s, llm["base_url"], original_steps)
             found.append(measured)
     return found
 
@@ -248,7 +257,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--agents", type=int, nargs="+", default=list(GOALS_MS))
     parser.add_argument("--steps", type=int, default=10)
-    parser.add_argument("--original-steps", type=int, default=3)
+    parser.add_argument("--original-steps", type=int, default=8)
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
     measured = asyncio.run(measure(arguments.agents, arguments.steps, arguments.original_steps))
