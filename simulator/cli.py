@@ -13,7 +13,6 @@ from typing import Annotated, Any
 import typer
 
 from simulator.install import BASE_BUILD, InstallError, install, is_installed
-from simulator.maps import load_map, map_names
 
 app = typer.Typer(
     help="A headless StarCraft II that PySC2 and python-sc2 start and play as if it were the game.",
@@ -42,6 +41,8 @@ def install_command(directory: Directory, as_json: Json = False) -> None:
     except InstallError as error:
         typer.echo(f"Not installed: {error}.", err=True)
         raise typer.Exit(1) from error
+    from simulator.maps import map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
     if as_json:
         typer.echo(json.dumps({"path": str(root), "maps": list(map_names())}))
     else:
@@ -62,6 +63,8 @@ def info(as_json: Json = False) -> None:
 
 
 def _facts() -> dict[str, Any]:
+    from simulator.maps import load_map, map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
     path = os.environ.get("SC2PATH")
     if not path:
         kind = "run khala sc2 install DIRECTORY first"

@@ -15,8 +15,6 @@ import shlex
 import sys
 from pathlib import Path
 
-from simulator.mapfile import FOLDERS, is_placeholder, placeholders
-
 BASE_BUILD = 75689
 """Build of 4.10.0: the newest for Linux that both PySC2 and python-sc2 know."""
 
@@ -89,6 +87,8 @@ def _write_launcher(path: Path) -> None:
 
 
 def _write_maps(maps: Path) -> None:
+    from simulator.mapfile import FOLDERS, is_placeholder, placeholders  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
     for folder in FOLDERS:
         (maps / folder).mkdir(parents=True, exist_ok=True)
     for relative, data in placeholders():
