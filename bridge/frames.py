@@ -110,13 +110,8 @@ class Camera:
         scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
         return WorldPoint(point.x / scale - half + self.x, self.y + half - point.y / scale)
 
-    def sees(self, x: float, y: float) -> bool:
-        """Whether a world position is on the screen."""
-        half = CAMERA_WIDTH / 2
-        return -half <= x - self.x < half and -half < y - self.y <= half
-
-    def sees_all(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """`sees` of many world positions at once: (n, 2) → (n,)."""
+    def sees(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of these world positions are on the screen: (n, 2) → (n,)."""
         half = CAMERA_WIDTH / 2
         right, down = places[:, 0] - self.x, self.y - places[:, 1]
         seen: NDArray[np.bool_] = (right >= -half) & (right < half) & (down >= -half) & (down < half)

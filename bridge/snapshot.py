@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from protocol.messages import Outcome
 
-LOOPS_PER_S = 22.4
-"""Game loops in a second at the speed called "faster", the one that ladders and the API play at."""
-
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:

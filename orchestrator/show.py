@@ -15,7 +15,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from protocol.messages import Report, Result, Run, Usage, Wire
+from protocol.messages import LOOPS_PER_S, Report, Result, Run, Usage, Wire
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "malformed": "red"}
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
-LOOPS_PER_S = 22.4
 
 
 def console() -> Console:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from s2clientprotocol import raw_pb2
 
-from bridge.snapshot import LOOPS_PER_S
-from protocol.messages import Casualties, Report, Result, Usage
+from protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
 
 if TYPE_CHECKING:
     from s2clientprotocol import score_pb2

@@ -17,6 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field
 SCHEMA_VERSION: Literal[1] = 1
 """Major version of the schema. A peer with another one is refused, not guessed at."""
 
+LOOPS_PER_S = 22.4
+"""Game loops in a second at the speed called "faster", the one that ladders and the API play at."""
+
 Point = tuple[float, float]
 Alliance = Literal["own", "ally", "enemy", "neutral"]
 Outcome = Literal["win", "draw", "loss"]

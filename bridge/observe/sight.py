@@ -23,14 +23,14 @@ from bridge.frames import Camera, MapFrame, WorldPoint
 from bridge.knowledge import is_armed
 from bridge.names import buff_name, order_name, unit_name, upgrade_name
 from bridge.observe.events import events
-from bridge.snapshot import LOOPS_PER_S, Snapshot
-from protocol.messages import Resources, TeamView, UnitView, View
+from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitView, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bridge.catalog import Action
     from bridge.observe.teams import Roster, Team
+    from bridge.snapshot import Snapshot
     from bridge.task import AgentConfig
     from protocol.messages import ActionSpec, Alliance, Frames, Point
 
@@ -149,7 +149,7 @@ class Scene:
 
     def _seen_by(self, camera: Camera) -> list[_Body]:
         """The units on a camera's screen, in the order of their tags."""
-        return [self._order[index] for index in np.flatnonzero(camera.sees_all(self._places)).tolist()]
+        return [self._order[index] for index in np.flatnonzero(camera.sees(self._places)).tolist()]
 
     def _actions(self, agent: AgentConfig, types: list[str]) -> tuple[ActionSpec, ...]:
         valid: dict[str, Action] = {}

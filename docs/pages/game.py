@@ -11,6 +11,7 @@ from bridge.knowledge import RACES, UnitType
 from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
 from orchestrator.config import load_task, task_files
+from protocol.messages import LOOPS_PER_S
 from simulator.maps import MapError, load_map
 from simulator.scenario import Create
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from bridge.task import AgentConfig, TaskConfig
     from simulator.scenario import Scenario
 
-LOOPS_PER_S = 22.4
 AGENTS, OPPONENT = 1, 2
 """Player numbers on the shipped maps."""
 

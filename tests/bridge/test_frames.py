@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,7 +32,7 @@ def test_a_camera_sees_what_is_inside_of_its_frame(cx: float, cy: float, x: floa
     camera = Camera(cx, cy)
     screen = camera.screen(x, y)
     if all(abs(value - edge) > 1e-9 for value in screen for edge in (0, 24)):
-        assert camera.sees(x, y) == (0 <= screen.x < 24 and 0 <= screen.y < 24)
+        assert camera.sees(np.array([[x, y]])).tolist() == [0 <= screen.x < 24 and 0 <= screen.y < 24]
 
 
 def test_the_screen_has_y_down_and_its_centre_in_the_middle() -> None:
