@@ -54,6 +54,7 @@ class Score:
     damage_dealt: Vitals = field(default_factory=Vitals)
     damage_taken: Vitals = field(default_factory=Vitals)
     healed: Vitals = field(default_factory=Vitals)
+    curriculum: float = 0.0  # what the map's script gives
 
 
 @dataclass(slots=True)
@@ -79,9 +80,14 @@ class Player:
     minerals: float = 0.0
     vespene: float = 0.0
     upgrades: list[int] = field(default_factory=list)
+    underway: list[str] = field(default_factory=list)  # names of units and upgrades that are being made
+    timers: dict[str, float] = field(default_factory=dict)  # cooldown's name -> loop at which it is over
+    cheats: list[str] = field(default_factory=list)  # debug states that are on
     result: GameResult = GameResult.UNDECIDED
     surrendered: bool = False
     score: Score = field(default_factory=Score)
+    start: tuple[float, float] | None = None  # where his town hall was put at the start of a melee game
+    camera: tuple[float, float] | None = None  # where he looks at the start, if not where the map says
 
     def counters(self) -> tuple[object, ...]:
         """Everything as nested tuples, in a fixed order, for the digest of the world."""
