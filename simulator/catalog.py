@@ -13,6 +13,8 @@ from functools import lru_cache
 from importlib import resources
 from typing import Any, Final
 
+from simulator.abilities import Ability, ability_from
+from simulator.buffs import Buff, buff_from
 from simulator.records import (
     Affects,
     Area,
@@ -30,6 +32,8 @@ from simulator.records import (
 __all__ = [
     "DEFAULT_VERSION",
     "LOOPS_PER_NORMAL_SECOND",
+    "Ability",
+    "Buff",
     "Catalog",
     "CatalogError",
     "Footprint",
@@ -50,9 +54,13 @@ class CatalogError(ValueError):
     """A table version, unit or weapon that is not in the data was asked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Catalog:
-    """All tables of one game version, with look-up by id and by name."""
+    """All tables of one game version, with look-up by id and by name.
+
+    ``cards`` and ``ordinary`` go by unit row: what units of a type can be told, and by which ability ids they move,
+    attack, patrol, hold and stop.
+    """
 
     version: str
     build: int
@@ -62,6 +70,12 @@ class Catalog:
     footprints: dict[str, Footprint]
     row_of_id: dict[int, int]
     row_of_name: dict[str, int]
+    abilities: tuple[Ability, ...]
+    buffs: tuple[Buff, ...]
+    cards: tuple[tuple[Ability, ...], ...]
+    ordinary: tuple[dict[str, int], ...]
+    ability_of_id: dict[int, Ability]
+    buff_of_name: dict[str, Buff]
 
     def unit(self, key: int | str) -> UnitType:
         """The unit type with this API id or this name; raises ``CatalogError`` when there is none."""
@@ -69,6 +83,24 @@ class Catalog:
         if row is None:
             raise CatalogError(f"no unit type {key!r} in the tables of version {self.version}")
         return self.units[row]
+
+    def ability(self, number: int) -> Ability:
+        """The specific ability with this API id; raises ``CatalogError`` when there is none."""
+        found = self.ability_of_id.get(number)
+        if found is None:
+            raise CatalogError(f"no ability {number} in the tables of version {self.version}")
+        return found
+
+    def abilities_of(self, row: int) -> tuple[Ability, ...]:
+        """What units of the type in this row can be told to do, by ascending id."""
+        return self.cards[row]
+
+    def buff(self, name: str) -> Buff:
+        """The buff with this name; raises ``CatalogError`` when there is none."""
+        found = self.buff_of_name.get(name)
+        if found is None:
+            raise CatalogError(f"no buff {name!r} in the tables of version {self.version}")
+        return found
 
     def upgrade(self, key: int | str) -> Upgrade:
         """The upgrade with this API id or this name; raises ``CatalogError`` when there is none."""
@@ -92,6 +124,9 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
     weapon_of_id = {w.id: w for w in weapons}
     units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_rows(name, "units")))
+    abilities = tuple(ability_from(raw) for raw in _rows(name, "abilities"))
+    cards = _cards(units, abilities)
+    buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
     return Catalog(
         version=name,
         build=next(b for b, v in VERSION_OF_BUILD.items() if v == name),
@@ -101,7 +136,45 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
         footprints={raw["id"]: _footprint(raw) for raw in _rows(name, "footprints")},
         row_of_id={u.id: u.row for u in units},
         row_of_name={u.name: u.row for u in units},
+        abilities=abilities,
+        buffs=buffs,
+        cards=cards,
+        ordinary=tuple({a.does: a.id for a in card if a.does in BASICS} for card in cards),
+        ability_of_id={a.id: a for a in abilities},
+        buff_of_name={b.name: b for b in buffs},
     )
+
+
+BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack")
+
+
+def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple[tuple[Ability, ...], ...]:
+    """The command card of every type; of each basic order it holds one, the one that fits the type."""
+    of_name: dict[str, dict[int, Ability]] = {unit.name: {} for unit in units}
+    smart = next(a for a in abilities if a.does == "smart")
+    for ability in abilities:
+        for user in ability.users:
+            if ability.does not in ("", "general", "smart") and user in of_name:
+                of_name[user][ability.id] = ability
+    return tuple(_card(unit, of_name[unit.name], smart) for unit in units)
+
+
+def _card(unit: UnitType, found: dict[int, Ability], smart: Ability) -> tuple[Ability, ...]:
+    armed = any(unit.weapon_against(plane) is not None for plane in ("ground", "air"))
+    walks = unit.speed_n > 0.0
+    fits = {"attack": armed, "scan_move": walks and not armed, "stop": armed or walks}
+    card = {} if unit.uncommandable else dict(found)
+    seen: set[str] = set()
+    for number, ability in sorted(found.items()):
+        if ability.does not in BASICS:
+            continue
+        if ability.does in seen or not fits.get(ability.does, walks):
+            card.pop(number, None)
+        else:
+            seen.add(ability.does)
+    if card or (not unit.uncommandable and (armed or walks)):
+        card[smart.id] = smart
+    return tuple(ability for _, ability in sorted(card.items()))
 
 
 def _rows(version: str, kind: str) -> list[dict[str, Any]]:
@@ -114,10 +187,19 @@ def _pairs(bonus: dict[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(bonus.items()))
 
 
+def _own(record: type[Any], raw: dict[str, Any]) -> dict[str, Any]:
+    """The values of a row that are fields of ``record``."""
+    names = {f.name for f in dataclasses.fields(record)}
+    return {k: v for k, v in raw.items() if k in names}
+
+
 def _affects(raw: dict[str, Any]) -> Affects:
-    names = {f.name for f in dataclasses.fields(Affects)}
-    known = {k: v for k, v in raw.items() if k in names}
-    return Affects(**known, excluding=raw.get("except", ""))
+    return Affects(**_own(Affects, raw), excluding=raw.get("except", ""))
+
+
+def _sweep(raw: dict[str, Any]) -> Sweep:
+    points = tuple(map(tuple, raw["points"]))
+    return Sweep(affects=_affects(raw), **{**_own(Sweep, raw), "points": points})
 
 
 def _hit(raw: dict[str, Any]) -> Hit:
@@ -129,11 +211,8 @@ def _hit(raw: dict[str, Any]) -> Hit:
         missile_acceleration_n=raw.pop("missile_acceleration", None),
         area=tuple(Area(**ring) for ring in raw.pop("area", ())),
         area_affects=_affects(raw.pop("area_affects", {})),
-        sweep=sweep and Sweep(sweep["radius"], tuple(map(tuple, sweep["points"])), _affects(sweep)),
-        search=search
-        and Search(
-            search.get("radius", 0.0), _affects(search), search.get("arc_deg", 360.0), search.get("max_count", 0)
-        ),
+        sweep=sweep and _sweep(sweep),
+        search=search and Search(affects=_affects(search), **_own(Search, search)),
         **raw,
     )
 

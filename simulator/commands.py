@@ -7,6 +7,7 @@ is asked are left alone, and the slots that took the order are returned.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 from simulator.columns import NOBODY
@@ -40,13 +41,13 @@ Point = tuple[float, float]
 def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
     """Walk to a point and look at nobody on the way."""
     order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
-    return _give(world, [s for s in slots if can_move(world.unit_type(s))], order, queue=queue)
+    return give(world, [s for s in slots if can_move(world.unit_type(s))], order, queue=queue)
 
 
 def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
     """Walk after another unit (a tag)."""
     takers = [s for s in slots if can_move(world.unit_type(s)) and world.tag_of(s) != target]
-    return _give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
+    return give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
 
 
 def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
@@ -60,7 +61,7 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
             order = Order(OrderKind.SCAN_MOVE, SCAN_MOVE, point=_inside(world, point))
         else:
             continue
-        taken += _give(world, [slot], order, queue=queue)
+        taken += give(world, [slot], order, queue=queue)
     return taken
 
 
@@ -70,7 +71,7 @@ def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool 
     if victim == NOBODY:
         return []
     takers = [s for s in slots if s != victim and can_reach(world, s, victim)]
-    return _give(world, takers, Order(OrderKind.ATTACK_UNIT, ATTACK, target=target), queue=queue)
+    return give(world, takers, Order(OrderKind.ATTACK_UNIT, ATTACK, target=target), queue=queue)
 
 
 def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
@@ -80,7 +81,7 @@ def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = Fa
         if can_move(world.unit_type(slot)):
             x, y = world.pos[slot]
             order = Order(OrderKind.PATROL, PATROL, point=_inside(world, point), origin=(float(x), float(y)))
-            taken += _give(world, [slot], order, queue=queue)
+            taken += give(world, [slot], order, queue=queue)
     return taken
 
 
@@ -97,7 +98,7 @@ def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
     """Stay on the spot and fight only what is in reach."""
     takers = [s for s in slots if can_move(world.unit_type(s))]
-    return _give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
+    return give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
 
 
 def smart(
@@ -201,9 +202,12 @@ def _inside(world: World, point: Point) -> Point:
     return min(max(point[0], x0), x1), min(max(point[1], y0), y1)
 
 
-def _give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
+def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
+    """Make an order the units' current one, or let it wait in their queues; returns the slots that took it."""
     taken = []
+    wanted = order
     for slot in slots:
+        order = _of_its_own(world, slot, wanted)
         if queue and world.order_kind[slot] != OrderKind.IDLE:
             if len(world.queue[slot]) >= QUEUE_LIMIT:
                 continue
@@ -215,6 +219,24 @@ def _give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[
     return taken
 
 
+ORDINARY = {
+    OrderKind.MOVE: "move",
+    OrderKind.FOLLOW: "move",
+    OrderKind.ATTACK_MOVE: "attack",
+    OrderKind.ATTACK_UNIT: "attack",
+    OrderKind.HOLD: "hold_position",
+    OrderKind.PATROL: "patrol",
+    OrderKind.SCAN_MOVE: "scan_move",
+}
+
+
+def _of_its_own(world: World, slot: int, order: Order) -> Order:
+    """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
+    does = ORDINARY.get(order.kind)
+    own = None if does is None else world.catalog.ordinary[int(world.type[slot])].get(does)
+    return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
+
+
 def begin(world: World, slot: int, order: Order | None) -> None:
     """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
     order = order or Order(OrderKind.IDLE, 0)
@@ -223,15 +245,36 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.order_ability[slot] = order.ability
     world.order_target[slot] = target
     world.order_point[slot] = world.pos[slot] if order.point is None else order.point
+    world.order_aimed[slot] = order.point is not None
     world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
     if order.kind is not OrderKind.ATTACK_UNIT or target == NOBODY or not engage(world, slot, target):
         disengage(world, slot)
     world.walks[slot] = order.kind in WALKS
     world.looks_around[slot] = order.kind in LOOKS_AROUND
     world.holds[slot] = order.kind is OrderKind.HOLD
-    world.needs_target[slot] = order.kind in NEEDS_TARGET
+    world.needs_target[slot] = order.kind in NEEDS_TARGET or (order.kind is OrderKind.CAST and target != NOBODY)
+    world.casts[slot] = order.kind is OrderKind.CAST
+    world.cast_at[slot] = -1.0
+    world.channels[slot] = False
     world.scan_now = world.orders_changed = True
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0
     world.returning[slot] = world.nav_end[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
+
+
+def begin_next(world: World, slot: int) -> None:
+    """Begin the next order of a unit; a patrol turns round, targets that are gone are skipped."""
+    waiting = world.queue[slot]
+    if world.order_kind[slot] == OrderKind.PATROL and not waiting:
+        here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
+        world.order_point[slot], world.order_origin[slot] = there, here
+        world.nav_end[slot] = False
+        world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
+        return
+    order: Order | None = None
+    while waiting and order is None:
+        order = waiting.pop(0)
+        if order.target != NO_TAG and world.slot_of(order.target) == NOBODY:
+            order = None
+    begin(world, slot, order)

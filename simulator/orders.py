@@ -22,6 +22,7 @@ class OrderKind(IntEnum):
     HOLD = 5
     PATROL = 6
     SCAN_MOVE = 7
+    CAST = 8
 
 
 WALKS: Final = frozenset({OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL})

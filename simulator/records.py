@@ -29,29 +29,40 @@ class Affects:
     excluding: str = ""
     not_self: bool = False
     not_target: bool = False
+    neutral: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """A line of small circles drawn through the target, as the Colossus' beams and the Lurker's spines do.
+    """A line of small circles drawn one after the other, as the Colossus' beams and the Lurker's spines do.
 
-    Each point is ``(delay_loops, across, along)``: the offset is in the frame of the shot, ``across`` to its right,
-    ``along`` backwards from the target to the attacker (the catalog's own axes). A unit is hit once per sweep.
+    Each point is ``(delay_loops, across, along)``: the offset from the ``origin`` ("target" or "source") is in the
+    frame of the shot, ``across`` to its right, ``along`` backwards from the target to the attacker (the catalog's own
+    axes). A unit is hit once per sweep, ``lag_loops`` after it was touched; the delays include the lag. A sweep from
+    the attacker ends ``past_range`` beyond the weapon's range.
     """
 
     radius: float
     points: tuple[tuple[float, float, float], ...]
     affects: Affects
+    origin: str = "target"
+    lag_loops: float = 0.0
+    past_range: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """A second circle (or arc) around the target in which the same damage is dealt again."""
+    """A second circle (or arc) in which the same damage is dealt again, around the target or in front of the attacker.
+
+    ``origin`` is "target" or "source"; from the source the radius counts from its edge. With a ``max_count`` only the
+    nearest so many are taken.
+    """
 
     radius: float
     affects: Affects
     arc_deg: float = 360.0
     max_count: int = 0
+    origin: str = "target"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +70,8 @@ class Hit:
     """One damage of one shot.
 
     ``delay_loops`` counts from the weapon's damage point. A hit with a ``missile_speed_n`` is carried by a missile
-    that leaves then. ``when`` names a branch of the game's own switch (branches exclude each other).
+    that leaves then. ``when`` names a branch of the game's own switch (branches exclude each other). A hit with a
+    ``beam_tick_n`` repeats as long as the attack goes on, once per period. A ``bounce`` leaves from the last victim.
     """
 
     effect: str
@@ -78,12 +90,17 @@ class Hit:
     sweep: Sweep | None = None
     search: Search | None = None
     bounce: bool = False
-    repeat: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Weapon:
-    """A weapon: reach, rhythm and the hits of one shot. ``row`` is its index in ``Catalog.weapons``."""
+    """A weapon: reach, rhythm and the hits of one shot. ``row`` is its index in ``Catalog.weapons``.
+
+    ``hidden`` ones are not told by the API (a Roach's bite), ``disabled`` ones need to be switched on, ``passive`` ones
+    only aim. ``moves`` says what the body does while it fires: it stands (""), glides on ("slowing") or goes where it
+    wants ("moving"). ``excluding`` is an attribute it can't be aimed at, ``acquires`` what it picks by itself ("any" or
+    "unit", which is no structure), ``launches`` the unit type that an attack sends out.
+    """
 
     row: int
     id: str
@@ -110,11 +127,29 @@ class Weapon:
     fires_moving: bool = False
     strafe: bool = False
     moves: str = ""
+    excluding: str = ""
+    acquires: str = "any"
+    launches: str = ""
     estimates: tuple[str, ...] = ()
 
     def reaches(self, plane: str) -> bool:
         """Whether it can be aimed at a unit on ``plane`` ("ground" or "air")."""
         return self.targets in ("any", plane)
+
+    @property
+    def is_beam(self) -> bool:
+        """Whether it goes on by itself once it has begun, tick after tick."""
+        return any(hit.beam_tick_n is not None for hit in self.hits)
+
+    @property
+    def is_kamikaze(self) -> bool:
+        """Whether firing it kills the unit."""
+        return any(hit.kills_self for hit in self.hits)
+
+    @property
+    def works(self) -> bool:
+        """Whether an attack with it does anything: it deals damage or launches units."""
+        return bool(self.hits or self.launches) and not self.passive
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,9 +260,9 @@ class UnitType:
         return self.radius if self.radius_api is None else self.radius_api
 
     def weapon_against(self, plane: str) -> Weapon | None:
-        """The first weapon that a unit of this type can use by itself against ``plane``, or None."""
-        usable = (w for w in self.weapons if w.reaches(plane) and not w.disabled and not w.hidden)
-        return next(usable, None)
+        """The weapon with the longest range that a unit of this type can aim at ``plane`` by itself, or None."""
+        usable = [w for w in self.weapons if w.reaches(plane) and w.works and not w.disabled]
+        return max(usable, key=lambda weapon: weapon.range, default=None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,14 @@
 """What has left a weapon and not yet arrived: missiles in flight and hits that are due later.
 
-Two small tables of exactly as many rows as there are shots. ``systems.weapons`` adds to them, ``systems.missiles``
-and ``systems.damage`` take from them. A reference to a unit that died becomes -1; the shot keeps its last point.
+Two small tables of exactly as many rows as there are shots, and a list of the sweeps under way. ``systems.weapons``
+adds to them, ``systems.hits``, ``missiles`` and ``sweeps`` take from them. A reference to a unit that died becomes -1;
+the shot keeps its last point.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -23,11 +25,50 @@ _SHOT: Final = [
     ("source", np.int64),  # slot of the attacker, or NOBODY
     ("owner", np.int64),  # whose unit fired
     ("target", np.int64),  # slot of the target, or NOBODY
+    ("prior", np.int64),  # slot from which a bounce came, or NOBODY
     ("weapon", np.int64),  # row in catalog.weapons
     ("hit", np.int64),  # index in the weapon's hits
     ("start", np.float64, 2),  # where the attacker stood
     ("goal", np.float64, 2),  # where the target is, or was when it died
 ]
+
+
+class Shot(NamedTuple):
+    """One row of either table as Python values."""
+
+    source: int
+    owner: int
+    target: int
+    prior: int
+    weapon: int
+    hit: int
+    start: tuple[float, float]
+    goal: tuple[float, float]
+
+
+def shot_of(row: np.void) -> Shot:
+    """The shot in a row of either table."""
+    source, owner, target, prior, weapon, hit = (int(row[name]) for name in Shot._fields[:6])
+    start, goal = row["start"].tolist(), row["goal"].tolist()
+    return Shot(source, owner, target, prior, weapon, hit, (start[0], start[1]), (goal[0], goal[1]))
+
+
+@dataclass(slots=True)
+class Sweep:
+    """A sweep that is under way: its shot, the (fractional) loop it began at, the next point, whom it has touched."""
+
+    shot: Shot
+    begun: float
+    ahead: int
+    touched: list[int]
+
+    def forget(self, slot: int) -> None:
+        """The unit in ``slot`` is gone."""
+        self.touched = [other for other in self.touched if other != slot]
+        self.shot = self.shot._replace(
+            source=NOBODY if self.shot.source == slot else self.shot.source,
+            target=NOBODY if self.shot.target == slot else self.shot.target,
+        )
 
 
 class _Table:
@@ -67,7 +108,7 @@ class _Table:
 
     def forget(self, slot: int) -> None:
         """The unit in ``slot`` is gone."""
-        for name in ("source", "target"):
+        for name in ("source", "target", "prior"):
             column = self.rows[name]
             column[column == slot] = NOBODY
 
@@ -85,8 +126,7 @@ class Missiles(_Table):
 class PendingHits(_Table):
     """Hits that fall due at a later loop.
 
-    ``due`` is that loop with its fraction. ``single`` marks damage to the target alone, whose splash or sweep is
-    already resolved.
+    ``due`` is that loop with its fraction. ``single`` marks damage to the target alone, by a sweep that touched it.
     """
 
     dtype = np.dtype([*_SHOT, ("due", np.float64), ("single", np.bool_)])

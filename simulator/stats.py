@@ -78,6 +78,8 @@ class Stats:
         self.attribute_bits: NDArray[np.int64] = np.array([bit_set(u.attributes, ATTRIBUTES) for u in catalog.units])
         self.layer_bits: NDArray[np.int64] = np.array([bit_set(u.collide, LAYERS) for u in catalog.units])
         self.plane_bits: NDArray[np.int64] = np.array([_plane_bits(u) for u in catalog.units])
+        self.beam: NDArray[np.bool_] = np.array([w.is_beam for w in catalog.weapons])
+        self.kamikaze: NDArray[np.bool_] = np.array([w.is_kamikaze for w in catalog.weapons])
         for player in range(players):
             self.apply(player, ())
 

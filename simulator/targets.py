@@ -17,12 +17,20 @@ if TYPE_CHECKING:
 WIDEST_AIM_DEG = 180.0
 
 
-def engage(world: World, slot: int, target: int) -> bool:
-    """Make a unit fight ``target`` with the weapon that fits; False when it has none."""
+def weapon_for(world: World, slot: int, target: int) -> int:
+    """Row of the weapon that a unit can aim at ``target`` now, or -1."""
     on_ground = bool(world.plane_bits[target] & GROUND_PLANE)
     row = int(world.ground_weapon[slot]) if on_ground else -1
     if row < 0 and (not on_ground or world.plane_bits[target] != GROUND_PLANE):
         row = int(world.air_weapon[slot])
+    if row >= 0 and world.catalog.weapons[row].excluding in world.unit_type(target).attributes:
+        return -1
+    return row
+
+
+def engage(world: World, slot: int, target: int) -> bool:
+    """Make a unit fight ``target`` with the weapon that fits; False when it has none."""
+    row = weapon_for(world, slot, target)
     if row < 0:
         return False
     if world.target[slot] != target:
@@ -30,12 +38,15 @@ def engage(world: World, slot: int, target: int) -> bool:
     weapon = world.catalog.weapons[row]
     world.target[slot] = target
     world.weapon[slot] = row
-    world.reach[slot] = world.stats.range[world.owner[slot], row]
-    world.reach_min[slot] = weapon.min_range or -math.inf
+    world.reach[slot] = world.stats.range[world.owner[slot], row] + world.range_add[slot]
+    bites = world.close_weapon[slot] >= 0
+    world.reach_min[slot] = -math.inf if bites or not weapon.min_range else weapon.min_range
     world.slop[slot] = weapon.slop
-    turns = weapon.turret_deg_n is None and not world.unit_type(slot).unturnable
+    world.rolling[slot] = weapon.moves == "moving"
+    world.turreted[slot] = weapon.turret_deg_n is not None
     angle = min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)
-    world.aim_cos[slot] = math.cos(math.radians(angle)) if turns else -1.0
+    fixed = weapon.turret_deg_n is None and world.unit_type(slot).unturnable
+    world.aim_cos[slot] = -1.0 if fixed else math.cos(math.radians(angle))
     world.nav_loop[slot] = 0
     return True
 
@@ -45,12 +56,14 @@ def disengage(world: World, slot: int) -> None:
     drop_attack(world, slot)
     world.target[slot] = NOBODY
     world.weapon[slot] = -1
+    world.rolling[slot] = world.turreted[slot] = False
     world.nav_loop[slot] = 0
     world.scan_now = True
 
 
 def drop_attack(world: World, slot: int) -> None:
     """Drop an attack that is started and has not taken effect; it leaves no cooldown."""
+    world.beaming[slot] = False
     if world.windup[slot] >= 0.0:
         world.windup[slot] = -1.0
         world.cooldown[slot] = 0.0

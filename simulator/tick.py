@@ -10,16 +10,23 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.systems import (
     acquire,
+    autocast,
     avoidance,
+    buffs,
+    casts,
     collision,
-    damage,
     death,
     engagement,
+    fields,
+    hits,
+    lifetimes,
     missiles,
     movement,
     navigation,
     orders,
+    passives,
     regeneration,
+    sweeps,
     triggers,
     vision,
     weapons,
@@ -36,15 +43,22 @@ if TYPE_CHECKING:
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     orders.carry_out,  # finished orders end, queued ones begin
     acquire.choose_targets,  # whom to fight, without being told
+    autocast.look_out,  # what to use, without being told
     engagement.measure,  # who is in reach of his target, who wants to walk where
+    casts.carry_on,  # abilities are prepared, take effect, go on
+    passives.run,  # what units do by their nature
     weapons.fire,  # attacks start, take effect, cool down
     navigation.find_ways,  # the next corner on the way to every goal
     avoidance.find_headings,  # around bodies in the way
     movement.move,  # steps, turning, acceleration
     collision.separate,  # bodies and walls
     missiles.fly,
-    damage.deal_pending,  # hits that are due
+    sweeps.run,  # lines that are being drawn through the ranks
+    hits.fall_due,
+    fields.run,  # storms, scans and whatever else lies on the ground
+    buffs.run_out,
     regeneration.regenerate,
+    lifetimes.run_out,
     death.bury,
     vision.look,
     triggers.run,  # the map's own script, which may end the game

@@ -6,15 +6,17 @@ import math
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final
 
+from simulator.armament import weapon_traits
+from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.mechanics import MECHANICS
 
 if TYPE_CHECKING:
+    from simulator.buffs import Buff
     from simulator.records import UnitType
     from simulator.world import World
 
 INSTANT_TURN_DEG: Final = 180.0
-NO_SCAN: Final = -1.0
 
 
 class Layer(IntEnum):
@@ -35,6 +37,7 @@ def layer_of(unit: UnitType) -> Layer:
 def body_traits(world: World, slot: int) -> None:
     """Write all traits of a slot; see the traits of ``columns``."""
     unit = world.unit_type(slot)
+    kinds = kinds_on(world, slot)
     at = (int(world.owner[slot]), unit.row)
     turn_deg = unit.turn_deg_n / LOOPS_PER_NORMAL_SECOND
     turn = math.radians(min(turn_deg, INSTANT_TURN_DEG))
@@ -56,15 +59,82 @@ def body_traits(world: World, slot: int) -> None:
     world.walled[slot] = len(world.footprint_cells(slot)) > 0
     world.priority[slot] = unit.priority
     world.targetable[slot] = not (unit.untargetable or unit.invulnerable)
-    _weapon_traits(world, slot, unit)
+    world.cloaked[slot] = unit.cloaked
+    world.sight[slot] = world.stats.sight[at]
+    world.detects[slot] = unit.detect
+    weapon_traits(world, slot, unit, kinds)
+    _plain(world, slot)
+    for kind in kinds:
+        _change(world, slot, kind)
+    if kinds or world.build_progress[slot] < 1.0:
+        _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
 
 
-def _weapon_traits(world: World, slot: int, unit: UnitType) -> None:
-    owner = int(world.owner[slot])
-    ground, air = unit.weapon_against("ground"), unit.weapon_against("air")
-    world.ground_weapon[slot] = -1 if ground is None else ground.row
-    world.air_weapon[slot] = -1 if air is None else air.row
-    world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
-    world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
-    armed = ground is not None or air is not None
-    world.acquires[slot] = armed and not (unit.defensive or unit.uncommandable) and owner != 0
+# buffs ----------------------------------------------------------------------------------------------------------------
+
+
+def _plain(world: World, slot: int) -> None:
+    """What a unit is like without any buff."""
+    world.attack_rate[slot] = world.taken_factor[slot] = world.dealt_factor[slot] = 1.0
+    for column in (
+        world.range_add, world.armor_add, world.shield_armor_add, world.ranged_add, world.melee_add,
+    ):  # fmt: skip
+        column[slot] = 0.0
+    world.can_act[slot] = world.can_attack[slot] = world.can_cast[slot] = True
+    if world.hallucination[slot]:
+        world.dealt_factor[slot] = 0.0
+
+
+def _change(world: World, slot: int, buff: Buff) -> None:
+    """Apply the numbers of one buff."""
+    second = LOOPS_PER_NORMAL_SECOND
+    world.step_max[slot] = (world.step_max[slot] + buff.speed_add_n / second) * buff.speed * buff.time
+    if buff.speed_max_n is not None:
+        world.step_max[slot] = min(float(world.step_max[slot]), buff.speed_max_n / second)
+    world.step_gain[slot] = world.step_gain[slot] * buff.acceleration + buff.acceleration_add_n / second**2
+    world.attack_rate[slot] *= buff.attack_rate * buff.time
+    world.range_add[slot] += buff.range_add
+    world.armor_add[slot] += buff.armor_add
+    world.shield_armor_add[slot] += buff.shield_armor_add
+    world.sight[slot] += buff.sight_add
+    world.detects[slot] = max(float(world.detects[slot]), buff.detect)
+    world.life_max[slot] += buff.life_max_add
+    world.life_regen[slot] += buff.life_regen_n / second
+    world.shield_regen[slot] += buff.shields_regen_n / second
+    world.energy_regen[slot] += buff.energy_regen_n / second
+    if buff.dealt_fraction:
+        world.dealt_factor[slot] *= dict(buff.dealt_fraction).get("Ranged", 1.0)
+    response = buff.response
+    if response is not None and response.on == "defender" and not response.limit:
+        world.ranged_add[slot] += response.add * ("ranged" not in response.not_kinds)
+        world.melee_add[slot] += response.add * ("melee" not in response.not_kinds)
+        world.taken_factor[slot] *= response.factor
+
+
+def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
+    """Apply what buffs, or being under construction, forbid or hide."""
+    unfinished = world.build_progress[slot] < 1.0
+    helpless = unfinished or bool(flags & {"stunned", "stasis"})
+    world.can_act[slot] = not (helpless or "uncommandable" in flags)
+    world.can_cast[slot] = not (helpless or "silenced" in flags)
+    world.can_attack[slot] = not (helpless or "disarmed" in flags)
+    if not world.can_attack[slot] or "passive" in flags:
+        world.acquires[slot] = False
+    if helpless or "rooted" in flags:
+        world.step_max[slot] = 0.0
+    if helpless or "unturning" in flags:
+        world.turn_cos[slot], world.turn_sin[slot] = 1.0, 0.0
+    if flags & {"invulnerable", "stasis"}:
+        world.targetable[slot] = False
+    world.cloaked[slot] = (world.cloaked[slot] or "cloak" in flags) and "uncloaked" not in flags
+    if "blind" in flags or unfinished:
+        world.detects[slot] = 0.0
+    if "bodiless" in flags:
+        world.layer_bits[slot] = 0
+    for name, column in (
+        ("no_life_regen", world.life_regen),
+        ("no_shield_regen", world.shield_regen),
+        ("no_energy_regen", world.energy_regen),
+    ):
+        if name in flags:
+            column[slot] = 0.0

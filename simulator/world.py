@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import geometry
+from simulator.buffs import Buffs
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
+from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
-from simulator.shots import Missiles, PendingHits
+from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.stats import Stats
 from simulator.traits import body_traits
 
@@ -31,8 +33,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
+    from simulator.fields import Field
     from simulator.maps import GameMap
+    from simulator.refusal import Refusal
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
@@ -50,6 +55,17 @@ class Death:
     type_id: int
     owner: int
     killer: int
+
+
+@dataclass(frozen=True, slots=True)
+class Mishap:
+    """A command that was given and could not be carried out in the end: at which loop, whose, which, and why."""
+
+    loop: int
+    player: int
+    tag: int
+    ability: int
+    refusal: Refusal
 
 
 class World(UnitColumns):
@@ -81,8 +97,18 @@ class World(UnitColumns):
         self.looked_at = -1  # the population that ``visible`` was written for
         self.missiles = Missiles()
         self.pending = PendingHits()
+        self.sweeps: list[Sweep] = []
+        self.buffs = Buffs()
+        self.fields: list[Field] = []
+        self.timers: dict[int, dict[str, float]] = {}  # slot -> cooldown's name -> loop at which it is over
+        self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
+        self.natured: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
+        self.natured_at = -1  # the population that this was written for
+        self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
+        self.mishaps: list[Mishap] = []
         self.deaths: list[Death] = []
         self.deaths_seen = 0  # how many of the deaths the triggers have been told about
+        self.script = ScriptMemory()
         self.ended = False
         self.queue: list[list[Order]] = []
         self.live: Ints = np.zeros(0, dtype=np.int64)
@@ -91,6 +117,8 @@ class World(UnitColumns):
         self.settled = -1  # the population among which no body touched another when all last stood still
         self.pairs: tuple[Floats, Floats, Floats] | None = None  # collision.pair_table of this population
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
+        self.mortal = False  # whether anybody's life is timed
+        self.hiding = False  # whether anybody is cloaked or burrowed
         self.creep_counts = bool(game_map.terrain.creep.any())
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
         self.stirred = True  # somebody walked in the last loop
@@ -111,15 +139,18 @@ class World(UnitColumns):
         self.type[slot] = unit.row
         self.owner[slot] = owner
         self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
-        self.heading[slot] = geometry.heading(facing)
+        self.heading[slot] = self.turret[slot] = geometry.heading(facing)
         self.life[slot] = self.stats.life_max[owner, unit.row] if unit.life_start is None else unit.life_start
         self.shields[slot] = self.stats.shields_max[owner, unit.row]
         self.energy[slot] = self.stats.energy_start[owner, unit.row]
-        self.cloaked[slot], self.burrowed[slot] = unit.cloaked, unit.burrowed
+        self.burrowed[slot] = unit.burrowed
         self.born_loop[slot] = self.loop
+        autocast = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
+        if autocast:
+            self.autocast[slot] = autocast
         self.queue[slot] = []
         self.looks_around[slot] = True
-        self.visible[:, slot] = not (self.fog or unit.cloaked or unit.burrowed)
+        self.visible[:, slot] = not (self.fog or unit.cloaked or unit.burrowed)  # vision looks closer
         self.visible[owner, slot] = True
         self.refresh(slot)
         self.ground.block(slot, self.footprint_cells(slot))
@@ -131,17 +162,77 @@ class World(UnitColumns):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        for column in (self.target, self.order_target, self.attacker):
+        for column in (self.target, self.order_target, self.attacker, self.carrier, self.addon):
             column[column == slot] = NOBODY
+        self.buffs.forget(slot)
+        self.timers.pop(slot, None)
+        self.autocast.pop(slot, None)
+        self.channelling.pop(slot, None)
         self.hurt = [pair for pair in self.hurt if slot not in pair]
         self.missiles.forget(slot)
         self.pending.forget(slot)
+        for sweep in self.sweeps:
+            sweep.forget(slot)
         self.ground.unblock(slot)
         self._population_changed()
 
     def refresh(self, slot: int) -> None:
-        """Write the traits of a slot from its type, its owner and the owner's upgrades."""
+        """Write the traits of a slot from its type, its owner, the owner's upgrades and the buffs that lie on it."""
         body_traits(self, slot)
+        self._look_after(slot)
+
+    def become(self, slot: int, unit: UnitType) -> None:
+        """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept."""
+        owner = int(self.owner[slot])
+        before = float(self.life_max[slot]) or 1.0
+        self.type[slot] = unit.row
+        self.burrowed[slot] = unit.burrowed
+        self.ground.unblock(slot)
+        self.refresh(slot)
+        self.ground.block(slot, self.footprint_cells(slot))
+        self.life[slot] = min(float(self.life[slot]) * float(self.life_max[slot]) / before, float(self.life_max[slot]))
+        self.shields[slot] = min(float(self.shields[slot]), float(self.stats.shields_max[owner, unit.row]))
+        self.energy[slot] = min(float(self.energy[slot]), float(self.stats.energy_max[owner, unit.row]))
+        wanted = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
+        self.autocast.pop(slot, None)
+        if wanted:
+            self.autocast[slot] = wanted
+        self.nav_loop[slot] = 0
+        self._population_changed()
+
+    def give(self, slot: int, owner: int) -> None:
+        """Hand a unit over to another player."""
+        self.owner[slot] = owner
+        self.refresh(slot)
+        self.visible[owner, slot] = True
+        self._population_changed()
+
+    def stow(self, slot: int, carrier: int) -> None:
+        """Take a unit out of the world into a carrier: it lives on, and nobody sees or touches it."""
+        self.carrier[slot] = carrier
+        self.walks[slot] = self.looks_around[slot] = self.holds[slot] = False
+        self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
+        self.wants[slot] = self.in_reach[slot] = False
+        self.visible[:, slot] = False
+        for column in (self.target, self.order_target):
+            column[column == slot] = NOBODY
+        self.target[slot] = NOBODY
+        self.ground.unblock(slot)
+        self._population_changed()
+
+    def unstow(self, slot: int, point: tuple[float, float]) -> None:
+        """Put a unit from its carrier back into the world."""
+        self.carrier[slot] = NOBODY
+        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
+        self.looks_around[slot] = True
+        self.visible[self.owner[slot], slot] = True
+        self.ground.block(slot, self.footprint_cells(slot))
+        self._population_changed()
+
+    def passengers(self, carrier: int) -> list[int]:
+        """Slots of the units inside a carrier, ascending."""
+        inside: list[int] = np.flatnonzero(self.alive & (self.carrier == carrier)).tolist()
+        return inside
 
     def slot_of(self, tag: int) -> int:
         """The slot of a living unit with this tag, or NOBODY."""
@@ -191,12 +282,13 @@ class World(UnitColumns):
         if kind is OrderKind.IDLE:
             fights = self.target[slot] != NOBODY
             return [Order(OrderKind.ATTACK_UNIT, ATTACK, self.tag_of(int(self.target[slot])))] if fights else []
-        targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW)
+        targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW) or self.order_target[slot] != NOBODY
+        pointless = targeted or kind is OrderKind.HOLD or not self.order_aimed[slot]
         current = Order(
             kind=kind,
             ability=int(self.order_ability[slot]),
             target=self.tag_of(int(self.order_target[slot])) if targeted else NO_TAG,
-            point=None if targeted or kind is OrderKind.HOLD else _point(self.order_point, slot),
+            point=None if pointless else _point(self.order_point, slot),
             origin=_point(self.order_origin, slot) if kind is OrderKind.PATROL else None,
         )
         return [current, *self.queue[slot]]
@@ -231,17 +323,34 @@ class World(UnitColumns):
         sha.update(self._recycles[: self.top].tobytes())
         sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
         sha.update(repr([player.counters() for player in self.players]).encode())
-        sha.update(self.missiles.content() + self.pending.content())
+        sha.update(repr(self.script.content()).encode())
+        sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
+        sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
         sha.update(self.visibility.tobytes())
         return sha.hexdigest()
 
     def _population_changed(self) -> None:
-        self.live = np.flatnonzero(self.alive)
+        self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.pairs = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
         self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
+        self.mortal = bool(self.expires.any())
+        self.hiding = bool((self.cloaked | self.burrowed).any())
+
+    def _look_after(self, slot: int) -> None:
+        """Note what the changed traits of a unit mean for laws that pass over worlds without such units."""
+        shields, life, energy = self.regenerating
+        self.regenerating = (
+            shields or bool(self.shield_regen[slot]),
+            life or bool(self.life_regen[slot]),
+            energy or bool(self.energy_regen[slot]),
+        )
+        self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
+        self.pairs = None
+        self.looked_at = -1
+        self.scan_now = True
 
     def _free_slot(self) -> int:
         free = np.flatnonzero(~self.alive[1 : self.top])

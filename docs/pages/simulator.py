@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import simulator.api
 from docs.pages.markdown import code, codes, head, join, prose, table
 from simulator.api import layers
-from simulator.api.abilities import ABILITIES
 from simulator.api.data import rows as api_rows
 from simulator.api.requests import HANDLERS
+from simulator.casting import is_modelled
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
 from simulator.install import BASE_BUILD
 from simulator.maps import load_map, map_names
@@ -80,7 +80,8 @@ def _law(system: Callable[[World], None]) -> str:
 
 def _abilities() -> str:
     listed = {int(row["ability_id"]): row for row in api_rows("abilities")}
-    rows = [(code(ability.id), listed[ability.id]["friendly_name"]) for ability in ABILITIES]
+    known = [ability for ability in load_catalog().abilities if is_modelled(ability)]
+    rows = [(code(ability.id), ability.name) for ability in known]
     return join(
         f"The game's API lists {len(listed)} abilities. These are carried out, by their specific or their general id; "
         "every other one is answered with `NotSupported`.",

@@ -1,41 +1,35 @@
-"""Abilities: which unit has which, what a requested id means to it, and how the world is told.
+"""Commands: which ability a requested id means to each unit, how the world is told, and what came of it.
 
 Clients name an ability by its general or by its specific id. A general one stands for whichever specific one each
 unit has: Attack (3674) is an attack (23) to a Stalker and a scan-move (19) to an Observer. What a command was in the
-end is reported back with the specific id. The table holds what the world can do, and no more.
+end is reported back with the specific id.
 
-Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py`.
+Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves and fights), `casting.py` (the rest).
 """
 
 from __future__ import annotations
 
 import dataclasses
-import enum
 import functools
 import math
 from typing import TYPE_CHECKING, TypeAlias
 
 from s2clientprotocol import error_pb2
 
-from simulator import commands, orders
+from simulator import casting, commands
+from simulator.abilities import Aim
+from simulator.casts import Cast
+from simulator.refusal import Refusal
 from simulator.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.records import UnitType
+    from simulator.catalog import Ability, Catalog
     from simulator.world import World
 
     Point = tuple[float, float]
     Result: TypeAlias = error_pb2.ActionResult.ValueType
-
-
-class Target(enum.Flag):
-    """What an ability can be aimed at."""
-
-    NONE = enum.auto()
-    POINT = enum.auto()
-    UNIT = enum.auto()
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -49,11 +43,11 @@ class Command:
     queue: bool = False
 
     @property
-    def aim(self) -> Target:
+    def aim(self) -> Aim:
         """The kind of its target."""
         if self.target != NO_TAG:
-            return Target.UNIT
-        return Target.NONE if self.point is None else Target.POINT
+            return Aim.UNIT
+        return Aim.NONE if self.point is None else Aim.POINT
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -65,20 +59,125 @@ class Outcome:
     slots: tuple[int, ...] = ()
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Ability:
-    """A specific ability; `give` tells the world, and returns the slots that took the order."""
+def _refused(why: Refusal) -> Outcome:
+    result: Result = error_pb2.ActionResult.Value(error_pb2.ActionResult.Name(int(why)))  # type: ignore[arg-type]  # same numbers
+    return Outcome(result)
 
-    id: int
-    general: int
-    targets: Target
-    usable: Callable[[UnitType], bool]
-    give: Callable[[World, list[int], Command], list[int]]
 
-    @property
-    def requires_point(self) -> bool:
-        """Whether it must be aimed, as the API's list of available abilities says it."""
-        return Target.NONE not in self.targets
+def meant(catalog: Catalog, row: int, requested: int) -> Ability | None:
+    """What a requested id, general or specific, means to units of the type in this row; None for nothing."""
+    card = catalog.abilities_of(row) if requested > 0 else ()
+    exact = next((a for a in card if a.id == requested), None)
+    if exact is not None:
+        return exact
+    return next((a for a in card if a.general == requested and casting.is_modelled(a)), None)
+
+
+@functools.lru_cache(maxsize=2048)
+def aims_of(catalog: Catalog, requested: int) -> Aim:
+    """What an ability, by its general or specific id, can be aimed at; nothing for one that is not known."""
+    aims = Aim(0)
+    for ability in catalog.abilities:
+        if requested in (ability.id, ability.general):
+            aims |= ability.aim
+    return aims
+
+
+def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
+    """What a unit can be told to do now, by ascending id; ``free`` looks at no cost and no cooldown."""
+    card = world.catalog.abilities_of(int(world.type[slot]))
+    return [a for a in card if casting.refusal(world, slot, a, free=free) is Refusal.SUCCESS]
+
+
+def judge(world: World, player: int, command: Command) -> Outcome:
+    """How a command would go now, without giving it."""
+    slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
+    own = [slot for slot in slots if world.owner[slot] == player]
+    if not own:
+        return _refused(Refusal.YOU_CANT_CONTROL_THAT_UNIT if slots else Refusal.ERROR)
+    if command.point is not None and not all(map(math.isfinite, command.point)):
+        return _refused(Refusal.MUST_TARGET_VISIBLE_LOCATION)
+    groups = _groups(world, own, command.ability)
+    if not groups:
+        return _refused(Refusal.NOT_SUPPORTED)
+    able: list[tuple[Ability, list[int]]] = []
+    why = Refusal.ERROR
+    for ability, some in groups:
+        results = [(slot, _refusal(world, player, slot, ability, command)) for slot in some]
+        takers = [slot for slot, result in results if result is Refusal.SUCCESS]
+        if takers:
+            able.append((ability, takers))
+        elif not able:
+            why = results[0][1]
+    if not able:
+        return _refused(why)
+    return Outcome(error_pb2.Success, _name_of(able), tuple(slot for _, some in able for slot in some))
+
+
+def carry_out(world: World, player: int, command: Command) -> Outcome:
+    """Gives a command to the units that can take it; the others are left alone."""
+    outcome = judge(world, player, command)
+    if outcome.result != error_pb2.Success:
+        return outcome
+    taken: list[int] = []
+    for ability, slots in _groups(world, list(outcome.slots), command.ability):
+        taken += _give(world, ability, slots, command)
+    if not taken:
+        return _refused(Refusal.ORDER_QUEUE_IS_FULL if command.queue else Refusal.ERROR)
+    return Outcome(error_pb2.Success, outcome.ability, tuple(taken))
+
+
+def _name_of(able: list[tuple[Ability, list[int]]]) -> int:
+    """The id by which a command of several kinds is reported: that of a fight before that of a walk."""
+    return max(able, key=lambda group: (group[0].does == "attack", -group[0].id))[0].id
+
+
+def _groups(world: World, slots: list[int], requested: int) -> list[tuple[Ability, list[int]]]:
+    """The specific abilities that a requested id stands for, with the units that have each, by ascending id."""
+    groups: dict[int, tuple[Ability, list[int]]] = {}
+    for slot in slots:
+        ability = meant(world.catalog, int(world.type[slot]), requested)
+        if ability is not None and casting.is_modelled(ability):
+            groups.setdefault(ability.id, (ability, []))[1].append(slot)
+    return [groups[number] for number in sorted(groups)]
+
+
+def _refusal(world: World, player: int, slot: int, ability: Ability, command: Command) -> Refusal:
+    if not command.aim & ability.aim:
+        aimless = Aim.POINT not in ability.aim
+        return Refusal.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
+            Refusal.ERROR if aimless else Refusal.MUST_TARGET_VISIBLE_LOCATION
+        )  # fmt: skip
+    target = NOBODY
+    if command.aim is Aim.UNIT:
+        target = world.slot_of(command.target)
+        if target == NOBODY or not world.visible[player, target]:
+            return Refusal.MUST_TARGET_VISIBLE_UNIT
+    why = casting.refusal(world, slot, ability)
+    if why is not Refusal.SUCCESS:
+        return why
+    if ability.does == "attack" and target != NOBODY:
+        return _cant_attack(world, slot, target)
+    if ability.does in casting.ORDINARY:
+        return Refusal.SUCCESS
+    return casting.aim_refusal(world, Cast(slot, ability, target, command.point))
+
+
+def _cant_attack(world: World, slot: int, target: int) -> Refusal:
+    if slot != target and commands.can_reach(world, slot, target):
+        return Refusal.SUCCESS
+    flies = world.unit_type(target).flying
+    return Refusal.CANT_TARGET_AIR_UNITS if flies else Refusal.CANT_TARGET_THAT_UNIT
+
+
+# giving ---------------------------------------------------------------------------------------------------------------
+
+
+def _give(world: World, ability: Ability, slots: list[int], command: Command) -> list[int]:
+    give = GIVE.get(ability.does)
+    if give is not None:
+        return give(world, slots, command)
+    return casting.use(world, slots, ability, target=command.target, point=command.point, queue=command.queue)
 
 
 def _move(world: World, slots: list[int], command: Command) -> list[int]:
@@ -88,8 +187,8 @@ def _move(world: World, slots: list[int], command: Command) -> list[int]:
 
 
 def _patrol(world: World, slots: list[int], command: Command) -> list[int]:
-    x, y = command.point or world.pos[world.slot_of(command.target)]
-    return commands.patrol(world, slots, (float(x), float(y)), queue=command.queue)
+    x, y = command.point or world.pos[world.slot_of(command.target)].tolist()
+    return commands.patrol(world, slots, (x, y), queue=command.queue)
 
 
 def _attack(world: World, slots: list[int], command: Command) -> list[int]:
@@ -116,91 +215,13 @@ def _smart(world: World, slots: list[int], command: Command) -> list[int]:
     return commands.smart(world, slots, point=command.point, target=command.target, queue=command.queue)
 
 
-def _can_act(unit: UnitType) -> bool:
-    return commands.can_move(unit) or commands.can_attack(unit)
-
-
-def _can_only_look(unit: UnitType) -> bool:
-    return commands.can_move(unit) and not commands.can_attack(unit)
-
-
-_AIMED = Target.POINT | Target.UNIT
-ABILITIES = (
-    Ability(orders.SMART, orders.SMART, _AIMED, _can_act, _smart),
-    Ability(orders.STOP, 3665, Target.NONE, _can_act, _stop),
-    Ability(orders.MOVE, 3794, _AIMED, commands.can_move, _move),
-    Ability(orders.PATROL, 3795, _AIMED, commands.can_move, _patrol),
-    Ability(orders.HOLD_POSITION, 3793, Target.NONE, commands.can_move, _hold),
-    Ability(orders.ATTACK, 3674, _AIMED, commands.can_attack, _attack),
-    Ability(orders.SCAN_MOVE, 3674, _AIMED, _can_only_look, _scan_move),
-)
-"""Of several that one general id stands for, the first that a unit of the group can use names the command."""
-
-
-@functools.lru_cache(maxsize=1024)
-def abilities_of(unit: UnitType) -> tuple[Ability, ...]:
-    """What units of a type can be told to do, by ascending id."""
-    return tuple(sorted((a for a in ABILITIES if a.usable(unit)), key=lambda ability: ability.id))
-
-
-@functools.lru_cache(maxsize=1024)
-def aims_of(requested: int) -> Target:
-    """What an ability, by its general or specific id, can be aimed at; nothing for one that is not known."""
-    aims = Target(0)
-    for ability in ABILITIES:
-        if requested in (ability.id, ability.general):
-            aims |= ability.targets
-    return aims
-
-
-def judge(world: World, player: int, command: Command) -> Outcome:
-    """How a command would go now, without giving it."""
-    slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
-    own = [slot for slot in slots if world.owner[slot] == player]
-    able = _able(world, own, command.ability)
-    if not own:
-        return Outcome(error_pb2.YouCantControlThatUnit if slots else error_pb2.Error)
-    if not able:
-        return Outcome(error_pb2.NotSupported)
-    if problem := _wrong_aim(world, player, command, *able[0]):
-        return Outcome(problem)
-    return Outcome(error_pb2.Success, able[0][0].id, tuple(slot for _, some in able for slot in some))
-
-
-def carry_out(world: World, player: int, command: Command) -> Outcome:
-    """Gives a command to the units that can take it; the others are left alone."""
-    outcome = judge(world, player, command)
-    if outcome.result != error_pb2.Success:
-        return outcome
-    taken: list[int] = []
-    for ability, slots in _able(world, list(outcome.slots), command.ability):
-        taken += ability.give(world, slots, command)
-    if not taken:
-        return Outcome(error_pb2.OrderQueueIsFull if command.queue else error_pb2.Error)
-    return Outcome(error_pb2.Success, outcome.ability, tuple(taken))
-
-
-def _able(world: World, slots: list[int], requested: int) -> list[tuple[Ability, list[int]]]:
-    """The specific abilities that a requested id stands for, with the units that have each."""
-    meant = [ability for ability in ABILITIES if requested in (ability.id, ability.general)]
-    groups = ((a, [slot for slot in slots if a.usable(world.unit_type(slot))]) for a in meant)
-    return [(ability, some) for ability, some in groups if some]
-
-
-def _wrong_aim(world: World, player: int, command: Command, ability: Ability, takers: list[int]) -> Result | None:
-    if not command.aim & ability.targets:
-        return error_pb2.MustTargetVisibleLocation if Target.POINT in ability.targets else error_pb2.Error
-    if command.point is not None and not all(map(math.isfinite, command.point)):
-        return error_pb2.MustTargetVisibleLocation
-    if command.aim is Target.UNIT:
-        return _wrong_unit(world, player, ability, takers, command.target)
-    return None
-
-
-def _wrong_unit(world: World, player: int, ability: Ability, takers: list[int], tag: int) -> Result | None:
-    target = world.slot_of(tag)
-    if target == NOBODY or not world.visible[player, target]:
-        return error_pb2.MustTargetVisibleUnit
-    if ability.id != orders.ATTACK or any(s != target and commands.can_reach(world, s, target) for s in takers):
-        return None
-    return error_pb2.CantTargetAirUnits if world.unit_type(target).flying else error_pb2.CantTargetThatUnit
+GIVE: dict[str, Callable[[World, list[int], Command], list[int]]] = {
+    "smart": _smart,
+    "stop": _stop,
+    "move": _move,
+    "patrol": _patrol,
+    "hold_position": _hold,
+    "attack": _attack,
+    "scan_move": _scan_move,
+}
+"""What is no skill; everything else goes through ``casting.use``."""

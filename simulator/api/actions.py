@@ -17,8 +17,9 @@ import numpy as np
 from s2clientprotocol import error_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator.abilities import Aim
 from simulator.api import abilities, clicks
-from simulator.api.abilities import Command, Outcome, Target
+from simulator.api.abilities import Command, Outcome
 from simulator.api.selection import at_point, panel_order
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand) -> Co
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
         point = seat.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
-        if Target.UNIT in abilities.aims_of(message.ability_id):
+        if Aim.UNIT in abilities.aims_of(seat.world.catalog, message.ability_id):
             sight = seat.look()
             row = at_point(sight, seat.types, point, seat.screen.scale / 2)
             if row is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import error_pb2, query_pb2
 
-from simulator.api.abilities import abilities_of
+from simulator.api.abilities import usable
 from simulator.traits import Layer
 from simulator.world import NOBODY
 
@@ -25,19 +25,22 @@ def answer(seat: Seat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQue
     """One answer to each question, in their order."""
     return query_pb2.ResponseQuery(
         pathing=[query_pb2.ResponseQueryPathing(distance=_distance(seat, question)) for question in request.pathing],
-        abilities=[_abilities(seat, question.unit_tag) for question in request.abilities],
+        abilities=[
+            _abilities(seat, question.unit_tag, ignore_cost=request.ignore_resource_requirements)
+            for question in request.abilities
+        ],
         placements=[query_pb2.ResponseQueryBuildingPlacement(result=_place(seat, q)) for q in request.placements],
     )
 
 
-def _abilities(seat: Seat, tag: int) -> query_pb2.ResponseQueryAvailableAbilities:
+def _abilities(seat: Seat, tag: int, *, ignore_cost: bool) -> query_pb2.ResponseQueryAvailableAbilities:
     answer = query_pb2.ResponseQueryAvailableAbilities(unit_tag=tag)
     slot = seat.world.slot_of(tag)
     if slot != NOBODY:
         unit = seat.world.unit_type(slot)
         answer.unit_type_id = unit.id
         if seat.world.owner[slot] == seat.player:
-            for ability in abilities_of(unit):
+            for ability in usable(seat.world, slot, free=ignore_cost):
                 answer.abilities.add(ability_id=ability.id, requires_point=ability.requires_point)
     return answer
 

@@ -37,7 +37,8 @@ def choose_targets(world: World) -> None:
         return
     world.scan_now = False
     n = world.top
-    due = world.acquires[:n] & world.looks_around[:n]
+    due = world.looks_around[:n] | (world.guns_walking[:n] & world.walks[:n])
+    due &= world.acquires[:n]
     due &= ~world.in_reach[:n]
     due &= world.scan_loop[:n] <= world.loop
     due &= world.windup[:n] < 0.0
@@ -61,9 +62,15 @@ def _give_up(world: World, seekers: Ints) -> None:
     offset = world.pos[chasing] - world.guard[chasing]
     idle = world.order_kind[chasing] == IDLE
     too_far = idle & (offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_radius**2)
-    lost = too_far | world.holds[chasing] | ~_seen(world, chasing)
+    lost = too_far | _stays(world, chasing) | ~_seen(world, chasing)
     for slot in chasing[lost].tolist():
         disengage(world, slot)
+
+
+def _stays(world: World, slots: Ints) -> Bools:
+    """Whether each unit goes after nobody: it holds its place, or fires only at what it passes."""
+    stays: Bools = world.holds.take(slots) | ~world.looks_around.take(slots)
+    return stays
 
 
 def _seen(world: World, slots: Ints) -> Bools:
@@ -103,10 +110,17 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
         np.where(planes & GROUND_PLANE, world.ground_scan[seekers, None], -1.0),
         np.where(planes & AIR_PLANE, world.air_scan[seekers, None], -1.0),
     )
-    holding = world.holds.take(seekers)
+    holding = _stays(world, seekers)
     if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
-    worth = np.where(gap <= sight, world.priority[foes] * PRIORITY_WEIGHT - gap, OUT_OF_SIGHT)
+    wanted = gap <= sight
+    least = world.least_range.take(seekers)
+    if some(least > 0.0):
+        wanted &= gap >= least[:, None]
+    sparing = world.spares_structures.take(seekers)
+    if some(sparing):
+        wanted &= ~(sparing[:, None] & world.walled.take(foes))
+    worth = np.where(wanted, world.priority[foes] * PRIORITY_WEIGHT - gap, OUT_OF_SIGHT)
     return gap, worth
 
 
@@ -117,6 +131,7 @@ def _longest_reach(world: World, slots: Ints) -> Floats:
         np.where(ground >= 0, world.stats.range[owner, ground], 0.0),
         np.where(air >= 0, world.stats.range[owner, air], 0.0),
     )
+    reach += world.range_add.take(slots)
     return reach
 
 
@@ -125,7 +140,7 @@ def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
     owner = world.owner[seekers]
     on_ground = (world.plane_bits[foes] & GROUND_PLANE != 0) & (world.ground_weapon[seekers] >= 0)
     weapon = np.where(on_ground, world.ground_weapon[seekers], world.air_weapon[seekers])
-    reaches: Bools = gap <= world.stats.range[owner, weapon]
+    reaches: Bools = gap <= world.stats.range[owner, weapon] + world.range_add.take(seekers)
     return reaches
 
 

@@ -7,109 +7,117 @@ fraction before armor. The formula's source is in ``data/SOURCES.md``.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
-from simulator.arrays import some
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, GROUND_PLANE
-from simulator.systems import weapons
 
 if TYPE_CHECKING:
-    from simulator.columns import Bools, Ints
-    from simulator.records import Affects, Sweep
+    from simulator.columns import Ints
+    from simulator.records import Affects, Search
+    from simulator.shots import Shot
     from simulator.stats import Damage
     from simulator.world import World
 
 BEHIND = 1e-9
 
 
-class Shot(NamedTuple):
-    """One row of ``shots`` as Python values."""
-
-    source: int
-    owner: int
-    target: int
-    weapon: int
-    hit: int
-    start: tuple[float, float]
-    goal: tuple[float, float]
-
-
-def shot_of(row: np.void) -> Shot:
-    """The shot in a row of either table of ``shots``."""
-    source, owner, target, weapon, hit = (int(row[name]) for name in Shot._fields[:5])
-    start, goal = row["start"].tolist(), row["goal"].tolist()
-    return Shot(source, owner, target, weapon, hit, (start[0], start[1]), (goal[0], goal[1]))
-
-
-def deal_pending(world: World) -> None:
-    """Let every hit that is due happen, in the order of being fired; those of a dead attacker are lost."""
-    pending = world.pending
-    if not len(pending):
-        return
-    due = pending.rows["due"] <= world.loop
-    if not some(due):
-        return
-    alive = pending.target != NOBODY
-    pending.rows["goal"] = np.where(alive[:, None], world.pos.take(pending.target, 0), pending.goal)
-    rows = pending.rows[due]
-    pending.keep(~due)
-    for row, begun, single in zip(rows, rows["due"].tolist(), rows["single"].tolist(), strict=True):
-        shot = shot_of(row)
-        if shot.source == NOBODY:
-            continue
-        hit = world.catalog.weapons[shot.weapon].hits[shot.hit]
-        if single:
-            _hit_target(world, shot, world.stats.damage[shot.owner][shot.weapon][shot.hit])
-        elif hit.missile_speed_n is not None:
-            weapons.launch(world, shot, hit)
-        elif hit.sweep is not None:
-            _sweep(world, shot, hit.sweep, begun)
-        else:
-            hit_with(world, shot)
-
-
 def hit_with(world: World, shot: Shot) -> None:
-    """Carry out one hit: on its target, and in the rings around it."""
+    """Carry out one hit: on its target, in the rings around it, or on whom a second search finds."""
     damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
-    if damage.hit.area:
+    if damage.hit.kills_self:
+        _give_life(world, shot.source)
+    elif damage.hit.search is not None and not damage.hit.bounce:
+        for slot in found_by(world, damage.hit.search, shot):
+            strike(world, shot.source, shot.owner, slot, damage)
+    elif damage.hit.area:
         _splash(world, shot, damage)
-        if not damage.hit.area_affects.not_target:
-            return
-    _hit_target(world, shot, damage)
-    if damage.hit.kills_self and shot.source != NOBODY:
-        world.life[shot.source] = 0.0
+        if damage.hit.area_affects.not_target:
+            hit_target(world, shot)
+    else:
+        hit_target(world, shot)
 
 
-def _hit_target(world: World, shot: Shot, damage: Damage) -> None:
+def hit_target(world: World, shot: Shot) -> None:
+    """Carry out a hit on its target alone, if that still lives."""
     if shot.target != NOBODY:
-        strike(world, shot.source, shot.owner, shot.target, damage)
+        strike(world, shot.source, shot.owner, shot.target, world.stats.damage[shot.owner][shot.weapon][shot.hit])
+
+
+def _give_life(world: World, slot: int) -> None:
+    """A unit dies of its own attack; nobody is credited with that."""
+    if slot != NOBODY:
+        world.life[slot] = 0.0
+        world.spent[slot] = True
+        world.attacker[slot] = NOBODY
 
 
 def strike(world: World, source: int, owner: int, victim: int, damage: Damage, fraction: float = 1.0) -> None:
     """Take one hit's damage from one unit and count it in both players' scores."""
-    row, side = int(world.type[victim]), int(world.owner[victim])
-    if not world.targetable[victim] or world.life[victim] <= 0.0:
+    amount = damage.against(int(world.stats.attribute_bits[world.type[victim]])) * fraction
+    kind = "splash" if fraction < 1.0 else damage.hit.kind
+    if source != NOBODY:
+        amount *= float(world.dealt_factor[source])
+    wound(world, source, owner, victim, amount, kind=kind, pierces=damage.hit.ignores_armor)
+
+
+def wound(
+    world: World,
+    source: int,
+    owner: int,
+    victim: int,
+    amount: float,
+    *,
+    kind: str = "spell",
+    pierces: bool = True,
+    shield_bonus: float = 0.0,
+) -> None:
+    """Take an amount of damage from one unit: shields first, then life, and both players' scores remember it.
+
+    Args:
+        world: The game.
+        source: Slot of the unit that deals it, or NOBODY.
+        owner: Whose damage it is.
+        victim: Slot of the unit that takes it; one that can't be touched takes none.
+        amount: Before armor, bonuses included.
+        kind: ``ranged``, ``melee``, ``splash`` or ``spell``; buffs answer to it.
+        pierces: Whether armor does not count.
+        shield_bonus: More damage that only shields take.
+    """
+    if not world.targetable[victim] or world.life[victim] <= 0.0 or amount <= 0.0 >= shield_bonus:
         return
-    amount = damage.against(int(world.stats.attribute_bits[row])) * fraction
-    pierces = damage.hit.ignores_armor
-    shield_armor = 0.0 if pierces else float(world.stats.shield_armor[side, row])
-    armor = 0.0 if pierces else float(world.stats.armor[side, row])
+    row, side = int(world.type[victim]), int(world.owner[victim])
+    answer = world.ranged_add if kind == "ranged" else world.melee_add if kind == "melee" else None
+    if answer is not None and answer[victim]:
+        amount = max(amount + float(answer[victim]), MECHANICS.damage_min)
+    amount *= float(world.taken_factor[victim])
+    if world.barrier[victim] > 0.0:
+        held = min(float(world.barrier[victim]), amount)
+        world.barrier[victim] -= held
+        amount -= held
+    shield_armor = 0.0 if pierces else float(world.stats.shield_armor[side, row] + world.shield_armor_add[victim])
+    armor = 0.0 if pierces else float(world.stats.armor[side, row] + world.armor_add[victim])
     shields, life = float(world.shields[victim]), float(world.life[victim])
+    least = MECHANICS.damage_min if amount > 0.0 else 0.0
     absorbed, rest = 0.0, amount
     if shields > 0.0:
-        reduced = max(amount - shield_armor, MECHANICS.damage_min)
+        reduced = max(amount + shield_bonus - shield_armor, least)
         absorbed = min(shields, reduced)
-        rest = reduced - absorbed
-    wounded = min(life, max(rest - armor, MECHANICS.damage_min)) if rest > 0.0 else 0.0
+        rest = max(min(reduced, amount) - absorbed, 0.0)
+    wounded = min(life, max(rest - armor, least)) if rest > 0.0 else 0.0
     world.shields[victim] = shields - absorbed
     world.life[victim] = life - wounded
     world.damaged_loop[victim] = world.loop
+    _count(world, owner, side, absorbed, wounded)
+    if source != NOBODY:
+        world.attacker[victim] = source
+        world.hurt.append((victim, source))
+
+
+def _count(world: World, owner: int, side: int, absorbed: float, wounded: float) -> None:
     taken = world.players[side].score.damage_taken
     taken.shields += absorbed
     taken.life += wounded
@@ -117,15 +125,12 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
         dealt = world.players[owner].score.damage_dealt
         dealt.shields += absorbed
         dealt.life += wounded
-    if source != NOBODY:
-        world.attacker[victim] = source
-        world.hurt.append((victim, source))
 
 
 def _splash(world: World, shot: Shot, damage: Damage) -> None:
     """Damage everybody in the rings around the impact, each with the fraction of the innermost ring it is in."""
     hit = damage.hit
-    near = _affected(world, hit.area_affects, shot)
+    near = affected(world, hit.area_affects, shot)
     offset = world.pos[near] - shot.goal
     edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
     forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
@@ -145,43 +150,36 @@ def _in_arc(x: float, y: float, forward_x: float, forward_y: float, arc_deg: flo
     return bool(along >= np.cos(np.radians(arc_deg / 2.0)) * lengths - BEHIND)
 
 
-def _sweep(world: World, shot: Shot, sweep: Sweep, begun: float) -> None:
-    """Lay a single hit for everybody on the line, at the delay of the first point that touches it.
+def found_by(world: World, search: Search, shot: Shot) -> list[int]:
+    """Slots that a second search finds, the nearest first; from the source its radius counts from the edge.
 
-    Whom the line touches is decided once, when it begins at the (fractional) loop ``begun``.
+    Where the shot bounced from is not found again.
     """
-    forward_x, forward_y = shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1]
-    distance = math.sqrt(forward_x * forward_x + forward_y * forward_y)
-    fx, fy = (forward_x / distance, forward_y / distance) if distance > BEHIND else (0.0, -1.0)
-    near = _affected(world, sweep.affects, shot)
-    points = np.array(sweep.points)
-    across, along = points[:, 1], points[:, 2]
-    at = shot.goal + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
-    offset = world.pos[near][:, None, :] - at
-    touched: Bools = geometry.length(offset) <= sweep.radius + world.radius[near][:, None]
-    hits: Ints = np.flatnonzero(touched.any(axis=1))
-    if hits.size:
-        first = np.argmax(touched[hits], axis=1)
-        world.pending.append(
-            len(hits),
-            source=shot.source,
-            owner=shot.owner,
-            target=near[hits],
-            weapon=shot.weapon,
-            hit=shot.hit,
-            start=shot.start,
-            goal=world.pos[near[hits]],
-            due=begun - points[0, 0] + points[first, 0],
-            single=True,
-        )
+    near = affected(world, search.affects, shot)
+    forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
+    radius, origin = search.radius, shot.goal
+    if search.origin == "source":
+        radius += float(world.radius[shot.source]) if shot.source != NOBODY else 0.0
+        origin = shot.start
+    offset = world.pos[near] - origin
+    edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
+    order = np.argsort(edge, kind="stable").tolist()
+    found = [
+        int(near[i])
+        for i in order
+        if edge[i] <= radius and near[i] != shot.prior and _in_arc(*offset[i].tolist(), *forward, search.arc_deg)
+    ]
+    return found[: search.max_count] if search.max_count else found
 
 
-def _affected(world: World, affects: Affects, shot: Shot) -> Ints:
-    """Living units that a splash or a sweep may touch."""
+def affected(world: World, affects: Affects, shot: Shot) -> Ints:
+    """Living units that a splash, a search or a sweep may touch."""
     slots = world.live
     chosen = world.targetable[slots] & (world.life[slots] > 0.0)
     if not affects.allies:
         chosen &= world.owner[slots] != shot.owner
+    if not affects.neutral:
+        chosen &= world.owner[slots] != 0
     if affects.plane != "any":
         bit = GROUND_PLANE if affects.plane == "ground" else AIR_PLANE
         chosen &= (world.plane_bits[slots] & bit) != 0

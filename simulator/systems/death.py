@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from simulator.arrays import some
 from simulator.columns import NOBODY
+from simulator.skills import DEATHS
 from simulator.world import Death
 
 if TYPE_CHECKING:
@@ -25,10 +26,23 @@ def bury(world: World) -> None:
     for slot in slots[dead].tolist():
         attacker = int(world.attacker[slot])
         killer = int(world.owner[attacker]) if attacker != NOBODY else NO_KILLER
-        owner, unit = int(world.owner[slot]), world.unit_type(slot)
-        world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, killer))
-        _count(world, unit, owner, killer)
+        name = world.unit_type(slot).name
+        if name in DEATHS:
+            DEATHS[name](world, slot)
+        _note(world, slot, killer)
+        for passenger in world.passengers(slot):
+            world.life[passenger] = 0.0
+            _note(world, passenger, killer)
+            world.remove(passenger)
         world.remove(slot)
+
+
+def _note(world: World, slot: int, killer: int) -> None:
+    """Remember a death, and enter it into the scores unless it was a hallucination's."""
+    owner, unit = int(world.owner[slot]), world.unit_type(slot)
+    world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, killer))
+    if not world.hallucination[slot]:
+        _count(world, unit, owner, killer)
 
 
 def _count(world: World, unit: UnitType, owner: int, killer: int) -> None:

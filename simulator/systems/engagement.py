@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 EDGE_TOLERANCE = 1e-9
 ON_TARGET = 1e-9
 FOLLOW_GAP = 0.5
+ANYWHERE = 500.0
 FOLLOW = int(OrderKind.FOLLOW)
 
 
@@ -38,13 +39,17 @@ def measure(world: World) -> None:
     world.in_reach[:n] = False
     if some(world.needs_target[:n]):
         _follow(world)
+    if some(world.casts[:n]):
+        _approach(world)
     if some(world.returning[:n]):
         _go_back(world)
     if fighters.size:
         _close_in(world, fighters)
     if some(wants):
-        wants &= world.windup[:n] < 0.0
-        wants &= world.backswing[:n] <= 0.0
+        free = world.windup[:n] < 0.0
+        free &= world.backswing[:n] <= 0.0
+        free |= world.rolling[:n]
+        wants &= free
         wants &= world.step_max[:n] > 0.0
 
 
@@ -63,17 +68,25 @@ def _close_in(world: World, slots: Ints) -> None:
     gap = np.where(on_target, 0.0, distance) - bodies
     reach = world.reach.take(slots)
     swinging = world.windup.take(slots) >= 0.0
+    swinging |= world.beaming.take(slots)
     allowed = reach + EDGE_TOLERANCE
     beyond = gap > allowed
     near = ~beyond
     if some(swinging):
         near |= swinging & (gap <= reach + world.slop.take(slots))
     near &= gap >= world.reach_min.take(slots)
+    near &= world.can_attack.take(slots)
+    world.beaming[slots] &= near
     world.gap[slots] = gap
     world.in_reach[slots] = near
+    beyond &= ~near | world.rolling.take(slots)
+    beyond &= ~world.holds.take(slots)
+    passing = world.walks.take(slots) & ~world.looks_around.take(slots)
+    if some(passing):  # a unit that fires while it walks stays on its way
+        slots, goal, bodies, reach, beyond = (array[~passing] for array in (slots, goal, bodies, reach, beyond))
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
-    world.wants[slots] = beyond & ~world.holds[slots]
+    world.wants[slots] = beyond
 
 
 def _follow(world: World) -> None:
@@ -88,6 +101,24 @@ def _follow(world: World) -> None:
         world.goal[slots] = world.pos[leader]
         world.stop_at[slots] = stop_at
         world.wants[slots] = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) > stop_at + FOLLOW_GAP
+
+
+def _approach(world: World) -> None:
+    """Units that are to use an ability walk until it reaches, and stand from then on."""
+    for slot in which(world.casts[: world.top]).tolist():
+        target = int(world.order_target[slot])
+        ability = world.catalog.ability(int(world.order_ability[slot]))
+        aimed = target != NOBODY or bool(world.order_aimed[slot])
+        waits = world.cast_at[slot] < 0.0 and not world.channels[slot]
+        if not (aimed and waits) or ability.range >= ANYWHERE:
+            continue
+        goal = world.pos[target] if target != NOBODY else world.order_point[slot]
+        body = float(world.radius[target]) if target != NOBODY else 0.0
+        stop_at = ability.range + float(world.radius[slot]) + body
+        dx, dy = (goal - world.pos[slot]).tolist()
+        world.goal[slot] = goal
+        world.stop_at[slot] = max(stop_at - MECHANICS.chase_slack, 0.0)
+        world.wants[slot] = dx * dx + dy * dy > stop_at * stop_at
 
 
 def _go_back(world: World) -> None:

@@ -45,6 +45,7 @@ def _fighting_on_the_spot(world: World) -> tuple[Ints, Floats]:
     """Those who stand and fight, with the direction of their target; what can't turn keeps its heading."""
     fighters = world.fighters
     turning = world.aim_cos.take(fighters) > -1.0
+    turning &= ~world.turreted.take(fighters)
     turning &= ~world.wants.take(fighters)
     slots = fighters[turning]
     return slots, world.toward.take(slots, 0)

@@ -8,8 +8,6 @@ from simulator import commands
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
-from simulator.orders import Order, OrderKind
-from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -20,7 +18,7 @@ PACKED_AFTER_LOOPS = 2
 def carry_out(world: World) -> None:
     """End every order whose point is reached or whose target is gone, and begin what waits behind it."""
     for slot in _lost(world) + _arrived(world):
-        _next(world, slot)
+        commands.begin_next(world, slot)
 
 
 def _lost(world: World) -> list[int]:
@@ -39,7 +37,7 @@ def _lost(world: World) -> list[int]:
 def _arrived(world: World) -> list[int]:
     """Slots whose walk has reached its point, or as near as the crowd there or the terrain lets them."""
     n = world.top
-    walkers = which(world.walks[:n] & (world.target[:n] == NOBODY))
+    walkers = which(world.walks[:n] & ((world.target[:n] == NOBODY) | ~world.looks_around[:n]))
     if not walkers.size:
         return []
     offset = world.order_point.take(walkers, 0) - world.pos.take(walkers, 0)
@@ -65,20 +63,3 @@ def _packed(world: World, slot: int, squared: float) -> bool:
     inside = offset[:, 0] ** 2 + offset[:, 1] ** 2 < squared
     area = float((world.separation[friends[inside]] ** 2).sum())
     return area >= MECHANICS.crowd_share * squared
-
-
-def _next(world: World, slot: int) -> None:
-    """Begin the next order of a unit; a patrol turns round, targets that are gone are skipped."""
-    waiting = world.queue[slot]
-    if world.order_kind[slot] == OrderKind.PATROL and not waiting:
-        here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
-        world.order_point[slot], world.order_origin[slot] = there, here
-        world.nav_end[slot] = False
-        world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
-        return
-    order: Order | None = None
-    while waiting and order is None:
-        order = waiting.pop(0)
-        if order.target != NO_TAG and world.slot_of(order.target) == NOBODY:
-            order = None
-    commands.begin(world, slot, order)

@@ -22,14 +22,23 @@ def regenerate(world: World) -> None:
         _regain(world, world.life, world.life_max, world.life_regen, world.life_delay)
     if energy:
         _regain(world, world.energy, world.energy_max, world.energy_regen, None)
+        _drain(world)
 
 
 def _regain(world: World, amount: Floats, most: Floats, rate: Floats, delay: Floats | None) -> None:
     n = world.top
-    below = amount[:n] < most[:n]
+    below = (amount[:n] < most[:n]) & (rate[:n] > 0.0)
     if delay is not None and some(below):
         below &= world.damaged_loop[:n] < world.loop - delay[:n]
     if not some(below):
         return
     slots = which(below & (world.life[:n] > 0.0))
     amount[slots] = np.minimum(amount.take(slots) + rate.take(slots), most.take(slots))
+
+
+def _drain(world: World) -> None:
+    """Take energy from units that spend more than they regain; the rule that makes them spend looks at what is left."""
+    n = world.top
+    slots = which(world.energy_regen[:n] < 0.0)
+    if slots.size:
+        world.energy[slots] = np.maximum(world.energy.take(slots) + world.energy_regen.take(slots), 0.0)

@@ -1,7 +1,8 @@
 """Vision: what each player sees, where the map has a fog of war.
 
 A cell is visible when its centre is within the sight of a unit of the player's and not above the unit's own cliff
-level, unless the unit flies. On maps whose script takes the fog away everybody sees everything.
+level, unless the unit flies. On maps whose script takes the fog away everybody sees everything. Units that are cloaked
+or burrowed are seen where a detector of the player's, a scan, or a buff that reveals them looks.
 """
 
 from __future__ import annotations
@@ -25,22 +26,53 @@ VISIBLE = 2
 
 
 def look(world: World) -> None:
-    """Update ``visibility`` and ``visible``; where there is fog, every few loops."""
+    """Update ``visibility`` and ``visible``; where there is fog or somebody hides, every few loops."""
     n = world.top
-    if world.fog and (world.loop % MECHANICS.vision_period == 0 or world.looked_at != world.population):
+    changed = world.looked_at != world.population
+    due = world.loop % MECHANICS.vision_period == 0 or changed
+    if world.fog and due:
         for player in range(1, len(world.players)):
             _light(world, player)
-    if world.fog or world.looked_at != world.population:
+    if world.fog or changed or (world.hiding and due):
         for player in range(len(world.players)):
             world.visible[player, :n] = False
             world.visible[player, world.live] = _seen_units(world, player)
+        _reveal(world)
         world.looked_at = world.population
 
 
 def _seen_units(world: World, player: int) -> NDArray[np.bool_]:
-    hidden = (world.cloaked[world.live] | world.burrowed[world.live]) & (world.owner[world.live] != player)
-    seen: NDArray[np.bool_] = world.is_visible(player) & ~hidden
+    seen: NDArray[np.bool_] = world.is_visible(player)
+    if not world.hiding:
+        return seen
+    slots = world.live
+    own = world.owner[slots] == player
+    hidden = (world.cloaked[slots] | world.burrowed[slots]) & ~own
+    if hidden.any():
+        found = np.flatnonzero(hidden)
+        hidden[found[_detected(world, player, slots[found])]] = False
+    seen = seen & ~hidden
     return seen
+
+
+def _detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(k,) whether a detector or a scan of the player's reaches each unit's edge."""
+    eyes = world.units_of(player)
+    eyes = eyes[world.detects[eyes] > 0.0]
+    scans = [item for item in world.fields if item.detects and item.owner == player]
+    at = np.concatenate((world.pos[eyes], np.array([item.at for item in scans]).reshape(-1, 2)))
+    reach = np.concatenate((world.detects[eyes], np.array([item.radius for item in scans])))
+    offset = world.pos[slots][:, None, :] - at
+    near = offset[..., 0] ** 2 + offset[..., 1] ** 2 <= (reach + world.radius[slots, None]) ** 2
+    found: NDArray[np.bool_] = near.any(axis=1)
+    return found
+
+
+def _reveal(world: World) -> None:
+    """Show units under a revealing buff to whoever laid it on them."""
+    for row in world.buffs.rows:
+        if "revealed" in world.catalog.buffs[int(row["buff"])].flags:
+            world.visible[int(row["owner"]), int(row["slot"])] = True
 
 
 def _light(world: World, player: int) -> None:
@@ -49,8 +81,14 @@ def _light(world: World, player: int) -> None:
     np.minimum(grid, SEEN_BEFORE, out=grid)
     height, width = grid.shape
     cliff = world.map.terrain.cliff
+    for item in world.fields:
+        if item.sights and item.owner == player:
+            cells = _disc(item.sights) + np.array(item.at).astype(np.int64)
+            x, y = cells[:, 0], cells[:, 1]
+            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+            grid[y[inside], x[inside]] = VISIBLE
     for slot in world.units_of(player).tolist():
-        cells = _disc(float(world.stats.sight[player, world.type[slot]])) + world.pos[slot].astype(np.int64)
+        cells = _disc(float(world.sight[slot])) + world.pos[slot].astype(np.int64)
         x, y = cells[:, 0], cells[:, 1]
         inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
         x, y = x[inside], y[inside]

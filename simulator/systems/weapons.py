@@ -1,29 +1,34 @@
 """Weapons: attacks start when the target is in reach and the weapon is ready, and take effect at the damage point.
 
 The time from one start to the next is the period with a random delay; fractions of a loop carry over while the fight
-goes on, so that the mean is exact. What the attack then does, at once, later or by missile, is laid into ``pending``
-and ``missiles``.
+goes on, so that the mean is exact. A beam ticks once per period without any delay, for as long as its target stays
+within its slop. What the attack then does, at once, later or by missile, is laid into ``pending`` for ``hits``; weapons
+that send out units instead stand in ``LAUNCHERS``.
 """
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from simulator import geometry
 from simulator.arrays import some, which
-from simulator.catalog import LOOPS_PER_NORMAL_SECOND
-from simulator.stats import GROUND_PLANE, INSTANT_ACCELERATION_N
+from simulator.columns import NOBODY
+from simulator.stats import GROUND_PLANE
 
 if TYPE_CHECKING:
-    from simulator.columns import Bools, Ints
+    from collections.abc import Callable
+
+    from simulator.columns import Bools, Floats, Ints
     from simulator.records import Hit, Weapon
-    from simulator.systems.damage import Shot
     from simulator.world import World
 
 NOT_STARTED = -1.0
 LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadiusLarge
+
+LAUNCHERS: Final[dict[str, Callable[[World, int, int], None]]] = {}
+"""What happens at the damage point of a weapon that launches units: a function of the world, attacker and target."""
 
 
 def fire(world: World) -> None:
@@ -38,6 +43,9 @@ def fire(world: World) -> None:
         if some(started):
             windup -= started
             _drop_lost(world, which(started & ~world.in_reach[:n]))
+        turreted = fighters[world.turreted.take(fighters)]
+        if turreted.size:
+            _turn_turrets(world, turreted)
         ready = world.in_reach.take(fighters)
         ready &= cooldown.take(fighters) <= 0.0
         ready &= ~started.take(fighters)
@@ -57,106 +65,152 @@ def _drop_lost(world: World, lost: Ints) -> None:
         world.cooldown[lost] = 0.0
 
 
+def _turn_turrets(world: World, slots: Ints) -> None:
+    """Turn the turrets of units that fight towards their targets."""
+    world.turret[slots] = geometry.turn_towards(
+        world.turret.take(slots, 0),
+        world.toward.take(slots, 0),
+        world.turret_cos.take(slots),
+        world.turret_sin.take(slots),
+    )
+
+
 def _aimed(world: World, slots: Ints) -> Bools:
-    """Whether each unit faces its target within its weapon's arc; turrets always do."""
+    """Whether each unit's body, or its turret, faces its target within the weapon's arc."""
     least = world.aim_cos.take(slots)
-    turret = least <= -1.0
-    if np.count_nonzero(turret) == len(turret):
-        return turret
-    along = world.toward.take(slots, 0) * world.heading.take(slots, 0)
-    aimed: Bools = turret | (along[:, 0] + along[:, 1] >= least)
+    any_way = least <= -1.0
+    if np.count_nonzero(any_way) == len(any_way):
+        return any_way
+    facing = world.heading.take(slots, 0)
+    turreted = world.turreted.take(slots)
+    if some(turreted):
+        facing = np.where(turreted[:, None], world.turret.take(slots, 0), facing)
+    along = world.toward.take(slots, 0) * facing
+    aimed: Bools = any_way | (along[:, 0] + along[:, 1] >= least)
     return aimed
 
 
 def _start(world: World, slots: Ints) -> None:
     """Begin attacks: the cooldown of the next one runs from here."""
     for slot in slots.tolist():
-        row = int(world.weapon[slot])
+        row = _weapon_at_hand(world, slot)
         weapon = world.catalog.weapons[row]
-        low, high = weapon.jitter_loops
-        delay = low + (high - low) * world.rng.random()
-        world.cooldown[slot] += world.stats.period[world.owner[slot], row] + delay
-        world.windup[slot] = weapon.damage_point_loops
+        rate = float(world.attack_rate[slot])
+        delay = 0.0
+        if not weapon.is_beam:
+            low, high = weapon.jitter_loops
+            delay = low + (high - low) * world.rng.random()
+        world.cooldown[slot] += world.stats.period[world.owner[slot], row] / rate + delay
+        world.windup[slot] = weapon.damage_point_loops / rate
+
+
+def _weapon_at_hand(world: World, slot: int) -> int:
+    """Row of the weapon for this attack: the one for close targets when the target stands that close."""
+    close = int(world.close_weapon[slot])
+    if close >= 0 and world.weapon[slot] in (close, world.ground_weapon[slot]):
+        near = world.gap[slot] <= world.close_range[slot]
+        world.weapon[slot] = close if near else world.ground_weapon[slot]
+    return int(world.weapon[slot])
 
 
 def _take_effect(world: World, slots: Ints) -> None:
     """Lay the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
     rows = world.weapon[slots]
-    owner, target = world.owner[slots], world.target[slots]
     moment = world.loop + world.windup[slots]
     for row in dict.fromkeys(rows.tolist()):
         weapon = world.catalog.weapons[row]
         mine = rows == row
-        for index, hit in enumerate(weapon.hits):
-            chosen = mine if not hit.when else mine & _branch(world, hit, weapon, target)
-            count = int(chosen.sum())
-            if count and not is_unmodelled(hit):
-                world.pending.append(
-                    count,
-                    source=slots[chosen],
-                    owner=owner[chosen],
-                    target=target[chosen],
-                    weapon=row,
-                    hit=index,
-                    due=moment[chosen] + first_delay(hit),
-                    single=False,
-                    goal=world.pos[target[chosen]],
-                    start=world.pos[slots[chosen]],
-                )
+        for index in range(len(weapon.hits)):
+            _lay(world, weapon, index, slots[mine], moment[mine])
         world.backswing[slots[mine]] = weapon.backswing_loops
+        world.beaming[slots[mine]] = weapon.is_beam
+        launcher = LAUNCHERS.get(weapon.id)
+        if launcher is not None:
+            for slot in slots[mine].tolist():
+                launcher(world, slot, int(world.target[slot]))
     world.windup[slots] = NOT_STARTED
 
 
-def first_delay(hit: Hit) -> float:
-    """Loops from the damage point until the hit begins."""
-    return hit.sweep.points[0][0] if hit.sweep is not None else hit.delay_loops
+def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) -> None:
+    """Lay one hit of the attacks whose damage point was at ``moment`` (k,); bounces follow from the hit before."""
+    hit = weapon.hits[index]
+    if hit.bounce:
+        return
+    target = world.target[slots]
+    if hit.when:
+        chosen = _branch(world, hit, weapon, slots, target)
+        slots, target, moment = slots[chosen], target[chosen], moment[chosen]
+    if slots.size:
+        at = slots if weapon.is_kamikaze else target  # who blows himself up is the middle of it
+        world.pending.append(
+            len(slots),
+            source=slots,
+            owner=world.owner[slots],
+            target=target,
+            prior=NOBODY,
+            weapon=weapon.row,
+            hit=index,
+            due=moment + (0.0 if hit.sweep is not None else hit.delay_loops),
+            single=False,
+            goal=world.pos[at],
+            start=world.pos[slots],
+        )
 
 
-def is_unmodelled(hit: Hit) -> bool:
-    """Whether the rules do not carry out this hit yet: bounces and second circles."""
-    return hit.bounce or hit.search is not None
+# branches of the game's own switches ----------------------------------------------------------------------------------
 
 
-def _branch(world: World, hit: Hit, weapon: Weapon, target: Ints) -> Bools:
+def _branch(world: World, hit: Hit, weapon: Weapon, source: Ints, target: Ints) -> Bools:
     """(k,) whether the game's switch takes the branch ``hit`` stands in; unknown conditions never hold."""
     if hit.when == "else":
         others = [h.when for h in weapon.hits if h.when not in ("", "else")]
         taken = np.zeros(len(target), dtype=np.bool_)
         for name in others:
-            taken |= _condition(world, name, target)
+            taken |= _condition(world, name, source, target)
         return ~taken
-    return _condition(world, hit.when, target)
+    return _condition(world, hit.when, source, target)
 
 
-def _condition(world: World, name: str, target: Ints) -> Bools:
-    if name == "GroundUnitFilter":
-        on_ground: Bools = (world.plane_bits[target] & GROUND_PLANE) != 0
-        return on_ground
-    if name in ("TargetRadiusSmall", "TargetRadiusLarge"):
-        large: Bools = world.radius[target] >= LARGE_RADIUS
-        return large if name == "TargetRadiusLarge" else ~large
-    if name == "IsStructure":
-        walled: Bools = world.walled[target]
-        return walled
-    return np.zeros(len(target), dtype=np.bool_)
+def _condition(world: World, name: str, source: Ints, target: Ints) -> Bools:
+    condition = CONDITIONS.get(name)
+    if condition is None:
+        return np.zeros(len(target), dtype=np.bool_)
+    holds: Bools = condition(world, source, target)
+    return holds
 
 
-def launch(world: World, shot: Shot, hit: Hit) -> None:
-    """Send the missile of a hit on its way."""
-    top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
-    gain_n = hit.missile_acceleration_n
-    instant = gain_n is None or gain_n >= INSTANT_ACCELERATION_N
-    world.missiles.append(
-        1,
-        source=shot.source,
-        owner=shot.owner,
-        target=shot.target,
-        weapon=shot.weapon,
-        hit=shot.hit,
-        start=shot.start,
-        goal=shot.goal,
-        pos=shot.start,
-        step=top if instant else 0.0,
-        top=top,
-        gain=math.inf if gain_n is None or instant else gain_n / LOOPS_PER_NORMAL_SECOND**2,
-    )
+def _on_ground(world: World, source: Ints, target: Ints) -> Bools:
+    del source
+    on_ground: Bools = (world.plane_bits[target] & GROUND_PLANE) != 0
+    return on_ground
+
+
+def _large(world: World, source: Ints, target: Ints) -> Bools:
+    del source
+    large: Bools = world.radius[target] >= LARGE_RADIUS
+    return large
+
+
+def _friendly(world: World, source: Ints, target: Ints) -> Bools:
+    friendly: Bools = world.owner[source] == world.owner[target]
+    return friendly
+
+
+def _structure(world: World, source: Ints, target: Ints) -> Bools:
+    del source
+    walled: Bools = world.walled[target]
+    return walled
+
+
+CONDITIONS: Final[dict[str, Callable[[World, Ints, Ints], Bools]]] = {
+    "GroundUnitFilter": _on_ground,
+    "TargetRadiusLarge": _large,
+    "TargetRadiusSmall": lambda world, source, target: ~_large(world, source, target),
+    "IsStructure": _structure,
+    "FriendlyTarget": _friendly,
+    "FriendlyStructure": lambda world, source, target: (
+        _friendly(world, source, target) & _structure(world, source, target)
+    ),
+    "FriendlyUnit": lambda world, source, target: _friendly(world, source, target) & ~_structure(world, source, target),
+}
+"""The game's validators, each a function of the world, the attackers (k,) and the targets (k,)."""

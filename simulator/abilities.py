@@ -1,0 +1,172 @@
+"""What an ability is: whom it belongs to, what it is aimed at, what it costs, and which skill carries it out.
+
+Data only, one record per specific ability id of the API, read from the shipped tables by ``catalog``. Whether a unit
+may use one now, and what happens then, is ``casting``'s matter; the rule behind each is a ``skills.Skill``, named by
+``does``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntFlag
+from typing import Any, Final
+
+
+class Aim(IntFlag):
+    """What an ability can be aimed at."""
+
+    NONE = 1
+    POINT = 2
+    UNIT = 4
+
+
+AIMS: Final = {
+    "none": Aim.NONE,
+    "point": Aim.POINT,
+    "unit": Aim.UNIT,
+    "point_or_unit": Aim.POINT | Aim.UNIT,
+    "point_or_none": Aim.POINT | Aim.NONE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """A condition on a player's structures, upgrades and on the unit itself, as a tree.
+
+    ``kind`` is ``unit``, ``upgrade`` or ``behavior`` (a count of ``name`` in ``state``), ``and``, ``or``, ``not`` (of
+    ``parts``), ``cmp`` (``parts`` compared by ``name``), ``op`` (``parts`` joined by ``name``) or ``const``.
+    """
+
+    kind: str
+    name: str = ""
+    state: str = ""
+    value: float | None = None
+    parts: tuple[Need, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Charges:
+    """Uses that come back one by one: how many at most and at the start, and loops for one to come back."""
+
+    max: int
+    start: int
+    loops: float
+    start_loops: float
+    link: str
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """Which units may be targets, in the catalog's words: all of ``required`` and none of ``excluded`` hold."""
+
+    required: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Ability:
+    """One specific ability; distances are world units, ``range`` from edge to edge, 500 is the whole map.
+
+    ``general`` is the id under which clients may also ask for it, ``solo`` says that of several units told to use it
+    only one does, ``transient`` that it leaves the unit's orders alone. ``numbers`` are the skill's own figures.
+    """
+
+    id: int
+    name: str
+    does: str = ""
+    general: int = 0
+    link: str = ""
+    aim: Aim = Aim.NONE
+    users: tuple[str, ...] = ()
+    range: float = 0.0
+    slop: float = 0.0
+    arc_deg: float = 360.0
+    follow_range: float = 0.0
+    energy: float = 0.0
+    life: float = 0.0
+    minerals: int = 0
+    vespene: int = 0
+    cooldown_loops: float = 0.0
+    cooldown: str = ""
+    cooldown_shared: bool = False
+    charges: Charges | None = None
+    filters: Filter = Filter()
+    autocast: str = ""
+    autocast_range: float = 0.0
+    autocast_filters: Filter = Filter()
+    transient: bool = False
+    moves: bool = False
+    solo: bool = False
+    intro_loops: float = 0.0
+    prep_loops: float = 0.0
+    finish_loops: float = 0.0
+    outro_loops: float = 0.0
+    unit: str = ""
+    units: tuple[str, ...] = ()
+    upgrade: str = ""
+    loops: float = 0.0
+    random_loops: float = 0.0
+    building: bool = False
+    requires: Need | None = None
+    shown_if: Need | None = None
+    numbers: dict[str, Any] = field(default_factory=dict, hash=False, compare=False)
+
+    @property
+    def requires_point(self) -> bool:
+        """Whether it must be aimed, as the API's list of available abilities says it."""
+        return Aim.NONE not in self.aim
+
+    @property
+    def timer(self) -> str:
+        """The name of its cooldown; abilities that share one share the name."""
+        return self.cooldown or self.link
+
+
+def ability_from(raw: dict[str, Any]) -> Ability:
+    """The record in one row of ``abilities.json``."""
+    raw = dict(raw)
+    charges = raw.pop("charges", None)
+    return Ability(
+        aim=AIMS[raw.pop("target", "none")],
+        users=tuple(raw.pop("users", ())),
+        units=tuple(raw.pop("units", ())),
+        charges=charges and Charges(**charges),
+        filters=filter_from(raw.pop("filters", "")),
+        autocast_filters=filter_from(raw.pop("autocast_filters", "")),
+        requires=need_from(raw.pop("requires", None)),
+        shown_if=need_from(raw.pop("shown_if", None)),
+        **raw,
+    )
+
+
+def filter_from(text: str) -> Filter:
+    """The filter in ``"Required,Words;Excluded,Words"``; "-" stands for none."""
+    required, _, excluded = text.partition(";")
+
+    def words(part: str) -> tuple[str, ...]:
+        return tuple(word for word in part.split(",") if word not in ("", "-"))
+
+    return Filter(words(required), words(excluded))
+
+
+def need_from(raw: dict[str, Any] | None) -> Need | None:
+    """The condition in a row of the tables, or None."""
+    if raw is None:
+        return None
+    for kind in ("unit", "upgrade", "behavior"):
+        if kind in raw:
+            return Need(kind, raw[kind], raw.get("state", "done"))
+    for kind in ("and", "or"):
+        if kind in raw:
+            return Need(kind, parts=_parts(raw[kind]))
+    if "not" in raw:
+        return Need("not", parts=_parts([raw["not"]]))
+    if "cmp" in raw:
+        return Need("cmp", raw["cmp"], parts=_parts(raw["args"]))
+    if "op" in raw:
+        return Need("op", raw["op"], parts=_parts(raw["args"]))
+    return Need("const", value=raw.get("const"))
+
+
+def _parts(raws: list[dict[str, Any] | None]) -> tuple[Need, ...]:
+    return tuple(need for need in map(need_from, raws) if need is not None)

@@ -1,0 +1,264 @@
+"""Using abilities: whether a unit may now, what it costs, and how a use begins, takes effect and ends.
+
+What is the same for every ability stands here: who has it, requirements, cost, cooldown, target filters. What one
+does is its ``skills.Skill``. Players come in by ``use``, units with autocast by ``systems.autocast``; ``systems.casts``
+carries out what does not happen at once.
+
+Above: the API, ``systems``. Below: ``skills``, ``commands``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from simulator import commands
+from simulator.casts import Cast
+from simulator.columns import NOBODY
+from simulator.needs import met
+from simulator.orders import Order, OrderKind
+from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
+from simulator.skills import SKILLS
+from simulator.stats import AIR_PLANE, GROUND_PLANE
+from simulator.world import NO_TAG, Mishap
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from simulator.abilities import Ability, Filter
+    from simulator.casts import Point
+    from simulator.skills.skill import Skill
+    from simulator.world import World
+
+ANYWHERE: Final = 500.0
+ORDINARY: Final = frozenset({"smart", "stop", "move", "patrol", "hold_position", "scan_move", "attack"})
+"""What ``commands`` carries out; everything else is a skill."""
+
+
+def is_modelled(ability: Ability) -> bool:
+    """Whether the simulator has a rule for this ability."""
+    return ability.does in ORDINARY or ability.does in SKILLS
+
+
+def prep_loops(world: World, ability: Ability) -> float:
+    """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
+    loops = ability.intro_loops + ability.prep_loops
+    if ability.does == "morph":
+        loops += ability.loops + world.rng.random() * ability.random_loops
+    return loops
+
+
+# may it ---------------------------------------------------------------------------------------------------------------
+
+
+def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> Refusal:
+    """Whether a unit could use an ability of its card now, whatever it is aimed at; ``free`` looks at no cost."""
+    if not is_modelled(ability):
+        return Refusal.NOT_SUPPORTED
+    if ability.does in ORDINARY:
+        return Refusal.SUCCESS if world.build_progress[slot] >= 1.0 else Refusal.BUILDING_IS_UNDER_CONSTRUCTION
+    if not world.can_cast[slot] or world.hallucination[slot]:
+        return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+    if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
+        return Refusal.TECH_REQUIREMENTS_NOT_MET
+    return Refusal.SUCCESS if free else _unaffordable(world, slot, ability)
+
+
+def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
+    player = world.players[int(world.owner[slot])]
+    if "free" not in player.cheats:
+        if player.minerals < ability.minerals:
+            return Refusal.NOT_ENOUGH_MINERALS
+        if player.vespene < ability.vespene:
+            return Refusal.NOT_ENOUGH_VESPENE
+        if world.energy[slot] < ability.energy:
+            return Refusal.NOT_ENOUGH_ENERGY
+        if ability.life and world.life[slot] <= ability.life:
+            return Refusal.NOT_ENOUGH_LIFE
+    if "cooldown" not in player.cheats and cooldown_left(world, slot, ability) > 0.0:
+        return Refusal.COOLDOWN
+    return Refusal.SUCCESS
+
+
+def cooldown_left(world: World, slot: int, ability: Ability) -> float:
+    """Loops until the ability's cooldown is over, 0 when it is."""
+    timers = world.players[int(world.owner[slot])].timers if ability.cooldown_shared else world.timers.get(slot, {})
+    return max(0.0, timers.get(ability.timer, 0.0) - world.loop)
+
+
+def aim_refusal(world: World, cast: Cast) -> Refusal:
+    """Whether a unit may aim an ability like this; the way there is not looked at, unless it can't walk."""
+    slot, ability, target = cast.slot, cast.ability, cast.target
+    if target != NOBODY:
+        wrong = fits(world, slot, target, ability.filters)
+        if wrong is not Refusal.SUCCESS:
+            return wrong
+    far = ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
+    if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
+        return Refusal.TARGET_IS_OUT_OF_RANGE
+    return SKILLS[ability.does].refuse(world, cast)
+
+
+def fits(world: World, slot: int, target: int, words: Filter) -> Refusal:
+    """Whether a unit may be the target of another one's ability by the catalog's filter."""
+    for word in words.required:
+        if not _is(world, slot, target, word):
+            return NOT_REQUIRED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
+    for word in words.excluded:
+        if _is(world, slot, target, word):
+            return EXCLUDED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
+    return Refusal.SUCCESS
+
+
+def _is(world: World, slot: int, target: int, word: str) -> bool:
+    """Whether a word of a filter holds for a target; words for things that the world does not have never do."""
+    rule = WORDS.get(word)
+    return rule is not None and bool(rule(world, slot, target))
+
+
+def _owned_by(owner: str) -> Callable[[World, int, int], bool]:
+    def rule(world: World, slot: int, target: int) -> bool:
+        mine, its = int(world.owner[slot]), int(world.owner[target])
+        kind = "Player" if mine == its else "Neutral" if its == 0 else "Enemy"
+        return kind == owner
+
+    return rule
+
+
+def _attribute(name: str) -> Callable[[World, int, int], bool]:
+    return lambda world, _, target: name in world.unit_type(target).attributes
+
+
+def _flag(name: str) -> Callable[[World, int, int], bool]:
+    def rule(world: World, _: int, target: int) -> bool:
+        return any(name in world.catalog.buffs[row].flags for row in world.buffs.of(target)["buff"].tolist())
+
+    return rule
+
+
+WORDS: Final[dict[str, Callable[[World, int, int], bool]]] = {
+    "Self": lambda _, slot, target: slot == target,
+    "Player": _owned_by("Player"),
+    "Neutral": _owned_by("Neutral"),
+    "Enemy": _owned_by("Enemy"),
+    "Visible": lambda world, slot, target: bool(world.visible[world.owner[slot], target]),
+    "Air": lambda world, _, target: bool(world.plane_bits[target] & AIR_PLANE),
+    "Ground": lambda world, _, target: bool(world.plane_bits[target] & GROUND_PLANE),
+    "Structure": lambda world, _, target: world.unit_type(target).structure,
+    "Biological": _attribute("biological"),
+    "Mechanical": _attribute("mechanical"),
+    "Psionic": _attribute("psionic"),
+    "Massive": _attribute("massive"),
+    "Light": _attribute("light"),
+    "Armored": _attribute("armored"),
+    "Heroic": _attribute("heroic"),
+    "CanHaveEnergy": lambda world, _, target: bool(world.energy_max[target] > 0.0),
+    "HasEnergy": lambda world, _, target: bool(world.energy[target] > 0.0),
+    "Worker": lambda world, _, target: world.unit_type(target).worker,
+    "Buried": lambda world, _, target: bool(world.burrowed[target]),
+    "Cloaked": lambda world, _, target: bool(world.cloaked[target]),
+    "UnderConstruction": lambda world, _, target: bool(world.build_progress[target] < 1.0),
+    "Hallucination": lambda world, _, target: bool(world.hallucination[target]),
+    "Invulnerable": lambda world, _, target: world.unit_type(target).invulnerable or not world.targetable[target],
+    "Stasis": _flag("stasis"),
+    "Benign": _flag("benign"),
+    "Destructible": lambda world, _, target: int(world.owner[target]) == 0 and world.unit_type(target).structure,
+}
+
+
+def in_range(world: World, cast: Cast, *, slop: float | None = None) -> bool:
+    """Whether a unit stands near enough for its ability, from edge to edge; ``slop`` is what it may be beyond."""
+    ability = cast.ability
+    if ability.range >= ANYWHERE or (cast.target == NOBODY and cast.point is None):
+        return True
+    goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
+    assert goal is not None
+    x, y = world.pos[cast.slot].tolist()
+    away = math.hypot(goal[0] - x, goal[1] - y)
+    return away <= reach(world, cast) + (ability.slop if slop is None else slop) + 1e-6
+
+
+def reach(world: World, cast: Cast) -> float:
+    """From centre to centre, how near a caster must come."""
+    body = float(world.radius[cast.target]) if cast.target != NOBODY else 0.0
+    return cast.ability.range + float(world.radius[cast.slot]) + body
+
+
+# use it ---------------------------------------------------------------------------------------------------------------
+
+
+def use(
+    world: World,
+    slots: Iterable[int],
+    ability: Ability,
+    *,
+    target: int = NO_TAG,
+    point: Point | None = None,
+    queue: bool = False,
+) -> list[int]:
+    """Have units use an ability of theirs on a unit (tag), at a point or on nothing; returns the slots that will.
+
+    Those that can't are left alone. Of several only the nearest uses an ability that is ``solo``.
+    """
+    victim = world.slot_of(target)
+    casts = [Cast(slot, ability, victim, point) for slot in slots]
+    casts = [c for c in casts if refusal(world, c.slot, ability) is Refusal.SUCCESS]
+    casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
+    if ability.solo and len(casts) > 1:
+        casts = [min(casts, key=lambda c: (_busy(world, c), _away(world, c), c.slot))]
+    taken: list[int] = []
+    for cast in casts:
+        if ability.transient and not queue:
+            perform(world, cast)
+            taken.append(cast.slot)
+        else:
+            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(victim), point=point)
+            taken += commands.give(world, [cast.slot], order, queue=queue)
+    return taken
+
+
+def _busy(world: World, cast: Cast) -> bool:
+    """Whether the unit is using this very ability already: another one is asked first."""
+    return bool(world.casts[cast.slot]) and int(world.order_ability[cast.slot]) == cast.ability.id
+
+
+def _away(world: World, cast: Cast) -> float:
+    if cast.target == NOBODY and cast.point is None:
+        return -float(world.energy[cast.slot])
+    goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
+    assert goal is not None
+    x, y = world.pos[cast.slot].tolist()
+    return math.hypot(goal[0] - x, goal[1] - y)
+
+
+def perform(world: World, cast: Cast) -> None:
+    """Take the cost, begin the cooldown and let the ability take effect."""
+    slot, ability = cast.slot, cast.ability
+    player = world.players[int(world.owner[slot])]
+    if "free" not in player.cheats:
+        player.minerals -= ability.minerals
+        player.vespene -= ability.vespene
+        world.energy[slot] = max(0.0, float(world.energy[slot]) - ability.energy)
+        world.life[slot] -= ability.life
+    start_cooldown(world, slot, ability)
+    SKILLS[ability.does].effect(world, cast)
+
+
+def start_cooldown(world: World, slot: int, ability: Ability, loops: float | None = None) -> None:
+    """Let the ability's cooldown run from now, ``loops`` long or as the tables say."""
+    lasts = ability.cooldown_loops if loops is None else loops
+    if lasts:
+        shared = world.players[int(world.owner[slot])].timers
+        timers = shared if ability.cooldown_shared else world.timers.setdefault(slot, {})
+        timers[ability.timer] = world.loop + lasts
+
+
+def skill_of(ability: Ability) -> Skill:
+    """The rule behind an ability; raises ``KeyError`` for one that is not modelled."""
+    return SKILLS[ability.does]
+
+
+def fail(world: World, cast: Cast, why: Refusal) -> None:
+    """Tell a player that an order could not be carried out in the end."""
+    owner = int(world.owner[cast.slot])
+    world.mishaps.append(Mishap(world.loop, owner, world.tag_of(cast.slot), cast.ability.id, why))

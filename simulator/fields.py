@@ -1,0 +1,67 @@
+"""Fields: effects that lie on the ground for a time, such as a storm, a scan or a bile on its way.
+
+A field is a value in ``world.fields`` until it ends; ``systems.effects`` calls its skill at every period. What the
+API tells of it (``effect``, the places, the radius) is in the value, what it does is the skill's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from simulator.columns import NOBODY
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+Point = tuple[float, float]
+
+
+@dataclass(slots=True)
+class Field:
+    """One effect on the ground.
+
+    Args:
+        does: Name of the rule that runs it, in ``skills.FIELDS``.
+        effect: The API's effect id, 0 when clients are not told of it.
+        owner: Whose unit made it.
+        points: Where it lies, world units; the first is its middle.
+        radius: World units.
+        begun: Loop at which it came.
+        end: Loop at which it ends.
+        due: Loop at which its rule runs next.
+        period: Loops between two runs.
+        ability: The ability that made it, for its numbers.
+        source: Tag of the unit that made it, 0 for none.
+        target: Tag of the unit that it follows or meets, 0 for none.
+        count: Runs so far; the rule's own counter.
+        sights: Radius in which its owner sees, 0 for none.
+        detects: Whether its owner sees what is cloaked there.
+    """
+
+    does: str
+    owner: int
+    points: list[Point]
+    radius: float
+    begun: int
+    end: float
+    effect: int = 0
+    due: float = 0.0
+    period: float = 1.0
+    ability: int = 0
+    source: int = 0
+    target: int = 0
+    count: int = 0
+    sights: float = 0.0
+    detects: bool = False
+    memory: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def at(self) -> Point:
+        """Its middle."""
+        return self.points[0]
+
+
+def source_slot(world: World, item: Field) -> int:
+    """The slot of the unit that made a field, or NOBODY when it is gone."""
+    return world.slot_of(item.source) if item.source else NOBODY

@@ -1,0 +1,92 @@
+"""Requirements: whether a player has what an ability needs, such as a finished structure or an upgrade.
+
+Counts what the tables ask for; what a requirement is stands in ``abilities.Need``.
+"""
+
+from __future__ import annotations
+
+import operator
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from simulator import buffs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.abilities import Need
+    from simulator.catalog import Catalog
+    from simulator.world import World
+
+ALIAS: Final = "Alias_"
+COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
+    "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+}  # fmt: skip
+
+
+def met(world: World, slot: int, need: Need | None) -> bool:
+    """Whether the condition holds for a unit and its owner; a player with the debug tech tree needs nothing."""
+    if need is None or "tech_tree" in world.players[int(world.owner[slot])].cheats:
+        return True
+    return _count(world, slot, need) > 0
+
+
+def _count(world: World, slot: int, need: Need) -> float:
+    """The value of a condition: how many there are, or 1 and 0 for true and false."""
+    match need.kind:
+        case "and":
+            return float(all(_count(world, slot, part) > 0 for part in need.parts))
+        case "or":
+            return float(any(_count(world, slot, part) > 0 for part in need.parts))
+        case "not":
+            return float(not _count(world, slot, need.parts[0]) > 0)
+        case "cmp":
+            left, right = (_count(world, slot, part) for part in need.parts)
+            return float(COMPARE[need.name](left, right))
+        case "op":
+            return 1.0  # the tables' only one allows what melee games always allow
+        case "const":
+            return need.value or 0.0
+        case "behavior":
+            known = need.name in world.catalog.buff_of_name
+            return float(known and buffs.has(world, slot, need.name))
+        case "upgrade":
+            return _upgrades(world, int(world.owner[slot]), need)
+    return _units(world, slot, need)
+
+
+def _upgrades(world: World, player: int, need: Need) -> float:
+    upgrade = next((u for u in world.catalog.upgrades if u.name == need.name), None)
+    if upgrade is None:
+        return 0.0
+    underway = need.state.startswith("queued") and upgrade.name in world.players[player].underway
+    return float(upgrade.id in world.players[player].upgrades or underway)
+
+
+def _units(world: World, slot: int, need: Need) -> float:
+    rows = counts_as(world.catalog, need.name.removeprefix(ALIAS), alias=need.name.startswith(ALIAS))
+    player = int(world.owner[slot])
+    if need.state.endswith("_here"):
+        return float(world.addon[slot] >= 0 and int(world.type[world.addon[slot]]) in rows)
+    mine = world.live[world.owner[world.live] == player]
+    of_kind = np.isin(world.type[mine], list(rows))
+    if need.state == "done":
+        of_kind &= world.build_progress[mine] >= 1.0
+    found = float(np.count_nonzero(of_kind))
+    if need.state.startswith("queued"):
+        found += sum(world.catalog.units[row].name in world.players[player].underway for row in rows)
+    return found
+
+
+@lru_cache(maxsize=512)
+def counts_as(catalog: Catalog, name: str, *, alias: bool) -> frozenset[int]:
+    """Rows of the types that count as ``name``: its own, and with ``alias`` those that stand in for it."""
+    own = catalog.row_of_name.get(name)
+    rows = set() if own is None else {own}
+    if alias:
+        number = None if own is None else catalog.units[own].id
+        rows |= {u.row for u in catalog.units if number is not None and number in u.tech_alias}
+        rows |= {u.row for u in catalog.units if name == "TechLab" and u.name.endswith("TechLab")}
+    return frozenset(rows)

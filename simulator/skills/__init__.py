@@ -1,0 +1,31 @@
+"""Skills: the rules behind abilities, buffs and fields that are not the same for all.
+
+One module per group of units. Each offers some of these tables, and here they are joined:
+
+* ``SKILLS``: an ability's ``does`` → ``Skill``
+* ``FIELDS``: a field's ``does`` → what it does at each period
+* ``TICKS`` and ``ENDS``: a buff's name → what it does at each of its periods, and when it has run out
+* ``PASSIVES``: a unit type's name → what units of it do in every loop without being told
+* ``DEATHS``: a unit type's name → what happens when one dies, called with the slot while it is still there
+
+``casting`` and the systems look things up here; the modules know the world and nothing above it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.skills import basics
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+    from simulator.world import World
+
+SKILLS: Final[dict[str, Skill]] = {**basics.SKILLS}
+FIELDS: Final[dict[str, FieldRule]] = {}
+TICKS: Final[dict[str, BuffRule]] = {}
+ENDS: Final[dict[str, BuffRule]] = {}
+PASSIVES: Final[dict[str, UnitRule]] = {}
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}

@@ -1,0 +1,61 @@
+"""Skills that units of every race have: changing mode, and buffs that need no more than being laid on.
+
+A morph is an ability whose time passes while the unit stands still, and that then makes it one of another type.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.skills.skill import Effect
+    from simulator.world import World
+
+
+def on_self(buff: str) -> Effect:
+    """An effect that lays a buff on the caster, for as long as the ability or else the buff says."""
+
+    def effect(world: World, cast: Cast) -> None:
+        loops = cast.ability.numbers.get("duration_loops")
+        buffs.apply(world, cast.slot, buff, source=cast.slot, loops=loops)
+
+    return effect
+
+
+def on_target(buff: str) -> Effect:
+    """An effect that lays a buff on the target."""
+
+    def effect(world: World, cast: Cast) -> None:
+        loops = cast.ability.numbers.get("duration_loops")
+        buffs.apply(world, cast.target, buff, source=cast.slot, loops=loops)
+
+    return effect
+
+
+def off_self(buff: str) -> Effect:
+    """An effect that takes a buff off the caster."""
+
+    def effect(world: World, cast: Cast) -> None:
+        buffs.remove(world, cast.slot, buff)
+
+    return effect
+
+
+def _morph(world: World, cast: Cast) -> None:
+    """Become what the ability makes; the time it takes has passed (see ``casting.prep_loops``)."""
+    world.become(cast.slot, world.catalog.unit(cast.ability.unit))
+
+
+def _can_morph(world: World, cast: Cast) -> Refusal:
+    known = cast.ability.unit in world.catalog.row_of_name
+    return Refusal.SUCCESS if known else Refusal.NOT_SUPPORTED
+
+
+SKILLS: Final = {
+    "morph": Skill(_morph, refuse=_can_morph),
+}

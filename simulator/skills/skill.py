@@ -1,0 +1,119 @@
+"""What a skill is: the rule that carries out an ability, as a few functions of the world and the cast.
+
+Costs, cooldowns, requirements, target filters and the way there are the same for all abilities and stand in
+``casting``; a skill says only what is its own. Beside the type here are the few things that many skills do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.stats import AIR_PLANE, GROUND_PLANE
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.casts import Cast, Point
+    from simulator.fields import Field
+    from simulator.world import World
+
+Effect: TypeAlias = Callable[["World", "Cast"], None]
+FieldRule: TypeAlias = Callable[["World", "Field"], None]
+BuffRule: TypeAlias = Callable[["World", int, "np.void"], None]
+UnitRule: TypeAlias = Callable[["World", "list[int]"], None]
+
+
+def nothing_against_it(_: World, __: Cast) -> Refusal:
+    """No reason of its own to refuse."""
+    return Refusal.SUCCESS
+
+
+@dataclass(frozen=True, slots=True)
+class Skill:
+    """What an ability does.
+
+    Args:
+        effect: Called when it takes effect; cost and cooldown are taken by then.
+        refuse: Reasons of its own against the cast, ``Refusal.SUCCESS`` for none.
+        hold: Makes it a channel: called in every later loop, False when it is over.
+        end: Called when a channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused).
+        pick: The target (slot) that a unit with autocast chooses, NOBODY for none; the nearest allowed one without.
+        prepare: Called when the caster begins to prepare (``prep_loops``).
+        estimates: What of it is no fact of the sources, a sentence each.
+    """
+
+    effect: Effect
+    refuse: Callable[[World, Cast], Refusal] = nothing_against_it
+    hold: Callable[[World, Cast], bool] | None = None
+    end: Effect | None = None
+    pick: Callable[[World, int, Ability], int] | None = None
+    prepare: Effect | None = None
+    estimates: tuple[str, ...] = ()
+
+
+# what many skills do --------------------------------------------------------------------------------------------------
+
+
+def number(cast_or_ability: Cast | Ability, name: str, default: float | None = None) -> float:
+    """One of the ability's own figures; raises ``KeyError`` when the tables lack it and there is no default."""
+    ability: Any = getattr(cast_or_ability, "ability", cast_or_ability)
+    value = ability.numbers.get(name, default)
+    if value is None:
+        raise KeyError(f"ability {ability.id} ({ability.name}) has no number {name!r}")
+    return float(value)
+
+
+def around(
+    world: World, point: Point, radius: float, *, plane: str = "any", edge: bool = True, structures: bool = True
+) -> list[int]:
+    """Slots of the living units within ``radius`` of a point, ascending; to their edge, or with ``edge`` off to their
+    centre. Units that can't be touched are left out.
+    """
+    slots = world.live
+    offset = world.pos[slots] - np.array(point)
+    reach = radius + world.radius[slots] if edge else np.full(len(slots), radius)
+    near = (offset[:, 0] ** 2 + offset[:, 1] ** 2 <= reach**2) & world.targetable[slots] & (world.life[slots] > 0.0)
+    if plane != "any":
+        bit = GROUND_PLANE if plane == "ground" else AIR_PLANE
+        near &= (world.plane_bits[slots] & bit) != 0
+    found: list[int] = slots[near].tolist()
+    if not structures:
+        found = [slot for slot in found if not world.unit_type(slot).structure]
+    return found
+
+
+def foes(world: World, slots: list[int], owner: int) -> list[int]:
+    """Those of ``slots`` that fight ``owner``."""
+    return [slot for slot in slots if int(world.owner[slot]) not in (owner, 0)]
+
+
+def friends(world: World, slots: list[int], owner: int) -> list[int]:
+    """Those of ``slots`` that are the owner's."""
+    return [slot for slot in slots if int(world.owner[slot]) == owner]
+
+
+def place_of(world: World, cast: Cast) -> Point:
+    """Where a cast is aimed: the target's place, else its point, else the caster's place."""
+    slot = cast.target if cast.target != NOBODY else cast.slot
+    if cast.target == NOBODY and cast.point is not None:
+        return cast.point
+    x, y = world.pos[slot].tolist()
+    return x, y
+
+
+def distance(world: World, slot: int, point: Point) -> float:
+    """From a unit's centre to a point."""
+    x, y = world.pos[slot].tolist()
+    return math.hypot(point[0] - x, point[1] - y)
+
+
+def gap(world: World, slot: int, other: int) -> float:
+    """From edge to edge."""
+    (x, y), (a, b) = world.pos[slot].tolist(), world.pos[other].tolist()
+    return math.hypot(a - x, b - y) - float(world.radius[slot] + world.radius[other])

@@ -1,0 +1,79 @@
+"""Autocast: units use abilities by themselves where their player lets them.
+
+Looked over every few loops. A unit that walks or fights on order interrupts only for abilities that leave its orders
+alone; one that idles, patrols or attack-moves does it as an order of its own and goes on afterwards.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator import casting, commands
+from simulator.abilities import Aim
+from simulator.casts import Cast
+from simulator.columns import NOBODY
+from simulator.mechanics import MECHANICS
+from simulator.orders import Order, OrderKind
+from simulator.refusal import Refusal
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.world import World
+
+FREE = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL, OrderKind.HOLD})
+
+
+def look_out(world: World) -> None:
+    """Let every unit with autocast use what it may, in the order of slots."""
+    if not world.autocast or world.loop % MECHANICS.scan_period:
+        return
+    for slot in sorted(world.autocast):
+        if world.carrier[slot] == NOBODY and world.can_cast[slot] and not world.casts[slot]:
+            for number in world.autocast[slot]:
+                if _try(world, slot, world.catalog.ability(number)):
+                    break
+
+
+def _try(world: World, slot: int, ability: Ability) -> bool:
+    order = OrderKind(int(world.order_kind[slot]))
+    if not ability.transient and order not in FREE:
+        return False
+    if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+        return False
+    skill = casting.skill_of(ability)
+    target = skill.pick(world, slot, ability) if skill.pick is not None else nearest(world, slot, ability)
+    if target == NOBODY and ability.requires_point:
+        return False
+    cast = Cast(slot, ability, target, begun=world.loop)
+    if casting.aim_refusal(world, cast) is not Refusal.SUCCESS:
+        return False
+    if order is OrderKind.HOLD and not casting.in_range(world, cast):
+        return False
+    if ability.transient:
+        casting.perform(world, cast)
+        return True
+    waiting = ([] if order is OrderKind.IDLE else world.orders_of(slot)[:1]) + world.queue[slot]
+    commands.begin(world, slot, Order(OrderKind.CAST, ability.id, target=world.tag_of(target)))
+    world.queue[slot] = waiting
+    return True
+
+
+def nearest(world: World, slot: int, ability: Ability) -> int:
+    """The nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
+    if Aim.UNIT not in ability.aim:
+        return NOBODY
+    slots = world.live
+    offset = world.pos[slots] - world.pos[slot]
+    gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[slots] - world.radius[slot]
+    reach = ability.autocast_range or ability.range
+    near = slots[gap <= reach]
+    for other in near[np.argsort(gap[gap <= reach], kind="stable")].tolist():
+        if (
+            other != slot
+            and casting.fits(world, slot, other, ability.autocast_filters) is Refusal.SUCCESS
+            and casting.aim_refusal(world, Cast(slot, ability, other)) is Refusal.SUCCESS
+        ):
+            return int(other)
+    return NOBODY

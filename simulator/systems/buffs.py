@@ -1,0 +1,42 @@
+"""Buffs: their periods come and their time runs out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.arrays import some, which
+from simulator.skills import ENDS, TICKS
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+
+def run_out(world: World) -> None:
+    """Run the rules of buffs that are due, and take off those whose time is over."""
+    if not len(world.buffs):
+        return
+    _tick(world)
+    over = world.buffs.rows["end"] <= world.loop
+    if not some(over):
+        return
+    ended = world.buffs.rows[over]
+    world.buffs.rows = world.buffs.rows[~over]
+    for row in ended:
+        slot = int(row["slot"])
+        world.refresh(slot)
+        rule = ENDS.get(world.catalog.buffs[int(row["buff"])].name)
+        if rule is not None:
+            rule(world, slot, row)
+
+
+def _tick(world: World) -> None:
+    due = which(world.buffs.rows["due"] <= world.loop)
+    for index in due.tolist():
+        row = world.buffs.rows[index]
+        kind = world.catalog.buffs[int(row["buff"])]
+        row["due"] += kind.period_loops
+        rule = TICKS.get(kind.name)
+        if rule is not None:
+            rule(world, int(row["slot"]), row.copy())
+        if index >= len(world.buffs.rows):
+            return  # a rule took buffs away; what is due is due in the next loop as well

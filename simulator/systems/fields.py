@@ -1,0 +1,24 @@
+"""Fields: effects on the ground do their work at their periods, and end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.skills import FIELDS
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+
+def run(world: World) -> None:
+    """Run the rule of every field that is due, in the order in which they came, and remove those that are over."""
+    if not world.fields:
+        return
+    for item in list(world.fields):
+        while item.due <= world.loop and item.due <= item.end:
+            item.due += item.period
+            rule = FIELDS.get(item.does)
+            if rule is not None:
+                rule(world, item)
+            item.count += 1
+    world.fields = [item for item in world.fields if item.end > world.loop]

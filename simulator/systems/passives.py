@@ -1,0 +1,27 @@
+"""Passives: what units do by their nature, in every loop, without being told."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator.skills import PASSIVES
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+
+def run(world: World) -> None:
+    """Run the rule of every type that has one, for all living units of the type."""
+    if world.natured_at != world.population:
+        _look_over(world)
+    for name, slots in world.natured.items():
+        PASSIVES[name](world, slots)
+
+
+def _look_over(world: World) -> None:
+    """List the units whose types have a rule, after somebody came or went."""
+    world.natured_at, world.natured = world.population, {}
+    for slot in world.live.tolist():
+        name = world.unit_type(slot).name
+        if name in PASSIVES:
+            world.natured.setdefault(name, []).append(slot)
