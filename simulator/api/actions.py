@@ -13,20 +13,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-from s2clientprotocol import error_pb2, spatial_pb2
+from s2clientprotocol import error_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.abilities import Aim
-from simulator.api import abilities, clicks
-from simulator.api.abilities import Command, Outcome
+from simulator.api import abilities, clicks, pixels
+from simulator.api.abilities import Command, Outcome, Target
 from simulator.api.selection import at_point, panel_order
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from s2clientprotocol import common_pb2, raw_pb2
+    from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
 
+    from simulator.api.projection import View
     from simulator.api.seat import Seat
 
     Result: TypeAlias = error_pb2.ActionResult.ValueType
@@ -53,18 +52,27 @@ def perform(seat: Seat, action: sc.Action, loop: int) -> None:
         point = action.action_raw.camera_move.center_world_space
         if _finite(point):
             _move_camera(seat, (point.x + seat.origin[0], point.y + seat.origin[1]), loop)
-    spatial = _spatial(action)
+    spatial, view = _spatial(seat, action)
     if spatial.HasField("camera_move"):
         pixel = spatial.camera_move.center_minimap
-        _move_camera(seat, seat.minimap.to_world(float(pixel.x), float(pixel.y)), loop)
-    if clicks.select(seat, spatial):
-        _report_spatial(seat, spatial, loop)
+        _move_camera(seat, view.minimap.to_world(float(pixel.x), float(pixel.y)), loop)
+    if clicks.select(seat, spatial, view.screen):
+        report = seat.report(loop)
+        for message, shown in _images(seat, report):
+            pixels.write_selection(message, shown, spatial, view)
     if action.HasField("action_ui") and clicks.press(seat, action.action_ui):
         seat.report(loop).action_ui.CopyFrom(action.action_ui)
 
 
-def _spatial(action: sc.Action) -> spatial_pb2.ActionSpatial:
-    return action.action_feature_layer if action.HasField("action_feature_layer") else action.action_render
+def _spatial(seat: Seat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, View]:
+    """What was clicked, and on which images."""
+    kind = "action_feature_layer" if action.HasField("action_feature_layer") else "action_render"
+    return getattr(action, kind), seat.views.get(kind, seat.view)
+
+
+def _images(seat: Seat, action: sc.Action) -> Iterator[tuple[spatial_pb2.ActionSpatial, View]]:
+    """The part of a report for each kind of images that the client has, with these images."""
+    return ((getattr(action, kind), view) for kind, view in seat.views.items())
 
 
 def _finite(point: common_pb2.Point) -> bool:
@@ -77,9 +85,9 @@ def _finite(point: common_pb2.Point) -> bool:
 def _commands(seat: Seat, action: sc.Action) -> Iterator[Command]:
     if action.action_raw.HasField("unit_command"):
         yield _from_tags(seat, action.action_raw.unit_command)
-    spatial = _spatial(action)
+    spatial, view = _spatial(seat, action)
     if spatial.HasField("unit_command"):
-        yield _from_click(seat, spatial.unit_command)
+        yield _from_click(seat, spatial.unit_command, view)
 
 
 def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
@@ -96,20 +104,20 @@ def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
     )
 
 
-def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand) -> Command:
+def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view: View) -> Command:
     """The command that a click on the screen or the minimap gives to the selected units."""
     target, point = 0, None
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
-        point = seat.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
-        if Aim.UNIT in abilities.aims_of(seat.world.catalog, message.ability_id):
+        point = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
+        if Target.UNIT in abilities.aims_of(message.ability_id):
             sight = seat.look()
-            row = at_point(sight, seat.types, point, seat.screen.scale / 2)
+            row = at_point(sight, seat.types, point, view.screen.scale / 2)
             if row is not None:
                 target, point = int(sight.tag[row]), None
     elif message.HasField("target_minimap_coord"):
         pixel = message.target_minimap_coord
-        point = seat.minimap.to_world(float(pixel.x), float(pixel.y))
+        point = view.minimap.to_world(float(pixel.x), float(pixel.y))
     tags = tuple(seat.selection.tags)
     return Command(message.ability_id, tags, target=target, point=point, queue=message.queue_command)
 
@@ -139,28 +147,15 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
         elif command.point is not None:
             raw.target_world_space_pos.x = command.point[0] - seat.origin[0]
             raw.target_world_space_pos.y = command.point[1] - seat.origin[1]
-    spatial = spatial_pb2.ActionSpatial()
-    spatial.unit_command.ability_id = outcome.ability
-    spatial.unit_command.queue_command = command.queue
-    _write_target(seat, spatial.unit_command, command)
-    _write_spatial(seat, action, spatial)
-
-
-def _write_target(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, command: Command) -> None:
-    """Where the click of a command would have been: on the screen, or on the minimap if that is elsewhere."""
+    point = command.point
     if command.target:
-        x, y = seat.world.pos[seat.world.slot_of(command.target)]
-    elif command.point is not None:
-        x, y = command.point
-    else:
-        return
-    column, row = (math.floor(v) for v in seat.screen.to_pixels(float(x), float(y), seat.camera))
-    if 0 <= column < seat.screen.columns and 0 <= row < seat.screen.rows:
-        message.target_screen_coord.x, message.target_screen_coord.y = column, row
-        return
-    column, row = (math.floor(v) for v in seat.minimap.to_pixels(float(x), float(y)))
-    message.target_minimap_coord.x = int(np.clip(column, 0, seat.minimap.columns - 1))
-    message.target_minimap_coord.y = int(np.clip(row, 0, seat.minimap.rows - 1))
+        x, y = seat.world.pos[seat.world.slot_of(command.target)].tolist()
+        point = x, y
+    for spatial, view in _images(seat, action):
+        spatial.unit_command.ability_id = outcome.ability
+        spatial.unit_command.queue_command = command.queue
+        if point is not None:
+            pixels.write_target(spatial.unit_command, view, seat.camera, point)
 
 
 # camera and clicks ----------------------------------------------------------------------------------------------------
@@ -174,19 +169,5 @@ def _move_camera(seat: Seat, point: tuple[float, float], loop: int) -> None:
         centre = action.action_raw.camera_move.center_world_space
         centre.x, centre.y = x - seat.origin[0], y - seat.origin[1]
         centre.z = seat.hands.camera_z
-    spatial = spatial_pb2.ActionSpatial()
-    column, row = (math.floor(v) for v in seat.minimap.to_pixels(x, y))
-    spatial.camera_move.center_minimap.x = min(column, seat.minimap.columns - 1)
-    spatial.camera_move.center_minimap.y = min(row, seat.minimap.rows - 1)
-    _write_spatial(seat, action, spatial)
-
-
-def _report_spatial(seat: Seat, spatial: spatial_pb2.ActionSpatial, loop: int) -> None:
-    _write_spatial(seat, seat.report(loop), spatial)
-
-
-def _write_spatial(seat: Seat, action: sc.Action, spatial: spatial_pb2.ActionSpatial) -> None:
-    if seat.options.HasField("feature_layer"):
-        action.action_feature_layer.CopyFrom(spatial)
-    if seat.options.HasField("render"):
-        action.action_render.CopyFrom(spatial)
+    for spatial, view in _images(seat, action):
+        pixels.write_camera(spatial.camera_move, view, seat.camera)

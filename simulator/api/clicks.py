@@ -18,6 +18,7 @@ from simulator.api.sight import Alliance
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from simulator.api.projection import Screen
     from simulator.api.seat import Seat
 
 Point = spatial_pb2.ActionSpatialUnitSelectionPoint
@@ -26,12 +27,12 @@ Panel = ui_pb2.ActionMultiPanel
 IdleWorker = ui_pb2.ActionSelectIdleWorker
 
 
-def select(seat: Seat, spatial: spatial_pb2.ActionSpatial) -> bool:
-    """A click or a rectangle on the screen."""
+def select(seat: Seat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bool:
+    """A click or a rectangle on the screen that the player looks at."""
     if spatial.HasField("unit_selection_point"):
-        return _select_point(seat, spatial.unit_selection_point)
+        return _select_point(seat, spatial.unit_selection_point, screen)
     if spatial.HasField("unit_selection_rect"):
-        return _select_rectangles(seat, spatial.unit_selection_rect)
+        return _select_rectangles(seat, spatial.unit_selection_rect, screen)
     return False
 
 
@@ -82,11 +83,11 @@ def _is_own(seat: Seat, tag: int) -> bool:
     return slot >= 0 and bool(seat.world.owner[slot] == seat.player)
 
 
-def _select_point(seat: Seat, click: Point) -> bool:
+def _select_point(seat: Seat, click: Point, screen: Screen) -> bool:
     pixel = click.selection_screen_coord
     sight, types = seat.look(), seat.types
-    world_point = seat.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
-    row = picking.at_point(sight, types, world_point, seat.screen.scale / 2)
+    world_point = screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
+    row = picking.at_point(sight, types, world_point, screen.scale / 2)
     if row is None:
         return False
     tag = int(sight.tag[row])
@@ -102,12 +103,12 @@ def _select_point(seat: Seat, click: Point) -> bool:
     return _choose(seat, [tag], add=click.type == Point.Toggle)
 
 
-def _select_rectangles(seat: Seat, drag: spatial_pb2.ActionSpatialUnitSelectionRect) -> bool:
+def _select_rectangles(seat: Seat, drag: spatial_pb2.ActionSpatialUnitSelectionRect, screen: Screen) -> bool:
     sight, types = seat.look(), seat.types
     rows = [np.zeros(0, np.intp)]
     for rectangle in drag.selection_screen_coord:
         corners = (
-            seat.screen.to_world(float(pixel.x), float(pixel.y), seat.camera) for pixel in (rectangle.p0, rectangle.p1)
+            screen.to_world(float(pixel.x), float(pixel.y), seat.camera) for pixel in (rectangle.p0, rectangle.p1)
         )
         rows.append(picking.in_rectangle(sight, types, *corners))
     return _choose(seat, sight.tag[np.unique(np.concatenate(rows))], add=drag.selection_add)

@@ -16,7 +16,6 @@ import numpy as np
 from s2clientprotocol import spatial_pb2
 
 from simulator.api import wire
-from simulator.api.projection import Minimap, Rect, Screen
 from simulator.api.raster import Layer, draw_discs, sample
 from simulator.api.sight import Cloak, Display
 
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from s2clientprotocol import sc2api_pb2
 
+    from simulator.api.projection import View
     from simulator.api.raster import Discs
     from simulator.api.sight import Sight
     from simulator.api.wire import Part
@@ -71,13 +71,14 @@ class Frame:
     selected: Bools  # [n] rows of the sight
     camera: tuple[float, float]
     attacked: Floats  # [k, 2] places of alerts since the last observation
+    fogged: bool  # what the player does not see is dark
 
 
 class FeatureLayers:
     """The feature layers that one client asked for; keeps what stays the same from frame to frame."""
 
-    def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, screen: Screen, minimap: Minimap) -> None:
-        self.screen, self.minimap = screen, minimap
+    def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, view: View) -> None:
+        self.screen, self.minimap = screen, minimap = view.screen, view.minimap
         hidden = frozenset() if setup.allow_cheating_layers else CHEATING
         shown = {name: bits for name, bits in MINIMAP_BITS.items() if name not in hidden}
         self._screen = _Image(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
@@ -204,13 +205,3 @@ def _ratio(part: Floats, whole: Floats) -> Floats:
 def _near(x: Floats, y: Floats, margin: Floats, columns: int, rows: int) -> NDArray[np.intp]:
     inside = (x > -margin) & (x < columns + margin) & (y > -margin) & (y < rows + margin)
     return np.flatnonzero(inside)
-
-
-def screen_of(setup: sc2api_pb2.SpatialCameraSetup) -> Screen:
-    """The screen that a client asked for; 24 world units wide unless it says so."""
-    return Screen(setup.resolution.x, setup.resolution.y, setup.width or 24.0)
-
-
-def minimap_of(setup: sc2api_pb2.SpatialCameraSetup, area: Rect) -> Minimap:
-    """The minimap that a client asked for, of this part of the map."""
-    return Minimap(setup.minimap_resolution.x, setup.minimap_resolution.y, area)

@@ -16,6 +16,7 @@ from simulator.api.clock import Clock
 from simulator.api.game import Game, Setup
 from simulator.api.game_info import GameInfo
 from simulator.api.process import Failure, Playing, Process
+from simulator.api.projection import size_problem
 from simulator.catalog import CatalogError
 from simulator.mapfile import SUFFIX, MapDataError, find_data, read_map
 from simulator.maps import map_names
@@ -23,7 +24,6 @@ from simulator.maps import map_names
 if TYPE_CHECKING:
     from simulator.maps import GameMap
 
-_MAX_LAYER_PIXELS = 4096
 _MAX_PLAYERS = 15
 
 
@@ -150,15 +150,8 @@ def _check_join(request: sc.RequestJoinGame) -> None:
 
 
 def _check_options(options: sc.InterfaceOptions) -> None:
-    if options.HasField("render"):
-        raise _cannot_join(sc.ResponseJoinGame.FeatureUnsupported, "Rendered images are not supported yet")
-    if not options.HasField("feature_layer"):
-        return
-    layers = options.feature_layer
-    for size in (layers.resolution, layers.minimap_resolution):
-        if not (0 < size.x <= _MAX_LAYER_PIXELS and 0 < size.y <= _MAX_LAYER_PIXELS):
-            text = f"Feature layers of {size.x} x {size.y} pixels; between 1 and {_MAX_LAYER_PIXELS} are possible"
-            raise _cannot_join(sc.ResponseJoinGame.OtherError, text)
+    if problem := size_problem(options):
+        raise _cannot_join(sc.ResponseJoinGame.OtherError, problem)
 
 
 def _with_participant(setup: Setup, place: int, request: sc.RequestJoinGame) -> Setup:

@@ -15,7 +15,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import ui, wire
-from simulator.api.abilities import usable
+from simulator.api.abilities import abilities_of
 from simulator.api.layers import Frame
 from simulator.api.raw import Units, write_image
 from simulator.api.score import Holdings
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _OBSERVATION = sc.ResponseObservation.DESCRIPTOR.fields_by_name["observation"].number
 _LAYERS = sc.Observation.DESCRIPTOR.fields_by_name["feature_layer_data"].number
+_RENDERS = sc.Observation.DESCRIPTOR.fields_by_name["render_data"].number
 _ALARM_PAUSE_LOOPS = 160
 """Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
 
@@ -56,12 +57,16 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
         observation.score.CopyFrom(holdings.score())
     if seat.options.raw:
         _write_raw(observation.raw_data, seat, sight, selected)
-    layers: list[Part] = []
-    if seat.layers is not None:
-        frame = Frame(world, seat.player, sight, selected, seat.camera, sight.pos[attacked])
-        layers = wire.embed(_LAYERS, seat.layers.encode(frame))
+    images: list[Part] = []
+    if seat.views:
+        fogged = world.fog and not (disable_fog or seat.sees_all)
+        frame = Frame(world, seat.player, sight, selected, seat.camera, sight.pos[attacked], fogged)
+        if seat.layers is not None:
+            images += wire.embed(_LAYERS, seat.layers.encode(frame))
+        if seat.renders is not None:
+            images += wire.embed(_RENDERS, seat.renders.encode(frame))
     _told(seat, sight)
-    return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *layers])]
+    return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *images])]
 
 
 def _told(seat: Seat, sight: Sight) -> None:
@@ -74,8 +79,8 @@ def _told(seat: Seat, sight: Sight) -> None:
 def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
     """What the selection can be told to do now; a foreign unit can be told nothing."""
     world = seat.world
-    own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
-    found = {ability.id: ability for slot in own for ability in usable(world, slot)}
+    rows = {int(world.type[s]) for s in seat.selection.slots(world) if world.owner[s] == seat.player}
+    found = {ability.id: ability for row in rows for ability in abilities_of(world.catalog.units[row])}
     for number in sorted(found):
         observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
 

@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from s2clientprotocol import sc2api_pb2 as sc
 
 Number = TypeVar("Number", float, "NDArray[np.float64]")
+
+MAX_PIXELS = 4096
+DEFAULT_WIDTH = 24.0
+"""World units that the screen shows along its shorter side when a client does not say."""
 
 
 class Rect(NamedTuple):
@@ -82,3 +87,30 @@ class Minimap:
     def to_world(self, column: Number, row: Number) -> tuple[Number, Number]:
         """World coordinates of the centres of pixels."""
         return self.area.x0 + (column + 0.5) * self.scale, self.area.y1 - (row + 0.5) * self.scale
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """The two images of one kind that a client looks at and clicks on."""
+
+    screen: Screen
+    minimap: Minimap
+
+
+def view_of(setup: sc.SpatialCameraSetup, area: Rect, width: float = DEFAULT_WIDTH) -> View:
+    """The images that a client asked for, the minimap of this part of the map; `width` where it named none."""
+    screen, minimap = setup.resolution, setup.minimap_resolution
+    return View(Screen(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
+
+
+def size_problem(options: sc.InterfaceOptions) -> str | None:
+    """What is wrong with the sizes of the images that a client asks for, if anything is."""
+    asked = (
+        ("Feature layers", options.HasField("feature_layer"), options.feature_layer),
+        ("Rendered images", options.HasField("render"), options.render),
+    )
+    for name, wanted, setup in asked:
+        for size in (setup.resolution, setup.minimap_resolution) if wanted else ():
+            if not (0 < size.x <= MAX_PIXELS and 0 < size.y <= MAX_PIXELS):
+                return f"{name} of {size.x} x {size.y} pixels; between 1 and {MAX_PIXELS} are possible"
+    return None

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 _AT_ONCE = 8000
 """Pixels looked at in one go: above, discs of one size at a time cost less than the idle pixels around small ones."""
 
-_DTYPES: dict[int, np.dtype[Any]] = {1: np.dtype(np.bool_), 8: np.dtype(np.uint8), 32: np.dtype("<i4")}
+_DTYPES: dict[int, np.dtype[Any]] = {
+    1: np.dtype(np.bool_), 8: np.dtype(np.uint8), 24: np.dtype(np.uint8), 32: np.dtype("<i4"),
+}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +103,10 @@ def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
 
 
 class Layer:
-    """One feature layer of a fixed size: turns its image into an `ImageData` field, ready to be joined."""
+    """One image of a fixed size: turns it into an `ImageData` field, ready to be joined.
+
+    24 bits per pixel are red, green and blue of an image [y, x, 3].
+    """
 
     def __init__(self, field: int, bits_per_pixel: int, columns: int, rows: int) -> None:
         self.bits_per_pixel = bits_per_pixel

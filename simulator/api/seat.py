@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.layers import FeatureLayers, minimap_of, screen_of
-from simulator.api.projection import Minimap, Rect, Screen
+from simulator.api.layers import FeatureLayers
+from simulator.api.projection import DEFAULT_WIDTH, Minimap, Rect, Screen, View, view_of
 from simulator.api.selection import Selection
 from simulator.api.sight import Sight, look
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from simulator.api.render import Renders
     from simulator.api.types import Types
     from simulator.world import World
 
-_WITHOUT_LAYERS = Screen(1, 1, 24.0)
+_WITHOUT_IMAGES = Screen(1, 1, DEFAULT_WIDTH)
 
 
 @dataclasses.dataclass
@@ -50,15 +51,23 @@ class Seat:
         self.playable = Rect(*world.map.terrain.playable)
         crop = options.raw_crop_to_playable_area
         self.origin: tuple[float, float] = (self.playable.x0, self.playable.y0) if crop else (0.0, 0.0)
-        layers = options.feature_layer
-        shown = self.playable if crop or layers.crop_to_playable_area else Rect(0, 0, width, height)
-        self.screen: Screen = _WITHOUT_LAYERS
-        self.minimap: Minimap = Minimap(1, 1, shown)
+        whole = Rect(0, 0, width, height)
+        self.views: dict[str, View] = {}  # by the field of an Action with clicks on them
         self.layers: FeatureLayers | None = None
+        self.renders: Renders | None = None
         if options.HasField("feature_layer"):
-            self.screen, self.minimap = screen_of(layers), minimap_of(layers, shown)
-            self.layers = FeatureLayers(layers, self.screen, self.minimap)
+            layers = options.feature_layer
+            view = view_of(layers, self.playable if crop or layers.crop_to_playable_area else whole)
+            self.views["action_feature_layer"] = view
+            self.layers = FeatureLayers(layers, view)
+        if options.HasField("render"):
+            render, otherwise = options.render, options.feature_layer.width or DEFAULT_WIDTH
+            view = view_of(render, self.playable if crop or render.crop_to_playable_area else whole, otherwise)
+            self.views["action_render"] = view
+            self.renders = _renders(view, types)
+        self.view: View = next(iter(self.views.values()), View(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
+        self.unread = False  # nobody asks for what is to be told
         self.hands = Hands(world.map.camera, self.ground_z(*world.map.camera))
         self.deaths_told = 0
         self.known: frozenset[int] = frozenset()  # tags in the last observation
@@ -70,9 +79,19 @@ class Seat:
         self.hands = other.hands
 
     @property
+    def screen(self) -> Screen:
+        """The screen on which it counts whether a unit is in view."""
+        return self.view.screen
+
+    @property
     def camera(self) -> tuple[float, float]:
         """The world point at which the camera looks."""
         return self.hands.camera
+
+    @property
+    def camera_z(self) -> float:
+        """Height of the ground there."""
+        return self.hands.camera_z
 
     @property
     def selection(self) -> Selection:
@@ -106,3 +125,9 @@ class Seat:
         action = sc.Action(game_loop=loop)
         self.hands.echoes.append(action)
         return action
+
+
+def _renders(view: View, types: Types) -> Renders:
+    from simulator.api.render import Renders  # noqa: PLC0415  # with it comes OpenCV, which few games need
+
+    return Renders(view, types)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 API_NEUTRAL = 16
+_VISIBLE_CELL = 2
 
 # Columns are compared with the `value` of an enum: converting the enum itself takes numpy 2 us more each time.
 
@@ -151,3 +152,20 @@ def _cloak(world: World, player: int, own: Bools) -> Ints:
     detected = world.visible[player, world.live]
     enemy = np.where(detected, Cloak.DETECTED.value, Cloak.CLOAKED.value)
     return np.where(hiding, np.where(own, Cloak.ALLIED.value, enemy), Cloak.NOT_CLOAKED.value)
+
+
+def alliance_of(owner: Ints, player: int) -> Ints:
+    """Whose side these owners are on for a player, as `Alliance`."""
+    return _alliance(owner, owner == player)
+
+
+def sees(world: World, player: int, points: Floats) -> Bools:
+    """(n,) whether a player sees the ground at world points (n, 2) now; points off the map are not seen."""
+    width, height = world.map.terrain.size
+    x, y = np.floor(points[:, 0]).astype(np.intp), np.floor(points[:, 1]).astype(np.intp)
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    if not world.fog:
+        return inside
+    cells = world.visibility[player, np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
+    seen: Bools = inside & (cells == _VISIBLE_CELL)
+    return seen

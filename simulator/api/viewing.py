@@ -13,6 +13,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator.api.clock import LOOPS_PER_SECOND
 from simulator.api.game_info import GameInfo
 from simulator.api.process import Failure, Playing
+from simulator.api.projection import size_problem
 from simulator.api.replay import Replay, ReplayError, rerun
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.Respons
         raise _cannot_start(error.name, str(error)) from error
     if not request.HasField("options"):
         raise _cannot_start("MissingOptions", "Say what to observe")
-    if request.options.HasField("render"):
-        raise _cannot_start("LaunchError", "Rendered images are not supported yet")
+    if problem := size_problem(request.options):
+        raise _cannot_start("LaunchError", problem)
     player = request.observed_player_id
     if player not in replay.interfaces:
         raise _cannot_start("InvalidObservedPlayerId", f"Nobody played as player {player} in the replay")

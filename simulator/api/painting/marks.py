@@ -1,0 +1,93 @@
+"""Small marks on a rendered image: bars, rings, shots, sparks. Works in pixels, on the image that it is given.
+
+Above: `scene.py`, `overview.py`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+
+from simulator.api.painting import palette
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from simulator.api.painting.palette import Colour
+
+    Image = NDArray[np.uint8]
+    Point = tuple[float, float]
+
+SHIFT = 4
+"""OpenCV takes fractions of pixels as whole numbers of sixteenths."""
+_ONE = 1 << SHIFT
+BEAM_OPACITY = 0.62
+
+
+def fixed(value: float) -> int:
+    """A coordinate as OpenCV takes it with `SHIFT`, where whole numbers are the middles of pixels."""
+    return round((value - 0.5) * _ONE)
+
+
+def health_colour(share: float) -> Colour:
+    """Red, yellow or green."""
+    return palette.HEALTH[0 if share <= 1 / 3 else 1 if share <= 2 / 3 else 2]
+
+
+def bars(
+    image: Image, middle: int, bottom: int, width: int, height: int, shares: Sequence[tuple[float, Colour]]
+) -> None:
+    """Bars of one width above each other, the first on top, on a dark ground; `bottom` is the row below them."""
+    rows, columns = image.shape[:2]
+    left, top = middle - width // 2, bottom - height * len(shares)
+    x0, x1 = max(0, left), min(columns, left + width)
+    if x0 >= x1 or bottom <= 0 or top >= rows:
+        return
+    image[max(0, top - 1) : bottom + 1, max(0, left - 1) : x1 + 1] = palette.BAR
+    for share, colour in shares:
+        filled = min(x1, left + max(round(width * share), 1 if share > 0 else 0))
+        if filled > x0 and top + height > 0:
+            image[max(0, top) : top + height, x0:filled] = colour
+        top += height
+
+
+def ring(image: Image, centre: Point, radius: float, colour: Colour, width: int = 1) -> None:
+    """A circle with soft edges."""
+    at = (fixed(centre[0]), fixed(centre[1]))
+    cv2.circle(image, at, round(radius * _ONE), colour, width, cv2.LINE_AA, SHIFT)
+
+
+def line(image: Image, start: Point, end: Point, colour: Colour, width: int = 1) -> None:
+    """A line with soft edges."""
+    one, other = (fixed(start[0]), fixed(start[1])), (fixed(end[0]), fixed(end[1]))
+    cv2.line(image, one, other, colour, width, cv2.LINE_AA, SHIFT)
+
+
+def beams(image: Image, shots: Iterable[tuple[Point, Point, Colour]], width: int) -> None:
+    """Shots from attackers to targets, the ground shining through."""
+    over = image.copy()
+    for start, end, colour in shots:
+        line(over, start, end, colour, width)
+    cv2.addWeighted(over, BEAM_OPACITY, image, 1 - BEAM_OPACITY, 0, dst=image)
+
+
+def spark(image: Image, at: Point, size: float, turn: int) -> None:
+    """A small cross of light where somebody is hit; `turn` varies it."""
+    x, y = at
+    a, b = (
+        ((size, size * 0.35), (-size * 0.35, size))
+        if turn % 2
+        else ((size * 0.7, -size * 0.7), (size * 0.7, size * 0.7))
+    )
+    for dx, dy in (a, b):
+        line(image, (x - dx, y - dy), (x + dx, y + dy), (255, 250, 210))
+
+
+def missile(image: Image, at: Point, tail: Point, colour: Colour, size: float) -> None:
+    """A bright head with a short tail."""
+    line(image, tail, at, colour, 1)
+    cv2.circle(image, (fixed(at[0]), fixed(at[1])), round(size * _ONE), (255, 255, 255), -1, cv2.LINE_AA, SHIFT)

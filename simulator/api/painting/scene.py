@@ -1,0 +1,173 @@
+"""The screen: what the camera shows, painted from the ground up.
+
+In order: ground and fog, effects on the ground, units from below to above, shots, effects that hang over the units,
+bars. Above: `render.py`. Below: `ground.py`, `sprites.py`, `weather.py`, `marks.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from simulator.api.painting import marks, palette, weather
+from simulator.api.painting.ground import Ground
+from simulator.api.painting.silhouettes import Class, class_of
+from simulator.api.painting.sprites import DIRECTIONS, Look, sprite_of
+from simulator.api.shots import in_flight, strikes
+from simulator.api.sight import Alliance, Cloak, Display
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from simulator.api.layers import Frame
+    from simulator.api.painting.marks import Point
+    from simulator.api.painting.palette import Colour
+    from simulator.api.painting.sprites import Sprite
+    from simulator.api.projection import Screen
+    from simulator.api.sight import Sight
+    from simulator.api.types import Types
+
+    Image = NDArray[np.uint8]
+
+GRID_FROM = 5.0
+"""Pixels per cell from which the cells are shown."""
+SPARK_LOOPS = 2
+BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
+"""What has no bars until it is damaged."""
+
+
+class Actor(NamedTuple):
+    """One unit on the screen, in pixels."""
+
+    row: int  # of the sight
+    x: float
+    y: float
+    radius: float
+
+
+class ScenePainter:
+    """Paints the screen of one client; keeps the ground under the camera and the sprites it has used."""
+
+    def __init__(self, screen: Screen, types: Types) -> None:
+        self._screen, self._types = screen, types
+        self._scale = 1 / screen.scale
+        self._sprites: dict[tuple[int, int, int, bool, bool], Sprite] = {}
+        self._bare = np.array([class_of(unit) in BARE for unit in types.catalog.units])
+        self._ground = Ground(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)
+
+    def paint(self, frame: Frame) -> Image:
+        """The image of this frame."""
+        screen = self._screen
+        image = self._ground.paint(frame.world, frame.player, screen.view(frame.camera), fog=frame.fogged)
+        actors = self._actors(frame)
+        sky = weather.paint_below(image, frame, screen)
+        self._units(image, frame, actors)
+        self._shots(image, frame)
+        weather.paint_above(image, frame, screen, sky)
+        self._bars(image, frame, actors)
+        return image
+
+    def _actors(self, frame: Frame) -> list[Actor]:
+        """The units in view in drawing order: structures, units on the ground, flyers, the larger ones first."""
+        sight, screen = frame.sight, self._screen
+        x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
+        radius = sight.radius * self._scale
+        margin = radius * 2 + 4
+        near = (x > -margin) & (x < screen.columns + margin) & (y > -margin) & (y < screen.rows + margin)
+        layer = 2 * sight.flying + ~self._types.structure[sight.row]
+        rows = np.flatnonzero(near)
+        rows = rows[np.lexsort((-radius[rows], layer[rows]))]
+        columns = (rows, x[rows], y[rows], radius[rows])
+        return [Actor(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
+
+    # units ------------------------------------------------------------------------------------------------------------
+
+    def _units(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+        looks = self._looks(frame.sight)
+        selected = frame.selected.tolist()
+        for actor in actors:
+            look = looks[actor.row]
+            sprite = self._sprites.get(look)
+            if sprite is None:
+                sprite = self._sprites[look] = self._sprite(look, actor.radius)
+            if selected[actor.row]:
+                marks.ring(
+                    image, (actor.x, actor.y), actor.radius * 1.3 + 1.5, palette.SELECTED, 1 + (actor.radius > 9)
+                )
+            sprite.stamp(image, int(actor.x), int(actor.y))
+
+    def _looks(self, sight: Sight) -> list[tuple[int, int, int, bool, bool]]:
+        """For each unit what its sprite depends on: type, side, direction, whether translucent, whether unfinished."""
+        turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
+        turn *= ~self._types.structure[sight.row]
+        veiled = (sight.cloak == Cloak.ALLIED.value) | (sight.cloak == Cloak.CLOAKED.value)
+        veiled |= (sight.cloak == Cloak.DETECTED.value) | sight.hallucination | sight.burrowed
+        veiled |= sight.display != Display.VISIBLE.value
+        columns = (sight.row, sight.alliance, turn, veiled, sight.build_progress < 1)
+        return list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def _sprite(self, look: tuple[int, int, int, bool, bool], radius: float) -> Sprite:
+        row, side, direction, veiled, unfinished = look
+        unit = self._types.catalog.units[row]
+        return sprite_of(Look(unit, unit.id, side, radius, direction, veiled, unfinished))
+
+    # shots ------------------------------------------------------------------------------------------------------------
+
+    def _shots(self, image: Image, frame: Frame) -> None:
+        sight, world = frame.sight, frame.world
+        attacker, target, melee = strikes(world, sight)
+        if len(attacker):
+            self._beams(image, frame, attacker[~melee], target[~melee])
+        hurt = (world.loop - world.damaged_loop[sight.slot] <= SPARK_LOOPS) & (sight.display == Display.VISIBLE.value)
+        for row in np.flatnonzero(hurt).tolist():
+            size = max(1.5, sight.radius[row] * self._scale * 0.55)
+            marks.spark(image, self._pixel(frame, sight.pos[row]), size, int(sight.slot[row]) + world.loop)
+        flying = in_flight(world, frame.player, through_fog=not frame.fogged)
+        for pos, goal, side in zip(*flying, strict=True) if flying else ():
+            way = goal - pos
+            behind = pos - way / max(math.hypot(*way), 1e-6) * 0.6
+            livery = palette.LIVERIES[int(side)]
+            size = max(1.0, 0.11 * self._scale)
+            marks.missile(image, self._pixel(frame, pos), self._pixel(frame, behind), livery.beam, size)
+
+    def _beams(self, image: Image, frame: Frame, attacker: NDArray[np.int64], target: NDArray[np.int64]) -> None:
+        sight = frame.sight
+        shots: list[tuple[Point, Point, Colour]] = []
+        for one, other in zip(attacker.tolist(), target.tolist(), strict=True):
+            way = sight.pos[other] - sight.pos[one]
+            start = sight.pos[one] + way / max(math.hypot(*way), 1e-6) * sight.radius[one]
+            beam = palette.LIVERIES[int(sight.alliance[one])].beam
+            shots.append((self._pixel(frame, start), self._pixel(frame, sight.pos[other]), beam))
+        if shots:
+            marks.beams(image, shots, 1 + (self._scale > 14))
+
+    def _pixel(self, frame: Frame, point: NDArray[np.float64]) -> Point:
+        return self._screen.to_pixels(float(point[0]), float(point[1]), frame.camera)
+
+    # bars -------------------------------------------------------------------------------------------------------------
+
+    def _bars(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+        sight = frame.sight
+        height = 1 if self._scale < 7 else 2 if self._scale < 20 else 3
+        quiet = (sight.display != Display.VISIBLE.value) | (sight.life_max <= 0)
+        quiet |= self._bare[sight.row] & ((sight.life >= sight.life_max) | (sight.alliance == Alliance.NEUTRAL.value))
+        columns = (quiet, sight.life, sight.life_max, sight.shields, sight.shields_max, sight.energy, sight.energy_max,
+                   sight.build_progress)  # fmt: skip
+        table = list(zip(*(column.tolist() for column in columns), strict=True))
+        for actor in reversed(actors):
+            hidden, life, life_max, shields, shields_max, energy, energy_max, progress = table[actor.row]
+            if hidden:
+                continue
+            shares: list[tuple[float, Colour]] = []
+            if shields_max > 0:
+                shares.append((shields / shields_max, palette.SHIELD))
+            shares.append((life / life_max, marks.health_colour(life / life_max)))
+            if energy_max > 0:
+                shares.append((energy / energy_max, palette.ENERGY))
+            if progress < 1:
+                shares.append((progress, palette.PROGRESS))
+            width = max(7, round(actor.radius * 1.7))
+            bottom = int(actor.y - actor.radius * 1.12) - 1
+            marks.bars(image, int(actor.x), bottom, width, height, shares)
