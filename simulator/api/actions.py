@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from s2clientprotocol import error_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator.abilities import Aim
 from simulator.api import abilities, clicks, pixels
-from simulator.api.abilities import Command, Outcome, Target
+from simulator.api.abilities import Command, Outcome
 from simulator.api.selection import at_point, panel_order
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view:
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
         point = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
-        if Target.UNIT in abilities.aims_of(message.ability_id):
+        if Aim.UNIT in abilities.aims_of(seat.world.catalog, message.ability_id):
             sight = seat.look()
             row = at_point(sight, seat.types, point, view.screen.scale / 2)
             if row is not None:

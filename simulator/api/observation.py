@@ -15,7 +15,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import ui, wire
-from simulator.api.abilities import abilities_of
+from simulator.api.abilities import usable
 from simulator.api.layers import Frame
 from simulator.api.raw import Units, write_image
 from simulator.api.score import Holdings
@@ -79,8 +79,8 @@ def _told(seat: Seat, sight: Sight) -> None:
 def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
     """What the selection can be told to do now; a foreign unit can be told nothing."""
     world = seat.world
-    rows = {int(world.type[s]) for s in seat.selection.slots(world) if world.owner[s] == seat.player}
-    found = {ability.id: ability for row in rows for ability in abilities_of(world.catalog.units[row])}
+    own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
+    found = {ability.id: ability for slot in own for ability in usable(world, slot)}
     for number in sorted(found):
         observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
 
