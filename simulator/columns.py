@@ -120,8 +120,12 @@ class UnitColumns:
     plane_bits: Ints = trait(int)  # planes on which it can be hit
     step_max: Floats = trait(float)  # world units per loop
     step_gain: Floats = trait(float)  # world units per loop, per loop
+    step_loss: Floats = trait(float)  # world units per loop, per loop, when it brakes
+    glides: Bools = trait(bool)  # it flies and needs time to stop
     turn_cos: Floats = trait(float)  # cosine and
-    turn_sin: Floats = trait(float)  # sine of the largest turn per loop
+    turn_sin: Floats = trait(float)  # sine of the largest turn per loop while it walks
+    turn_still_cos: Floats = trait(float)  # and while
+    turn_still_sin: Floats = trait(float)  # it stands
     priority: Floats = trait(float)  # as a target
     ground_weapon: Ints = trait(int, -1)  # row of the weapon against ground units, or -1
     air_weapon: Ints = trait(int, -1)

@@ -170,7 +170,8 @@ class UnitType:
     """A unit type; ``row`` is its index in ``Catalog.units``, ``id`` the number that the API uses.
 
     ``cost`` is cumulative (a Baneling's includes its Zergling), as the API tells it; what one production charges
-    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports.
+    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type that
+    is ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast of their own accord.
     """
 
     row: int
@@ -200,6 +201,7 @@ class UnitType:
     acceleration_n: float = 0.0
     deceleration_n: float = 0.0
     turn_deg_n: float = 0.0
+    turn_still_deg_n: float | None = None
     creep_factor: float = 1.0
     mover: str = ""
     push: int = 10
@@ -226,6 +228,8 @@ class UnitType:
     made_by: tuple[Production, ...] = ()
     priority: int = 0
     defensive: bool = False
+    passive: bool = False
+    like: str = ""
     flees: bool = False
     weapons: tuple[Weapon, ...] = ()
     footprint: str = ""

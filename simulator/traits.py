@@ -10,6 +10,7 @@ from simulator.armament import weapon_traits
 from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.mechanics import MECHANICS
+from simulator.stats import INSTANT_ACCELERATION_N
 
 if TYPE_CHECKING:
     from simulator.buffs import Buff
@@ -39,8 +40,6 @@ def body_traits(world: World, slot: int) -> None:
     unit = world.unit_type(slot)
     kinds = kinds_on(world, slot)
     at = (int(world.owner[slot]), unit.row)
-    turn_deg = unit.turn_deg_n / LOOPS_PER_NORMAL_SECOND
-    turn = math.radians(min(turn_deg, INSTANT_TURN_DEG))
     world.radius[slot] = unit.radius
     world.separation[slot] = unit.separation
     world.clearance[slot] = min(unit.separation if unit.inner is None else unit.inner, MECHANICS.body_clearance)
@@ -54,7 +53,9 @@ def body_traits(world: World, slot: int) -> None:
     world.energy_max[slot], world.energy_regen[slot] = world.stats.energy_max[at], world.stats.energy_regen[at]
     world.life_delay[slot] = unit.life_regen_delay_n * LOOPS_PER_NORMAL_SECOND
     world.shield_delay[slot] = unit.shield_regen_delay_n * LOOPS_PER_NORMAL_SECOND
-    world.turn_cos[slot], world.turn_sin[slot] = math.cos(turn), math.sin(turn)
+    _turning(world, slot, unit)
+    world.step_loss[slot] = _braking(unit)
+    world.glides[slot] = unit.flying and math.isfinite(world.step_loss[slot])
     world.creep_factor[slot] = unit.creep_factor
     world.walled[slot] = len(world.footprint_cells(slot)) > 0
     world.priority[slot] = unit.priority
@@ -68,6 +69,20 @@ def body_traits(world: World, slot: int) -> None:
         _change(world, slot, kind)
     if kinds or world.build_progress[slot] < 1.0:
         _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
+
+
+def _turning(world: World, slot: int, unit: UnitType) -> None:
+    walking_deg = min(unit.turn_deg_n / LOOPS_PER_NORMAL_SECOND, INSTANT_TURN_DEG)
+    still_deg = min((unit.turn_still_deg_n or unit.turn_deg_n) / LOOPS_PER_NORMAL_SECOND, INSTANT_TURN_DEG)
+    walking, still = math.radians(walking_deg), math.radians(still_deg)
+    world.turn_cos[slot], world.turn_sin[slot] = math.cos(walking), math.sin(walking)
+    world.turn_still_cos[slot], world.turn_still_sin[slot] = math.cos(still), math.sin(still)
+
+
+def _braking(unit: UnitType) -> float:
+    """Speed lost per loop; a type without a deceleration of its own brakes as it accelerates (an estimate)."""
+    rate_n = unit.deceleration_n or unit.acceleration_n
+    return math.inf if rate_n >= INSTANT_ACCELERATION_N else rate_n / LOOPS_PER_NORMAL_SECOND**2
 
 
 # buffs ----------------------------------------------------------------------------------------------------------------
@@ -124,6 +139,7 @@ def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
         world.step_max[slot] = 0.0
     if helpless or "unturning" in flags:
         world.turn_cos[slot], world.turn_sin[slot] = 1.0, 0.0
+        world.turn_still_cos[slot], world.turn_still_sin[slot] = 1.0, 0.0
     if flags & {"invulnerable", "stasis"}:
         world.targetable[slot] = False
     world.cloaked[slot] = (world.cloaked[slot] or "cloak" in flags) and "uncloaked" not in flags

@@ -1,7 +1,9 @@
-"""Movement: steps towards the next corner, along the headings of ``avoidance``, acceleration and turning.
+"""Movement: steps towards the next corner, along the headings of ``avoidance``; acceleration, braking and turning.
 
 Everybody steps as if alone; ``collision`` then carries the steps out, pushes bodies apart and off the walls, and
-notes who was blocked.
+notes who was blocked. Whoever needs time to stop brakes in time to stand exactly on its goal, and a flyer that no
+longer wants to go anywhere coasts to a stop. A ground unit has to face its way to make headway, a flyer flies where it
+is facing.
 """
 
 from __future__ import annotations
@@ -18,59 +20,134 @@ if TYPE_CHECKING:
     from simulator.geometry import Floats
     from simulator.world import World
 
+TURNING_CIRCLES = 4.0  # a flyer this many steps from its goal no longer swings around
+
 
 def move(world: World) -> None:
     """Choose this loop's steps and turn; writes ``intended``, ``speed`` and ``heading``."""
     n = world.top
     wants = world.wants[:n]
-    slots, wanted = _fighting_on_the_spot(world)
-    if some(wants):
+    coasting = _coasting(world)
+    if some(wants) or coasting.size:
+        drift = _drift(world, coasting)
         world.speed[:n] *= wants
         world.intended[:n] = 0.0
+        _coast(world, coasting, drift)
         walkers = which(wants)
-        direction = _walk(world, walkers)
-        slots, wanted = np.concatenate((walkers, slots)), np.concatenate((direction, wanted))
+        if walkers.size:
+            _walk(world, walkers)
         world.stirred = True
     elif world.stirred:
         world.speed[:n] = 0.0
         world.intended[:n] = 0.0
         world.stirred = False
-    if slots.size:
-        world.heading[slots] = geometry.turn_towards(
-            world.heading.take(slots, 0), wanted, world.turn_cos.take(slots), world.turn_sin.take(slots)
-        )
+    _face_targets(world)
 
 
-def _fighting_on_the_spot(world: World) -> tuple[Ints, Floats]:
-    """Those who stand and fight, with the direction of their target; what can't turn keeps its heading."""
+def _face_targets(world: World) -> None:
+    """Turn those who stand and fight to their target; turrets and what can't turn keep the body's heading."""
     fighters = world.fighters
     turning = world.aim_cos.take(fighters) > -1.0
     turning &= ~world.turreted.take(fighters)
     turning &= ~world.wants.take(fighters)
     slots = fighters[turning]
-    return slots, world.toward.take(slots, 0)
+    if slots.size:
+        world.heading[slots] = geometry.turn_towards(
+            world.heading.take(slots, 0),
+            world.toward.take(slots, 0),
+            world.turn_still_cos.take(slots),
+            world.turn_still_sin.take(slots),
+        )
 
 
-def _walk(world: World, walkers: Ints) -> Floats:
-    """Choose the steps of all who walk; returns the directions (k, 2) to turn to."""
+# flyers that stop -----------------------------------------------------------------------------------------------------
+
+
+def _coasting(world: World) -> Ints:
+    """Flyers that have speed left and nowhere to go."""
+    n = world.top
+    left = (world.speed[:n] > 0.0) & ~world.wants[:n]
+    if some(left):
+        left &= world.glides[:n]
+        left &= world.step_max[:n] > 0.0
+    return which(left)
+
+
+def _drift(world: World, slots: Ints) -> Floats:
+    """(k, 2) their steps of this loop: as the last one, a little shorter."""
+    last = world.intended.take(slots, 0)
+    speed = np.maximum(world.speed.take(slots) - world.step_loss.take(slots), 0.0)
+    drift: Floats = last * (speed / np.maximum(geometry.length(last), 1e-12))[:, None]
+    return drift
+
+
+def _coast(world: World, slots: Ints, drift: Floats) -> None:
+    if slots.size:
+        world.intended[slots] = drift
+        world.speed[slots] = geometry.length(drift)
+
+
+# walkers --------------------------------------------------------------------------------------------------------------
+
+
+def _walk(world: World, walkers: Ints) -> None:
+    """Choose the steps of all who walk, and turn them."""
     pos = world.pos.take(walkers, 0)
     offset = world.nav_point.take(walkers, 0) - pos
     distance = geometry.length(offset)
     direction = offset / np.maximum(distance, 1e-12)[:, None]
+    straight = world.nav_straight.take(walkers)
+    left = np.maximum(distance - world.stop_at.take(walkers) * straight, 0.0)
     speed = np.minimum(world.speed.take(walkers) + world.step_gain.take(walkers), _top_speed(world, walkers, pos))
-    left = distance - world.stop_at.take(walkers) * world.nav_straight.take(walkers)
-    step = np.minimum(speed, np.maximum(left, 0.0))
+    speed = _braked(world, walkers, speed, left, straight)
     aside = world.aside.take(walkers, 0)
     if np.count_nonzero(aside):
         turned: Bools = (aside[:, 0] != 0.0) | (aside[:, 1] != 0.0)
         turned &= world.detour.take(walkers) != 0
         direction = np.where(turned[:, None], aside, direction)
-    world.speed[walkers] = speed
-    world.intended[walkers] = direction * step[:, None]
+    step = np.minimum(speed, left)
     moving = step > 0.0
     if np.count_nonzero(moving) < len(moving):
         direction = np.where(moving[:, None], direction, world.heading.take(walkers, 0))
-    return direction
+    step, way = _turn(world, walkers, direction, step, left)
+    world.speed[walkers] = speed
+    world.intended[walkers] = way * step[:, None]
+
+
+def _braked(world: World, walkers: Ints, speed: Floats, left: Floats, straight: Bools) -> Floats:
+    """Speeds from which each walker can still stop at its goal; one with another order behind it does not."""
+    loss = world.step_loss.take(walkers)
+    braking = np.isfinite(loss) & straight
+    if not some(braking):
+        return speed
+    loss = np.where(braking, loss, 0.0)
+    least = np.sqrt(2.0 * loss * left + 0.25 * loss * loss) - 0.5 * loss
+    braking &= least < speed
+    for i in which(braking).tolist():
+        braking[i] = not world.queue[walkers[i]]
+    return np.where(braking, least, speed)
+
+
+def _turn(world: World, walkers: Ints, wanted: Floats, step: Floats, left: Floats) -> tuple[Floats, Floats]:
+    """Turn walkers to the wanted directions (k, 2); returns how far and which way they get in the meantime."""
+    facing = world.heading.take(walkers, 0)
+    product = facing * wanted
+    error_cos = product[:, 0] + product[:, 1]
+    turn_cos, turn_sin = world.turn_cos.take(walkers), world.turn_sin.take(walkers)
+    late = error_cos < turn_cos
+    if not some(late):
+        world.heading[walkers] = wanted
+        return step, wanted
+    standing = (world.speed.take(walkers) <= 0.0) | (error_cos < 0.0)
+    turn_cos = np.where(standing, world.turn_still_cos.take(walkers), turn_cos)
+    turn_sin = np.where(standing, world.turn_still_sin.take(walkers), turn_sin)
+    facing = geometry.turn_towards(facing, wanted, turn_cos, turn_sin)
+    world.heading[walkers] = facing
+    product = facing * wanted
+    swings = world.glides.take(walkers)
+    swings &= left > TURNING_CIRCLES * step
+    step = np.where(swings, step, step * np.maximum(product[:, 0] + product[:, 1], 0.0))
+    return step, np.where(swings[:, None], facing, wanted)
 
 
 def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:

@@ -116,7 +116,7 @@ def test_bodies_of_different_layers_pass_through_each_other(field: Any) -> None:
     colossus, zealot = field.put("Colossus", 1, 10, 16), field.put("Zealot", 1, 22, 16)
     commands.move(world, [colossus], (22, 16))
     commands.move(world, [zealot], (10, 16))
-    nearest = min(math.dist(world.pos[colossus], world.pos[zealot]) for _ in field.loops(86))
+    nearest = min(math.dist(world.pos[colossus], world.pos[zealot]) for _ in field.loops(90))
     assert nearest < 0.2
     assert math.dist(world.pos[zealot], (10, 16)) < 0.1
 
