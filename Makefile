@@ -8,7 +8,7 @@ PYTHONS ?= 3.11 3.12 3.13
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
 
-.PHONY: help install check format types test test-all demo bench docs golden picture clean
+.PHONY: help install check format types test slow test-all demo bench docs golden picture clean
 
 help: ## What can be made
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -30,6 +30,9 @@ demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripte
 
 test: install check ## What CI runs: lint, types, contracts and every test
 	$(RUN)pytest
+
+slow: install ## The tests that take long: PySC2's own in full, whole matches
+	$(RUN)pytest -m slow
 
 check: install ## Lint, format, types and import contracts
 	$(RUN)ruff check .
