@@ -123,7 +123,7 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
         raise CatalogError(f"no tables for game version {version!r}; shipped are {known}")
     weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
     weapon_of_id = {w.id: w for w in weapons}
-    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_rows(name, "units")))
+    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(_rows(name, "units"))))
     abilities = tuple(ability_from(raw) for raw in _rows(name, "abilities"))
     cards = _cards(units, abilities)
     buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
@@ -156,7 +156,7 @@ def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple
         for user in ability.users:
             if ability.does not in ("", "general", "smart") and user in of_name:
                 of_name[user][ability.id] = ability
-    return tuple(_card(unit, of_name[unit.name], smart) for unit in units)
+    return tuple(_card(unit, of_name[unit.like or unit.name], smart) for unit in units)
 
 
 def _card(unit: UnitType, found: dict[int, Ability], smart: Ability) -> tuple[Ability, ...]:
@@ -181,6 +181,12 @@ def _rows(version: str, kind: str) -> list[dict[str, Any]]:
     path = resources.files("simulator.data") / "tables" / version / f"{kind}.json"
     rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["rows"]
     return rows
+
+
+def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows, where one that is ``like`` another has all of that one that it does not say itself."""
+    of_name = {row["name"]: row for row in rows}
+    return [{**of_name[row["like"]], "made_by": (), **row} if "like" in row else row for row in rows]
 
 
 def _pairs(bonus: dict[str, float]) -> tuple[tuple[str, float], ...]:
