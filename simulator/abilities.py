@@ -153,19 +153,15 @@ def need_from(raw: dict[str, Any] | None) -> Need | None:
     """The condition in a row of the tables, or None."""
     if raw is None:
         return None
-    for kind in ("unit", "upgrade", "behavior"):
-        if kind in raw:
-            return Need(kind, raw[kind], raw.get("state", "done"))
-    for kind in ("and", "or"):
-        if kind in raw:
-            return Need(kind, parts=_parts(raw[kind]))
-    if "not" in raw:
-        return Need("not", parts=_parts([raw["not"]]))
-    if "cmp" in raw:
-        return Need("cmp", raw["cmp"], parts=_parts(raw["args"]))
-    if "op" in raw:
-        return Need("op", raw["op"], parts=_parts(raw["args"]))
-    return Need("const", value=raw.get("const"))
+    kind = next(
+        kind for kind in ("unit", "upgrade", "behavior", "and", "or", "not", "cmp", "op", "const") if kind in raw
+    )
+    if kind in ("unit", "upgrade", "behavior"):
+        return Need(kind, raw[kind], raw.get("state", "done"))
+    if kind == "const":
+        return Need(kind, value=raw["const"])
+    parts = raw["args"] if kind in ("cmp", "op") else [raw["not"]] if kind == "not" else raw[kind]
+    return Need(kind, raw[kind] if kind in ("cmp", "op") else "", parts=_parts(parts))
 
 
 def _parts(raws: list[dict[str, Any] | None]) -> tuple[Need, ...]:

@@ -35,29 +35,41 @@ def met(world: World, slot: int, need: Need | None) -> bool:
 
 def _count(world: World, slot: int, need: Need) -> float:
     """The value of a condition: how many there are, or 1 and 0 for true and false."""
-    match need.kind:
-        case "and":
-            return float(all(_count(world, slot, part) > 0 for part in need.parts))
-        case "or":
-            return float(any(_count(world, slot, part) > 0 for part in need.parts))
-        case "not":
-            return float(not _count(world, slot, need.parts[0]) > 0)
-        case "cmp":
-            left, right = (_count(world, slot, part) for part in need.parts)
-            return float(COMPARE[need.name](left, right))
-        case "op":
-            return 1.0  # the tables' only one allows what melee games always allow
-        case "const":
-            return need.value or 0.0
-        case "behavior":
-            known = need.name in world.catalog.buff_of_name
-            return float(known and buffs.has(world, slot, need.name))
-        case "upgrade":
-            return _upgrades(world, int(world.owner[slot]), need)
-    return _units(world, slot, need)
+    return RULES[need.kind](world, slot, need)
 
 
-def _upgrades(world: World, player: int, need: Need) -> float:
+def _all(world: World, slot: int, need: Need) -> float:
+    return float(all(_count(world, slot, part) > 0 for part in need.parts))
+
+
+def _any(world: World, slot: int, need: Need) -> float:
+    return float(any(_count(world, slot, part) > 0 for part in need.parts))
+
+
+def _not(world: World, slot: int, need: Need) -> float:
+    return float(_count(world, slot, need.parts[0]) <= 0)
+
+
+def _compared(world: World, slot: int, need: Need) -> float:
+    left, right = (_count(world, slot, part) for part in need.parts)
+    return float(COMPARE[need.name](left, right))
+
+
+def _allowed(_: World, __: int, ___: Need) -> float:
+    """The tables' only operation allows what melee games always allow."""
+    return 1.0
+
+
+def _constant(_: World, __: int, need: Need) -> float:
+    return need.value or 0.0
+
+
+def _buffs(world: World, slot: int, need: Need) -> float:
+    return float(need.name in world.catalog.buff_of_name and buffs.has(world, slot, need.name))
+
+
+def _upgrades(world: World, slot: int, need: Need) -> float:
+    player = int(world.owner[slot])
     upgrade = next((u for u in world.catalog.upgrades if u.name == need.name), None)
     if upgrade is None:
         return 0.0
@@ -78,6 +90,19 @@ def _units(world: World, slot: int, need: Need) -> float:
     if need.state.startswith("queued"):
         found += sum(world.catalog.units[row].name in world.players[player].underway for row in rows)
     return found
+
+
+RULES: Final[dict[str, Callable[[World, int, Need], float]]] = {
+    "and": _all,
+    "or": _any,
+    "not": _not,
+    "cmp": _compared,
+    "op": _allowed,
+    "const": _constant,
+    "behavior": _buffs,
+    "upgrade": _upgrades,
+    "unit": _units,
+}
 
 
 @lru_cache(maxsize=512)

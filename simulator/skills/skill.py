@@ -72,8 +72,9 @@ def number(cast_or_ability: Cast | Ability, name: str, default: float | None = N
 def around(
     world: World, point: Point, radius: float, *, plane: str = "any", edge: bool = True, structures: bool = True
 ) -> list[int]:
-    """Slots of the living units within ``radius`` of a point, ascending; to their edge, or with ``edge`` off to their
-    centre. Units that can't be touched are left out.
+    """Slots of the living units within ``radius`` of a point, ascending, those that can't be touched left out.
+
+    Measured to their edge, or to their centre with ``edge`` off.
     """
     slots = world.live
     offset = world.pos[slots] - np.array(point)

@@ -38,26 +38,27 @@ def look_out(world: World) -> None:
 
 def _try(world: World, slot: int, ability: Ability) -> bool:
     order = OrderKind(int(world.order_kind[slot]))
-    if not ability.transient and order not in FREE:
-        return False
-    if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
-        return False
-    skill = casting.skill_of(ability)
-    target = skill.pick(world, slot, ability) if skill.pick is not None else nearest(world, slot, ability)
-    if target == NOBODY and ability.requires_point:
-        return False
-    cast = Cast(slot, ability, target, begun=world.loop)
-    if casting.aim_refusal(world, cast) is not Refusal.SUCCESS:
-        return False
-    if order is OrderKind.HOLD and not casting.in_range(world, cast):
+    cast = _choose(world, slot, ability) if ability.transient or order in FREE else None
+    if cast is None or (order is OrderKind.HOLD and not casting.in_range(world, cast)):
         return False
     if ability.transient:
         casting.perform(world, cast)
         return True
     waiting = ([] if order is OrderKind.IDLE else world.orders_of(slot)[:1]) + world.queue[slot]
-    commands.begin(world, slot, Order(OrderKind.CAST, ability.id, target=world.tag_of(target)))
+    commands.begin(world, slot, Order(OrderKind.CAST, ability.id, target=world.tag_of(cast.target)))
     world.queue[slot] = waiting
     return True
+
+
+def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
+    """The cast that a unit would make of an ability now, or None."""
+    if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+        return None
+    pick = casting.skill_of(ability).pick or nearest
+    target = pick(world, slot, ability)
+    cast = Cast(slot, ability, target, begun=world.loop)
+    aimless = target == NOBODY and ability.requires_point
+    return None if aimless or casting.aim_refusal(world, cast) is not Refusal.SUCCESS else cast
 
 
 def nearest(world: World, slot: int, ability: Ability) -> int:

@@ -51,7 +51,7 @@ def _seen_units(world: World, player: int) -> NDArray[np.bool_]:
     if hidden.any():
         found = np.flatnonzero(hidden)
         hidden[found[_detected(world, player, slots[found])]] = False
-    seen = seen & ~hidden
+    seen &= ~hidden
     return seen
 
 
