@@ -1,20 +1,44 @@
-"""Effects on the ground as a player perceives them: storms, scans, biles on their way.
+"""What lies on the ground and on units for a time, as a player perceives it: effects, buffs, the power of pylons.
 
-The one place that decides which are told; the raw list, the feature layer and the rendered image show the same.
-Below: `sight.py`, the world's fields.
+The one place that decides which are told; raw data, feature layers and rendered images show the same. Below:
+`sight.py`, the world's fields and buffs.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from simulator.api.sight import sees
+from simulator.api.sight import Alliance, Display, sees
+from simulator.buffs import FOREVER
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from simulator.api.sight import Sight
+    from simulator.api.types import Types
     from simulator.fields import Field
     from simulator.world import World
+
+    Ints = NDArray[np.int64]
+    Floats = NDArray[np.float64]
+
+
+class Worn(NamedTuple):
+    """Buffs on units of a sight, one row each, in the order in which they came."""
+
+    row: Ints  # of the sight
+    id: Ints  # of the API
+    remain: Floats  # loops, 0 for one without an end
+    total: Floats  # loops that it lasts, 0 for one without an end
+
+
+class Spots(NamedTuple):
+    """Discs of the world."""
+
+    pos: Floats  # [n, 2] world
+    radius: Floats
 
 
 def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[Field]:
@@ -23,3 +47,28 @@ def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list
     if through_fog or not told:
         return told
     return [f for f in told if f.owner == player or sees(world, player, np.array(f.points, float)).any()]
+
+
+def seen_buffs(world: World, sight: Sight) -> Worn | None:
+    """The buffs that clients are told of on units that are seen clearly, None if there are none."""
+    if not len(world.buffs):
+        return None
+    rows = world.buffs.rows
+    row_of = np.full(world.capacity, -1)
+    clear = np.flatnonzero(sight.display == Display.VISIBLE.value)
+    row_of[sight.slot[clear]] = clear
+    ids = np.array([buff.id for buff in world.catalog.buffs])[rows["buff"]]
+    told = np.flatnonzero((ids > 0) & (row_of[rows["slot"]] >= 0))
+    rows, end = rows[told], rows["end"][told]
+    ends = end < FOREVER
+    remain, total = np.where(ends, end - world.loop, 0.0), np.where(ends, end - rows["begun"], 0.0)
+    return Worn(row_of[rows["slot"]], ids[told], np.maximum(remain, 0.0), total)
+
+
+def power(sight: Sight, types: Types) -> Spots | None:
+    """Where the player's own finished structures give power, None if nowhere."""
+    reach = types.power[sight.row]
+    if not reach.any():
+        return None
+    gives = (reach > 0) & (sight.alliance == Alliance.SELF.value) & (sight.build_progress >= 1) & ~sight.hallucination
+    return Spots(sight.pos[gives], reach[gives])

@@ -16,6 +16,7 @@ import numpy as np
 from s2clientprotocol import spatial_pb2
 
 from simulator.api import wire
+from simulator.api.effects import Spots, power, seen_buffs, seen_fields
 from simulator.api.raster import Layer, draw_discs, sample
 from simulator.api.sight import Cloak, Display
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from simulator.api.projection import View
     from simulator.api.raster import Discs
     from simulator.api.sight import Sight
+    from simulator.api.types import Types
     from simulator.api.wire import Part
     from simulator.world import World
 
@@ -50,11 +52,11 @@ MINIMAP_BITS = {
 VALUES = (
     "player_id", "player_relative", "unit_type", "selected", "unit_hit_points", "unit_hit_points_ratio",
     "unit_shields", "unit_shields_ratio", "unit_energy", "unit_energy_ratio", "hallucinations", "cloaked", "active",
-    "build_progress",
+    "build_progress", "placeholder", "buffs", "buff_duration",
 )  # fmt: skip
 """Layers that show a value of the topmost unit at each pixel."""
 
-BLANK = ("power", "effects", "blip", "buffs", "buff_duration", "placeholder")
+BLANK = ("blip",)
 """Screen layers of things that the world does not have yet."""
 
 CHEATING = frozenset({"unit_type"})
@@ -66,6 +68,7 @@ class Frame:
     """What the feature layers of one observation show."""
 
     world: World
+    types: Types
     player: int
     sight: Sight
     selected: Bools  # [n] rows of the sight
@@ -86,7 +89,7 @@ class FeatureLayers:
 
     def encode(self, frame: Frame) -> list[Part]:
         """The parts of an `ObservationFeatureLayer`."""
-        values = unit_values(frame.sight, frame.selected)
+        values = unit_values(frame)
         return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
 
     def _encode_screen(self, frame: Frame, values: Ints) -> list[Part]:
@@ -105,7 +108,31 @@ class FeatureLayers:
         layers = image.layers
         parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
         parts += layers["unit_density"].encode(discs.density) + layers["unit_density_aa"].encode(discs.smooth)
+        parts += self._effects(frame) + self._power(frame)
         return parts + [part for name in BLANK for part in layers[name].blank]
+
+    def _effects(self, frame: Frame) -> list[Part]:
+        """Effect ids at their places; of two at one pixel the younger one."""
+        layer = self._screen.layers["effects"]
+        if not frame.world.fields:
+            return layer.blank
+        fields = seen_fields(frame.world, frame.player, through_fog=not frame.fogged)
+        spots = [(x, y, field.radius, field.effect) for field in fields for x, y in field.points]
+        table = np.array(spots, np.float64).reshape(-1, 4)
+        return self._spots(layer, Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
+
+    def _power(self, frame: Frame) -> list[Part]:
+        layer, spots = self._screen.layers["power"], power(frame.sight, frame.types)
+        return layer.blank if spots is None else self._spots(layer, spots, np.ones(len(spots.pos), np.int32), frame)
+
+    def _spots(self, layer: Layer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
+        """Discs of the world with a value each."""
+        screen = self.screen
+        x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
+        radius = spots.radius / screen.scale
+        near = _near(x, y, radius + 1, screen.columns, screen.rows)
+        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
+        return layer.encode_pixels(discs.pixels, values[near].take(discs.rows))
 
     def _encode_minimap(self, frame: Frame, values: Ints) -> list[Part]:
         minimap, image = self.minimap, self._minimap
@@ -177,17 +204,19 @@ class _Image:
         return self._terrain + self._visibility
 
 
-def unit_values(sight: Sight, selected: Bools) -> Ints:
+def unit_values(frame: Frame) -> Ints:
     """[len(VALUES), n] value of each unit in each layer that shows units.
 
     Hit points, shields and energy are whole points, their ratios 0 to 255; the progress of a structure is 0 to 255
-    while it is being built and 0 afterwards.
+    while it is being built and 0 afterwards. Of several buffs on a unit the last one is shown, its duration as the
+    part that remains, 0 to 255; one without an end stays at 255.
     """
-    values = np.empty((len(VALUES), len(sight)), np.int32)
+    sight = frame.sight
+    values = np.zeros((len(VALUES), len(sight)), np.int32)
     values[0] = sight.owner
     values[1] = sight.alliance
     values[2] = sight.type_id
-    values[3] = selected
+    values[3] = frame.selected
     values[4], values[5] = sight.life, _ratio(sight.life, sight.life_max)
     values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
     values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
@@ -195,6 +224,11 @@ def unit_values(sight: Sight, selected: Bools) -> Ints:
     values[11] = (sight.cloak != Cloak.NOT_CLOAKED.value) & (sight.cloak != Cloak.UNKNOWN.value)
     values[12] = sight.active
     values[13] = (sight.build_progress < 1) * sight.build_progress * 255
+    values[14] = sight.display == Display.PLACEHOLDER.value
+    worn = seen_buffs(frame.world, sight)
+    if worn is not None:
+        values[15, worn.row] = worn.id
+        values[16, worn.row] = np.where(worn.total > 0, _ratio(worn.remain, worn.total), 255)
     return values
 
 

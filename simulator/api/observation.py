@@ -60,7 +60,7 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
     images: list[Part] = []
     if seat.views:
         fogged = world.fog and not (disable_fog or seat.sees_all)
-        frame = Frame(world, seat.player, sight, selected, seat.camera, sight.pos[attacked], fogged)
+        frame = Frame(world, game.types, seat.player, sight, selected, seat.camera, sight.pos[attacked], fogged)
         if seat.layers is not None:
             images += wire.embed(_LAYERS, seat.layers.encode(frame))
         if seat.renders is not None:

@@ -45,6 +45,7 @@ class Types:
         self.cargo: Ints = self._column(lambda unit: unit.cargo_space, np.int64)
         self.subgroup: Ints = self._column(lambda unit: unit.subgroup, np.int64)
         self.resource: Ints = self._column(lambda unit: unit.resource_amount, np.int64)
+        self.power: Floats = self._column(lambda unit: max((radius for radius, _ in unit.power), default=0.0))
         self.flying: Bools = self._column(lambda unit: unit.flying, np.bool_)
         self.structure: Bools = self._column(lambda unit: unit.structure, np.bool_)
         self.army: Bools = self._column(lambda unit: unit.army, np.bool_)

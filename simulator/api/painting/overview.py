@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     Image = NDArray[np.uint8]
 
-LEAST = 1.1
+LEAST = 1.4
 """Radius in pixels of the smallest dot."""
 
 

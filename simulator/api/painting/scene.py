@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 GRID_FROM = 5.0
 """Pixels per cell from which the cells are shown."""
 SPARK_LOOPS = 2
+SMALL, TALL = 5.0, 30.0
+"""Radius in pixels below which bars are one pixel high, and from which they are three."""
 BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 """What has no bars until it is damaged."""
 
@@ -85,26 +87,24 @@ class ScenePainter:
     # units ------------------------------------------------------------------------------------------------------------
 
     def _units(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
-        looks = self._looks(frame.sight)
-        selected = frame.selected.tolist()
+        looks, selected = self._looks(frame.sight), frame.selected.tolist()
+        for actor in actors:
+            if selected[actor.row]:
+                width = 1 + (actor.radius > 9)
+                marks.ring(image, (actor.x, actor.y), actor.radius * 1.3 + 1.5, palette.SELECTED, width)
         for actor in actors:
             look = looks[actor.row]
             sprite = self._sprites.get(look)
             if sprite is None:
                 sprite = self._sprites[look] = self._sprite(look, actor.radius)
-            if selected[actor.row]:
-                marks.ring(
-                    image, (actor.x, actor.y), actor.radius * 1.3 + 1.5, palette.SELECTED, 1 + (actor.radius > 9)
-                )
             sprite.stamp(image, int(actor.x), int(actor.y))
 
     def _looks(self, sight: Sight) -> list[tuple[int, int, int, bool, bool]]:
         """For each unit what its sprite depends on: type, side, direction, whether translucent, whether unfinished."""
         turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
         turn *= ~self._types.structure[sight.row]
-        veiled = (sight.cloak == Cloak.ALLIED.value) | (sight.cloak == Cloak.CLOAKED.value)
-        veiled |= (sight.cloak == Cloak.DETECTED.value) | sight.hallucination | sight.burrowed
-        veiled |= sight.display != Display.VISIBLE.value
+        veiled = (sight.cloak != Cloak.NOT_CLOAKED.value) | (sight.display != Display.VISIBLE.value)
+        veiled |= sight.hallucination | sight.burrowed
         columns = (sight.row, sight.alliance, turn, veiled, sight.build_progress < 1)
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
@@ -137,9 +137,13 @@ class ScenePainter:
         shots: list[tuple[Point, Point, Colour]] = []
         for one, other in zip(attacker.tolist(), target.tolist(), strict=True):
             way = sight.pos[other] - sight.pos[one]
-            start = sight.pos[one] + way / max(math.hypot(*way), 1e-6) * sight.radius[one]
+            ahead = way / max(math.hypot(*way), 1e-6)
+            start, end = (
+                sight.pos[one] + ahead * sight.radius[one],
+                sight.pos[other] - ahead * sight.radius[other] * 0.7,
+            )
             beam = palette.LIVERIES[int(sight.alliance[one])].beam
-            shots.append((self._pixel(frame, start), self._pixel(frame, sight.pos[other]), beam))
+            shots.append((self._pixel(frame, start), self._pixel(frame, end), beam))
         if shots:
             marks.beams(image, shots, 1 + (self._scale > 14))
 
@@ -150,7 +154,6 @@ class ScenePainter:
 
     def _bars(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
         sight = frame.sight
-        height = 1 if self._scale < 7 else 2 if self._scale < 20 else 3
         quiet = (sight.display != Display.VISIBLE.value) | (sight.life_max <= 0)
         quiet |= self._bare[sight.row] & ((sight.life >= sight.life_max) | (sight.alliance == Alliance.NEUTRAL.value))
         columns = (quiet, sight.life, sight.life_max, sight.shields, sight.shields_max, sight.energy, sight.energy_max,
@@ -170,4 +173,5 @@ class ScenePainter:
                 shares.append((progress, palette.PROGRESS))
             width = max(7, round(actor.radius * 1.7))
             bottom = int(actor.y - actor.radius * 1.12) - 1
+            height = 1 if actor.radius < SMALL else 2 if actor.radius < TALL else 3
             marks.bars(image, int(actor.x), bottom, width, height, shares)

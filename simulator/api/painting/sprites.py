@@ -35,9 +35,10 @@ REACH = 1.8
 ONE_LETTER, ALL_LETTERS = 4.6, 7.5
 """Radius in pixels from which a unit carries the first of its letters, and all of them."""
 UPRIGHT = frozenset({Class.STRUCTURE, Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
+NOSE = ((1.22, 0), (0.74, 0.2), (0.74, 0))
+"""The tick that shows where a unit faces, as half an outline."""
 GHOST, UNFINISHED = 0.5, 0.75
 """Opacity of what is cloaked or not real, and of what is being built."""
-_OPAQUE = 256
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,31 +56,24 @@ class Look:
 
 @dataclasses.dataclass(frozen=True)
 class Sprite:
-    """An image that is laid over another: `paint + image * keep / 256`, its middle on the unit."""
+    """An image that is laid over another: `paint + image * keep / 255`."""
 
-    paint: NDArray[np.uint16]  # [2 h + 1, 2 h + 1, 3]
-    keep: NDArray[np.uint16]  # [2 h + 1, 2 h + 1, 1], 256 where nothing is painted
-    half: int
+    paint: Image  # [h, w, 3]
+    keep: Image  # [h, w, 3] 255 where nothing is painted; three times the same, which is ten times as fast as once
+    left: int  # columns from the unit's pixel to the first one
+    top: int
 
     def stamp(self, image: Image, column: int, row: int) -> None:
-        """Lays the sprite over an image at a pixel; what is outside is left away."""
-        half, (rows, columns) = self.half, image.shape[:2]
-        x0, y0 = max(0, column - half), max(0, row - half)
-        x1, y1 = min(columns, column + half + 1), min(rows, row + half + 1)
+        """Lays the sprite over an image, the unit at this pixel; what is outside is left away."""
+        left, top = column + self.left, row + self.top
+        (rows, columns), (height, width) = image.shape[:2], self.paint.shape[:2]
+        x0, y0, x1, y1 = max(0, left), max(0, top), min(columns, left + width), min(rows, top + height)
         if x0 >= x1 or y0 >= y1:
             return
-        left, top = column - half, row - half
         inside = (slice(y0 - top, y1 - top), slice(x0 - left, x1 - left))
         region = image[y0:y1, x0:x1]
-        shine = region * self.keep[inside]
-        shine >>= 8
-        shine += self.paint[inside]
-        region[...] = shine
-
-
-def direction_of(facing: float) -> int:
-    """The drawn direction that is nearest to a facing in radians."""
-    return round(facing * DIRECTIONS / (2 * math.pi)) % DIRECTIONS
+        cv2.multiply(region, self.keep[inside], dst=region, scale=1 / 255)
+        cv2.add(region, self.paint[inside], dst=region)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -171,6 +165,8 @@ class _Easel:
             self._lay(self._mask(self._points(outline_of(look.unit), 0.5)), (12, 40, 20))
         if self.kind is Class.WORKER:
             self._lay(self._mask(self._points(((0.1, 0), (-0.2, 0.3), (-0.5, 0)))), livery.dark)
+        if self.kind not in UPRIGHT:
+            self._lay(self._mask(self._points(NOSE)), livery.ink, 0.9)
         if look.unfinished:
             line = np.arange(self.size) // (2 * self.finer)
             stripes = ((line[:, None] + line) % 2).astype(np.uint8)
@@ -192,9 +188,12 @@ class _Easel:
         thin = GHOST if self.look.ghost else UNFINISHED if self.look.unfinished else 1.0
         if self.kind is Class.BARRIER:
             thin *= GHOST
-        keep = np.round((1 - self.cover * thin) * _OPAQUE).astype(np.uint16)
-        paint = np.clip(np.round(self.colour * thin), 0, 255 * (1 - keep / _OPAQUE)).astype(np.uint16)
-        return Sprite(paint, keep, self.half)
+        keep = np.repeat(np.round((1 - self.cover * thin) * 255), 3, axis=2).astype(np.uint8)
+        paint = np.clip(np.round(self.colour * thin), 0, 255 - keep).astype(np.uint8)
+        rows, columns = (np.flatnonzero((keep[..., 0] < 255).any(axis=axis)) for axis in (1, 0))
+        box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+        left, top = int(columns[0]) - self.half, int(rows[0]) - self.half
+        return Sprite(np.ascontiguousarray(paint[box]), np.ascontiguousarray(keep[box]), left, top)
 
 
 @functools.cache
