@@ -25,6 +25,7 @@ from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
 from simulator.shots import Missiles, PendingHits, Sweep
+from simulator.snapshots import Memory
 from simulator.stats import Stats
 from simulator.traits import body_traits
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
+    from simulator.contacts import Bodies
     from simulator.fields import Field
     from simulator.maps import GameMap
     from simulator.refusal import Refusal
@@ -95,6 +97,7 @@ class World(UnitColumns):
         self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
         self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
         self.looked_at = -1  # the population that ``visible`` was written for
+        self.memories = [Memory() for _ in self.players]  # what each player remembers of what the fog covers
         self.missiles = Missiles()
         self.pending = PendingHits()
         self.sweeps: list[Sweep] = []
@@ -115,7 +118,7 @@ class World(UnitColumns):
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
         self.settled = -1  # the population among which no body touched another when all last stood still
-        self.pairs: tuple[Floats, Floats, Floats] | None = None  # collision.pair_table of this population
+        self.bodies: Bodies | None = None  # of this population
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.mortal = False  # whether anybody's life is timed
         self.hiding = False  # whether anybody is cloaked or burrowed
@@ -146,7 +149,7 @@ class World(UnitColumns):
         self.burrowed[slot] = unit.burrowed
         self.born_loop[slot] = self.loop
         autocast = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
-        if autocast:
+        if autocast and not unit.passive:
             self.autocast[slot] = autocast
         self.queue[slot] = []
         self.looks_around[slot] = True
@@ -327,12 +330,13 @@ class World(UnitColumns):
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
         sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
         sha.update(self.visibility.tobytes())
+        sha.update(repr([list(memory.of_unit.values()) for memory in self.memories]).encode())
         return sha.hexdigest()
 
     def _population_changed(self) -> None:
         self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
-        self.pairs = None
+        self.bodies = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
         self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
@@ -348,7 +352,7 @@ class World(UnitColumns):
             energy or bool(self.energy_regen[slot]),
         )
         self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
-        self.pairs = None
+        self.bodies = None
         self.looked_at = -1
         self.scan_now = True
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from simulator.api.types import Types
+    from simulator.snapshots import Snapshot
     from simulator.world import World
 
     Bools = NDArray[np.bool_]
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 API_NEUTRAL = 16
+EMPTY_SLOT = 0
 _VISIBLE_CELL = 2
 
 # Columns are compared with the `value` of an enum: converting the enum itself takes numpy 2 us more each time.
@@ -105,7 +107,39 @@ def look(world: World, types: Types, player: int, *, show_cloaked: bool, through
     order = np.argsort(types.flying[world.type[world.live]], kind="stable")
     keep = order[told[order]]
     hidden = (~seen | undetected)[keep]
-    return _columns(world, types, keep, hidden, own[keep], np.where(seen, cloak, Cloak.UNKNOWN.value)[keep])
+    sight = _columns(world, types, keep, hidden, own[keep], np.where(seen, cloak, Cloak.UNKNOWN.value)[keep])
+    shown = [] if through_fog else world.memories[player].shown
+    return _with_snapshots(sight, world, types, player, shown) if shown else sight
+
+
+def _with_snapshots(sight: Sight, world: World, types: Types, player: int, shown: list[Snapshot]) -> Sight:
+    """The sight with a row for each snapshot before the units; its slot is the empty one."""
+    row = np.array([s.row for s in shown])
+    owner = np.array([s.owner for s in shown])
+    pos = np.array([s.pos for s in shown])
+    none = np.zeros(len(shown))
+    known: dict[str, NDArray[Any]] = {
+        "slot": np.full(len(shown), EMPTY_SLOT),
+        "row": row,
+        "tag": np.array([s.tag for s in shown]),
+        "type_id": types.id[row],
+        "owner": np.where(owner == 0, API_NEUTRAL, owner),
+        "alliance": _alliance(owner, owner == player),
+        "display": np.full(len(shown), Display.SNAPSHOT.value),
+        "cloak": np.full(len(shown), Cloak.UNKNOWN.value),
+        "pos": pos,
+        "z": world.map.terrain.ground_z(pos) + types.height[row],
+        "facing": geometry.facing(np.array([s.heading for s in shown])),
+        "radius": types.radius[row],
+        "build_progress": np.array([s.build_progress for s in shown]),
+        "flying": types.flying[row],
+    }
+    columns = {
+        field.name: np.concatenate((known.get(field.name, none).astype(column.dtype), column))
+        for field in dataclasses.fields(Sight)
+        for column in (getattr(sight, field.name),)
+    }
+    return Sight(**columns)
 
 
 def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, cloak: Ints) -> Sight:

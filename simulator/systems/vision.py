@@ -14,6 +14,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.mechanics import MECHANICS
+from simulator.snapshots import remember
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ def look(world: World) -> None:
             world.visible[player, :n] = False
             world.visible[player, world.live] = _seen_units(world, player)
         _reveal(world)
+        if world.fog and due:
+            for player in range(1, len(world.players)):
+                remember(world, player)
         world.looked_at = world.population
 
 
