@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from simulator.api.sight import Alliance, Display, sees
+from simulator.api.sight import API_NEUTRAL, Alliance, Display, alliance_of, sees
 from simulator.buffs import FOREVER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from s2clientprotocol import raw_pb2
 
+    from simulator.api.seat import Seat
     from simulator.api.sight import Sight
     from simulator.api.types import Types
     from simulator.fields import Field
@@ -38,6 +40,13 @@ class Spots(NamedTuple):
     """Discs of the world."""
 
     pos: Floats  # [n, 2] world
+    radius: Floats
+
+
+class Power(NamedTuple):
+    """Units of a sight that give power, and how far."""
+
+    row: NDArray[np.intp]  # of the sight
     radius: Floats
 
 
@@ -65,10 +74,32 @@ def seen_buffs(world: World, sight: Sight) -> Worn | None:
     return Worn(row_of[rows["slot"]], ids[told], np.maximum(remain, 0.0), total)
 
 
-def power(sight: Sight, types: Types) -> Spots | None:
-    """Where the player's own finished structures give power, None if nowhere."""
+def power(sight: Sight, types: Types) -> Power | None:
+    """Which of the player's own finished units give power, None if none does."""
     reach = types.power[sight.row]
     if not reach.any():
         return None
     gives = (reach > 0) & (sight.alliance == Alliance.SELF.value) & (sight.build_progress >= 1) & ~sight.hallucination
-    return Spots(sight.pos[gives], reach[gives])
+    rows = np.flatnonzero(gives)
+    return Power(rows, reach[rows])
+
+
+def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool) -> None:
+    """Adds the effects that the player perceives to the raw data."""
+    for field in seen_fields(seat.world, seat.player, through_fog=through_fog):
+        side = int(alliance_of(np.array([field.owner]), seat.player)[0])
+        effect = raw.effects.add(effect_id=field.effect, radius=field.radius, alliance=side)
+        effect.owner = field.owner or API_NEUTRAL
+        for x, y in field.points:
+            effect.pos.add(x=x - seat.origin[0], y=y - seat.origin[1])
+
+
+def write_power(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight) -> None:
+    """Adds the player's sources of power to the raw data."""
+    sources = power(sight, seat.types)
+    if sources is None:
+        return
+    for row, radius in zip(sources.row.tolist(), sources.radius.tolist(), strict=True):
+        source = raw.player.power_sources.add(radius=radius, tag=int(sight.tag[row]))
+        x, y = sight.pos[row].tolist()
+        source.pos.x, source.pos.y, source.pos.z = x - seat.origin[0], y - seat.origin[1], float(sight.z[row])

@@ -122,8 +122,11 @@ class FeatureLayers:
         return self._spots(layer, Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
 
     def _power(self, frame: Frame) -> list[Part]:
-        layer, spots = self._screen.layers["power"], power(frame.sight, frame.types)
-        return layer.blank if spots is None else self._spots(layer, spots, np.ones(len(spots.pos), np.int32), frame)
+        layer, sources = self._screen.layers["power"], power(frame.sight, frame.types)
+        if sources is None:
+            return layer.blank
+        spots = Spots(frame.sight.pos[sources.row], sources.radius)
+        return self._spots(layer, spots, np.ones(len(sources.row), np.int32), frame)
 
     def _spots(self, layer: Layer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
         """Discs of the world with a value each."""
