@@ -14,10 +14,12 @@ from simulator.catalog import VERSION_OF_BUILD
 
 if TYPE_CHECKING:
     from google.protobuf.message import Message
+    from s2clientprotocol import sc2api_pb2 as sc
 
     from simulator.api.clock import Clock
     from simulator.api.game import Game, Setup
     from simulator.api.game_info import GameInfo
+    from simulator.api.lan import Peers
     from simulator.api.seat import Seat
 
 _PATCH_OF_BUILD = {75689: "4.10.0", 92440: "5.0.13"}
@@ -32,6 +34,17 @@ class Failure(Exception):
         self.body = body
 
 
+@dataclasses.dataclass(frozen=True)
+class Party:
+    """Who is there when a game begins, as one of them sees it."""
+
+    setup: Setup
+    interfaces: dict[int, sc.InterfaceOptions]  # of the participants
+    me: int  # number of the client's own place
+    watched: int | None  # the player that it observes, 0 all of them; None if it plays
+    options: sc.InterfaceOptions  # its own
+
+
 @dataclasses.dataclass
 class Playing:
     """A game with the seat of the client that is connected to this process."""
@@ -41,6 +54,8 @@ class Playing:
     info: GameInfo
     replay: bool = False
     clock: Clock | None = None  # of a game in real time
+    party: Party | None = None  # with which the game began, if it is no replay
+    peers: Peers | None = None  # the other processes of the game
     episode: int = 0  # restarts of the same game before this one
 
 
@@ -56,6 +71,12 @@ class Process:
         self.maps: dict[str, bytes] = {}  # saved by the client, under the path that it gave
         self.setup: Setup | None = None  # of the game that is created and not yet joined
         self.playing: Playing | None = None
+
+    def play(self, playing: Playing | None) -> None:
+        """Turns to another game, or to none; the other processes of the one before are left."""
+        before, self.playing = self.playing, playing
+        if before is not None and before.peers is not None:
+            before.peers.close()
 
     @property
     def over(self) -> bool:
