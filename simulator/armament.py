@@ -63,7 +63,7 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     world.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
     world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
     world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
-    world.acquires[slot] = bool(weapons) and not (unit.defensive or unit.uncommandable) and owner != 0
+    world.acquires[slot] = bool(weapons) and not (unit.defensive or unit.passive or unit.uncommandable) and owner != 0
     world.guns_walking[slot] = any(w.fires_moving and w.moves == "moving" for w in weapons)
     world.spares_structures[slot] = bool(weapons) and all(
         w.acquires == "unit" or w.excluding == "structure" for w in weapons

@@ -6,6 +6,7 @@ All grids are indexed ``[y, x]`` with row 0 at y = 0 (the bottom), cell (x, y) c
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,12 +17,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.scenario import Scenario, parse_scenario
+from simulator.scenario import Flat, Scenario
+from simulator.scenariofile import Sheet, sheets
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from simulator.geometry import Floats
 
 Grid = NDArray[np.bool_]
+Box = tuple[int, int, int, int]
+
+BASES = "bases"
+"""The folder beside the families whose files are only extended by others."""
+FIRST_CHOICE = "llm_smac"
+"""The family that a bare name means when several have it: its maps end by themselves."""
+FLAT_Z = 10.0
+FLAT_CLIFF = 128
+HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
 
 
 class MapError(ValueError):
@@ -33,7 +46,7 @@ class Terrain:
     """The unchanging ground: (h, w) grids unless a line says otherwise."""
 
     size: tuple[int, int]  # width, height in cells
-    playable: tuple[int, int, int, int]  # x0, y0, x1, y1; x1 and y1 exclusive
+    playable: Box  # x0, y0, x1, y1; x1 and y1 exclusive
     walk: Grid  # a ground unit's centre may be here
     glide: Grid  # a cliff walker's centre may be here
     build: Grid  # structures may stand here
@@ -85,12 +98,29 @@ class GameMap:
 
 
 @lru_cache(maxsize=1)
+def _families() -> tuple[str, ...]:
+    """The folders of shipped maps, sorted."""
+    root = resources.files("simulator.data") / "maps"
+    return tuple(sorted(folder.name for folder in root.iterdir() if folder.is_dir() and folder.name != BASES))
+
+
+@lru_cache(maxsize=32)
+def _sheets(family: str) -> Mapping[str, Sheet]:
+    """The scenarios of a family's shipped files as ``family/name``; none of a family that is not there."""
+    if family not in _families():
+        return {}
+    found: dict[str, Sheet] = {}
+    for file in (resources.files("simulator.data") / "maps" / family).iterdir():
+        if file.name.endswith(".yaml"):
+            named = sheets(file.read_text(encoding="utf-8"), f"{family}/{file.name}")
+            found |= {f"{family}/{name}": sheet for name, sheet in named}
+    return found
+
+
+@lru_cache(maxsize=1)
 def map_names() -> tuple[str, ...]:
     """All shipped maps as ``family/name``, sorted."""
-    root = resources.files("simulator.data") / "maps"
-    families = (f for f in root.iterdir() if f.is_dir())
-    found = (f"{f.name}/{m.name[:-5]}" for f in families for m in f.iterdir() if m.name.endswith(".yaml"))
-    return tuple(sorted(found))
+    return tuple(sorted(name for family in _families() for name in _sheets(family)))
 
 
 def find_map(name: str) -> str:
@@ -101,11 +131,12 @@ def find_map(name: str) -> str:
     """
     parts = Path(name.replace("\\", "/")).with_suffix("").parts if name.endswith(".SC2Map") else Path(name).parts
     exact = "/".join(parts[-2:])
-    if exact in map_names():
+    if len(parts) > 1 and exact in _sheets(parts[-2]):
         return exact
     same = [known for known in map_names() if parts and known.split("/")[1] == parts[-1]]
-    if len(same) == 1:
-        return same[0]
+    preferred = [known for known in same if known.split("/")[0] == FIRST_CHOICE]
+    if len(same) == 1 or preferred:
+        return (preferred or same)[0]
     if same:
         raise MapError(f"map {name!r} is ambiguous: {', '.join(same)}")
     raise MapError(f"no map {name!r}; shipped are {', '.join(map_names())}")
@@ -118,20 +149,34 @@ def load_map(name: str) -> GameMap:
 
 @lru_cache(maxsize=128)
 def _load(full_name: str) -> GameMap:
-    data = resources.files("simulator.data")
-    text = (data / "maps" / f"{full_name}.yaml").read_text(encoding="utf-8")
-    return map_from(parse_scenario(text, f"{full_name}.yaml"), text)
+    sheet = _sheets(full_name.partition("/")[0])[full_name]
+    return map_from(sheet.scenario(), sheet.canonical())
 
 
 def map_from(scenario: Scenario, text: str) -> GameMap:
-    """Join a scenario, whose file held ``text``, with its shipped terrain."""
-    terrain, content = _terrain(scenario.terrain)
-    digest = hashlib.sha256(text.encode() + content).hexdigest()
-    return GameMap(scenario.name, scenario.family, terrain, scenario, digest)
+    """Join a scenario, which ``text`` tells completely, with its terrain."""
+    if isinstance(scenario.terrain, Flat):
+        terrain, content = _flat(scenario.terrain.flat)
+    else:
+        terrain, content = _shipped(scenario.terrain)
+    return game_map(scenario, terrain, text.encode() + content)
+
+
+def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
+    """The map of a scenario on a terrain, which ``content`` tells completely."""
+    narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
+    return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
+
+
+def height_bytes(vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(h, w) the API's height of every cell, which is that of its lower-left corner, from (h + 1, w + 1) z."""
+    scaled = np.rint((vertices[:-1, :-1] - HEIGHT_LOW) * (HEIGHT_STEPS / HEIGHT_SPAN))
+    result: NDArray[np.uint8] = np.clip(scaled, 0, HEIGHT_STEPS).astype(np.uint8)
+    return result
 
 
 @lru_cache(maxsize=32)
-def _terrain(name: str) -> tuple[Terrain, bytes]:
+def _shipped(name: str) -> tuple[Terrain, bytes]:
     path = resources.files("simulator.data") / "terrain" / f"{name}.npz"
     if not path.is_file():
         raise MapError(f"no terrain {name!r} is shipped")
@@ -154,3 +199,33 @@ def _terrain(name: str) -> tuple[Terrain, bytes]:
         vertices=arrays["vertices"],
     )
     return terrain, content
+
+
+@lru_cache(maxsize=32)
+def _flat(size: tuple[int, int]) -> tuple[Terrain, bytes]:
+    """Level ground on which everything may stand everywhere."""
+    width, height = size
+    free = np.ones((height, width), dtype=np.bool_)
+    vertices = np.full((height + 1, width + 1), FLAT_Z, dtype=np.float32)
+    cliff = np.full((height, width), FLAT_CLIFF, dtype=np.uint16)
+    none = np.zeros_like(free)
+    terrain = Terrain(size, (0, 0, width, height), free, free, free, none, cliff, height_bytes(vertices), vertices)
+    for array in (free, none, vertices, cliff, terrain.height):
+        array.setflags(write=False)
+    return terrain, repr(size).encode()
+
+
+@lru_cache(maxsize=64)
+def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
+    """The terrain of which only a part is played on; heights are told of that part alone, as the game does."""
+    x0, y0, x1, y1 = playable
+    width, height = terrain.size
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise MapError(f"the playable area {list(playable)} is not within the terrain's {width} x {height} cells")
+    inside = np.zeros_like(terrain.walk)
+    inside[y0:y1, x0:x1] = True
+    grids = {name: getattr(terrain, name) & inside for name in ("walk", "glide", "build", "creep")}
+    told = np.where(inside, terrain.height, 0).astype(np.uint8)
+    for array in (*grids.values(), told):
+        array.setflags(write=False)
+    return dataclasses.replace(terrain, playable=playable, height=told, **grids)

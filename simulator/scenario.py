@@ -1,7 +1,8 @@
 """The scenario language: what a map's own script does, as data.
 
-A scenario is one YAML file of about 30 lines: who plays, where the named points are, and an ordered list of
-triggers. A trigger says *when* it is looked at, *if* which condition holds, and what it will *do*::
+A scenario is one YAML file of about 30 lines: who plays, where the named points and regions are, what stands there,
+and an ordered list of triggers. A trigger says *when* it is looked at, *if* which condition holds, and what it will
+*do*::
 
     triggers:
       - name: spawn
@@ -16,257 +17,137 @@ triggers. A trigger says *when* it is looked at, *if* which condition holds, and
         do:
           - result: {1: victory, 2: defeat}
 
-Triggers are looked at in the order of the file, and none after the one that ends the game. Here are only the models
-and the reader; ``systems.triggers`` executes them and ``maps`` joins a scenario with its terrain.
+Triggers are looked at in the order of the file, and none after the one that ends the game. Here is only the model of
+the whole; its parts are in ``script`` and ``places``, ``scenariofile`` reads it, ``systems.triggers`` executes it and
+``maps`` joins it with its terrain.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-import yaml
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, model_validator
 
-if TYPE_CHECKING:
-    from pathlib import Path
+from simulator.places import Model, Names, PlayerId, Point, Region, UpgradeName
+from simulator.script import At, CreateSpec, Enters, Every, Made, Touches, Trigger
 
-PlayerId = Annotated[int, Field(ge=1, le=15)]
-Outcome = Literal["victory", "defeat", "tie"]
+MELEE_MINERALS = 50.0
+"""What every player has at the start of a melee game."""
+
+Box = Annotated[
+    tuple[int, int, int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+]
 
 
-class ScenarioError(ValueError):
-    """A scenario file can't be used; the text names the file, the line and the field."""
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def _as_point(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-Point = Annotated[tuple[float, float], BeforeValidator(_as_point)]
-Place = str | Point
-
-
-class Visibility(_Model):
+class Visibility(Model):
     """What the map's script switches off for everybody: the fog of war and the black mask."""
 
     fog: bool = True
     black_mask: bool = True
 
 
-class PlayerSpec(_Model):
-    """A player slot of the map."""
+class PlayerSpec(Model):
+    """A player slot of the map.
+
+    An ``open`` slot is a player only if somebody sits there. Without a ``start`` a player of a melee game gets one of
+    the scenario's start locations by chance. ``ai: melee`` lets the game's own computer player lead what he has.
+    """
 
     race: Literal["protoss", "terran", "zerg", "random"]
-    control: Literal["agent", "computer"]
+    control: Literal["agent", "computer", "open"]
     start: Point | None = None
+    minerals: Annotated[float, Field(ge=0)] | None = None
+    vespene: Annotated[float, Field(ge=0)] = 0.0
+    upgrades: tuple[UpgradeName, ...] = ()
+    ai: Literal["melee"] | None = None
 
 
-class Every(_Model):
-    """True at every multiple of this many game loops."""
+class Flat(Model):
+    """A terrain without a terrain file: level ground of this many cells."""
 
-    every_loops: Annotated[int, Field(gt=0)]
-
-
-class At(_Model):
-    """True once, at this game loop."""
-
-    at_loop: Annotated[int, Field(ge=0)]
+    flat: Annotated[tuple[int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
 
 
-def _kind(value: Any) -> str | None:
-    """Which of several models a value is meant to be: the name of its only key, or ``event`` for a word."""
-    if isinstance(value, str):
-        return "event"
-    keys = list(value) if isinstance(value, dict) else list(type(value).model_fields)
-    return str(keys[0]) if len(keys) == 1 else None
-
-
-When = Annotated[
-    Annotated[Literal["start", "unit_died"], Tag("event")]
-    | Annotated[Every, Tag("every_loops")]
-    | Annotated[At, Tag("at_loop")],
-    Discriminator(
-        _kind, custom_error_type="when", custom_error_message="give start, unit_died, {every_loops: n} or {at_loop: n}"
-    ),
-]
-
-
-class Condition(_Model):
-    """All of these must hold; ``alive`` counts the living units of a player, structures included."""
-
-    alive: dict[PlayerId, Literal["some", "none"]]
-
-
-class CreateSpec(_Model):
-    """``count`` units of one type for a player, spread around a point when there are several."""
-
-    player: PlayerId
-    unit: str
-    count: Annotated[int, Field(ge=1, le=400)] = 1
-    at: Place
-    facing: float = 4.7124
-
-
-class Create(_Model):
-    """Make units."""
-
-    create: CreateSpec
-
-
-class OrderSpec(_Model):
-    """One order to all units of a player: an attack-move, a move, or an attack on every unit of another player."""
-
-    player: PlayerId
-    attack_move: Place | None = None
-    move: Place | None = None
-    attack_units_of: PlayerId | None = None
-
-    @model_validator(mode="after")
-    def _one_order(self) -> OrderSpec:
-        given = [n for n in ("attack_move", "move", "attack_units_of") if getattr(self, n) is not None]
-        if len(given) != 1:
-            raise ValueError("give exactly one of attack_move, move, attack_units_of")
-        return self
-
-
-class Order(_Model):
-    """Command units, replacing what they did."""
-
-    order: OrderSpec
-
-
-class Result(_Model):
-    """End the game with a result for each player."""
-
-    result: dict[PlayerId, Outcome]
-
-
-Action = Annotated[
-    Annotated[Create, Tag("create")] | Annotated[Order, Tag("order")] | Annotated[Result, Tag("result")],
-    Discriminator(_kind, custom_error_type="do", custom_error_message="give exactly one of create, order, result"),
-]
-
-
-class Trigger(_Model):
-    """One rule of the map's script."""
-
-    name: str
-    when: Annotated[tuple[When, ...], Field(min_length=1)]
-    condition: Condition | None = Field(default=None, alias="if")
-    do: Annotated[tuple[Action, ...], Field(min_length=1)]
-
-
-class Scenario(_Model):
-    """A whole map script with its players and points; see the module's text for the language."""
+class Scenario(Model):
+    """A whole map: its terrain, players, places, what stands on it, and its script."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     family: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     title: str
-    terrain: str
+    terrain: str | Flat
+    playable: Box | None = None
+    """What part of the terrain is played on, ``[x0, y0, x1, y1]``; the terrain's own without it."""
     visibility: Visibility = Visibility()
     camera: Point | None = None
+    """Where the camera starts; in a melee game at the player's workers, else in the middle without it."""
+    score: Literal["melee", "curriculum", "collected"] = "melee"
+    """What the API calls the score: the game's own, the script's, or the resources that were gathered."""
+    melee: bool = False
+    """Whether every player starts with a town hall and twelve workers, and loses with the last structure."""
+    start_locations: tuple[Point, ...] = ()
     players: dict[PlayerId, PlayerSpec]
-    points: dict[str, Point] = {}
+    points: dict[str, Point] = Field(default_factory=dict)
+    regions: dict[str, Region] = Field(default_factory=dict)
+    groups: dict[str, tuple[CreateSpec, ...]] = Field(default_factory=dict)
+    """Units that triggers make by name."""
+    units: tuple[CreateSpec, ...] = ()
+    """What stands on the map before any trigger is looked at."""
     triggers: tuple[Trigger, ...] = ()
     estimates: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _names_exist(self) -> Scenario:
-        for trigger in self.triggers:
-            for action in trigger.do:
-                for place in _places(action):
-                    if isinstance(place, str) and place not in self.points:
-                        raise ValueError(f"trigger {trigger.name!r} uses the point {place!r}, which is not in points")
+    def _starts(self) -> Scenario:
+        if self.melee:
+            open_starts = len(self.start_locations)
+            without = [number for number, player in self.players.items() if player.start is None]
+            if len(without) > open_starts:
+                raise ValueError(f"a melee game needs a start location for player {without[open_starts]}")
         return self
 
     @cached_property
     def periods(self) -> tuple[int, ...]:
         """The periods in game loops at which any trigger is due."""
-        times = [when for trigger in self.triggers for when in trigger.when]
-        return tuple(sorted({when.every_loops for when in times if isinstance(when, Every)}))
+        return tuple(sorted({w.every_loops for w in self._whens if isinstance(w, Every)}))
 
     @cached_property
     def moments(self) -> frozenset[int]:
         """The single game loops at which any trigger is due."""
-        times = [when for trigger in self.triggers for when in trigger.when]
-        return frozenset(when.at_loop for when in times if isinstance(when, At))
+        return frozenset(w.at_loop for w in self._whens if isinstance(w, At))
 
-    def place(self, place: Place) -> tuple[float, float]:
-        """World coordinates of a named point or of a pair of numbers."""
-        return self.points[place] if isinstance(place, str) else place
+    @cached_property
+    def watches(self) -> bool:
+        """Whether any trigger waits for what can happen in every loop."""
+        return any(isinstance(w, Made | Enters | Touches) for w in self._whens)
 
-
-def _places(action: Action) -> list[Place]:
-    if isinstance(action, Create):
-        return [action.create.at]
-    if isinstance(action, Order):
-        return [p for p in (action.order.attack_move, action.order.move) if p is not None]
-    return []
+    @cached_property
+    def _whens(self) -> list[Any]:
+        return [when for trigger in self.triggers for when in trigger.when]
 
 
-def read_scenario(path: Path) -> Scenario:
-    """Read one scenario file.
+def names_of(raw: Any) -> Names:
+    """What the parts of a scenario may refer to, from its data before they are checked."""
+    raw = raw if isinstance(raw, dict) else {}
 
-    Raises:
-        ScenarioError: it can't be read, is no YAML, or breaks the language.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ScenarioError(f"{path}: can't be read: {error.strerror}") from error
-    return parse_scenario(text, str(path))
+    def keys(field: str) -> set[Any]:
+        value = raw.get(field)
+        return set(value) if isinstance(value, dict) else set()
 
-
-def parse_scenario(text: str, source: str) -> Scenario:
-    """The scenario in ``text``; ``source`` names it in errors."""
-    try:
-        raw = yaml.safe_load(text)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise ScenarioError(f"{source}:{line}: not YAML: {error.problem}") from error
-    try:
-        return Scenario.model_validate(raw)
-    except ValidationError as error:
-        first = error.errors()[0]
-        line, field = _locate(text, first["loc"], missing=first["type"] == "missing")
-        message = first["msg"].removeprefix("Value error, ")
-        raise ScenarioError(f"{source}:{line}: {field or 'the file'}: {message}") from error
+    return Names(
+        players=frozenset({0, *keys("players")}),
+        points=frozenset(keys("points") | set(_drawn(raw.get("triggers")))),
+        regions=frozenset(keys("regions")),
+        groups=frozenset(keys("groups")),
+    )
 
 
-def _locate(text: str, where: tuple[int | str, ...], *, missing: bool) -> tuple[int, str]:
-    """The line of the innermost part of ``where`` that the file has, and the field's name.
-
-    Parts that are no key of the file are the validator's own names of alternatives; the last one may be ``missing``.
-    """
-    node = yaml.compose(text, Loader=yaml.SafeLoader)
-    line, field = 1, ""
-    for part in where:
-        if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
-            node, field = node.value[part], f"{field}[{part}]"
-        elif isinstance(node, yaml.MappingNode):
-            found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
-            if found is None:
-                if missing and part == where[-1]:
-                    field = f"{field}.{part}".lstrip(".")
-                continue
-            node, field = found[1], f"{field}.{part}".lstrip(".")
-            line = found[0].start_mark.line + 1
-            continue
-        else:
-            continue
-        line = node.start_mark.line + 1
-    return line, field
+def _drawn(triggers: Any) -> list[str]:
+    """Names of the points that triggers draw."""
+    found: list[str] = []
+    for trigger in triggers if isinstance(triggers, list) else ():
+        actions = trigger.get("do") if isinstance(trigger, dict) else None
+        for action in actions if isinstance(actions, list) else ():
+            options = action.get("draw", ()) if isinstance(action, dict) else ()
+            for option in [options] if isinstance(options, dict) else options:
+                found += list(option) if isinstance(option, dict) else []
+    return found

@@ -8,7 +8,7 @@ import pytest
 
 from simulator.maps import GameMap, map_from
 from simulator.players import PlayerSetup
-from simulator.scenario import parse_scenario
+from simulator.scenariofile import parse_scenario
 from simulator.tick import advance
 from simulator.world import World
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator.maps import MapError, find_map, load_map, map_from, map_names
-from simulator.scenario import ScenarioError, parse_scenario, read_scenario
+from simulator.scenariofile import ScenarioError, parse_scenario, read_scenario
 from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
@@ -42,7 +42,10 @@ MISTAKES = [
     (
         "{every_loops: 48}",
         "{every_loop: 48}",
-        "duel.yaml:22: triggers[2].when[0]: give start, unit_died, {every_loops: n} or {at_loop: n}",
+        (
+            "duel.yaml:22: triggers[2].when[0]: give start, unit_died, {every_loops: n}, {at_loop: n}, {died: who}, "
+            "{made: who}, {enters: ...} or {touches: ...}"
+        ),
     ),
     (
         "{every_loops: 48}",
@@ -54,11 +57,36 @@ MISTAKES = [
     (
         ", move: middle",
         "",
-        "duel.yaml:16: triggers[0].do[2].order: give exactly one of attack_move, move, attack_units_of",
+        (
+            "duel.yaml:16: triggers[0].do[2].order: give exactly one of attack_move, move, attack_units_of, unload_at, "
+            "gather_near"
+        ),
     ),
-    ("- order:", "- command:", "duel.yaml:16: triggers[0].do[2]: give exactly one of create, order, result"),
+    (
+        "- order:",
+        "- command:",
+        (
+            "duel.yaml:16: triggers[0].do[2]: give exactly one of create, spawn, regroup, remove, order, select, draw, "
+            "score, give, result"
+        ),
+    ),
     ("unit: Zealot, ", "", "duel.yaml:14: triggers[0].do[0].create.unit: Field required"),
-    ("at: middle", "at: center", "trigger 'begin' uses the point 'center', which is not in points"),
+    (
+        "at: middle",
+        "at: center",
+        "duel.yaml:14: triggers[0].do[0].create.at: there is no point center; there are middle",
+    ),
+    (
+        "at: middle",
+        "at: midle",
+        "duel.yaml:14: triggers[0].do[0].create.at: there is no point midle; did you mean middle?",
+    ),
+    (
+        "unit: Zealot",
+        "unit: Zealott",
+        "triggers[0].do[0].create.unit: there is no unit type Zealott; did you mean Zealot?",
+    ),
+    ("player: 2, unit", "player: 3, unit", "duel.yaml:15: triggers[0].do[1].create.player: there is no player 3"),
     (
         "race: zerg",
         "race: borg",
@@ -145,5 +173,5 @@ def test_a_map_is_found_by_name_and_by_path(given: str, found: str) -> None:
 
 @pytest.mark.parametrize("given", ["", "2s4z", "smac/2s3z/x", "../../etc/passwd"])
 def test_an_unknown_map_is_told_with_those_there_are(given: str) -> None:
-    with pytest.raises(MapError, match=r"no map .*; shipped are llm_smac/1c3s5z"):
+    with pytest.raises(MapError, match=r"no map .*; shipped are Melee/Empty128, .*, mini_games/MoveToBeacon"):
         find_map(given)
