@@ -44,6 +44,8 @@ class Mechanics:
     push_limit: float
     push_firm: float
     push_idle: float
+    flyer_drift: float
+    flyer_drift_limit: float
     blocked_share: float
     detour_after: int
     detour_period: int

@@ -15,6 +15,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.contacts import within
 from simulator.mechanics import MECHANICS
 from simulator.traits import Layer
 
@@ -83,26 +84,37 @@ def _fan(way: Floats, side: Floats) -> Floats:
 
 def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Floats) -> Bools:
     """(k, h) whether ``SEEN_AHEAD`` along each heading there is no wall and no body that stands or comes nearer."""
-    bodies = world.live[~world.walled[world.live]]
-    going = world.intended.take(bodies, 0)
-    offset = world.pos.take(bodies, 0) - start[:, None, :]  # (k, m, 2)
-    apart = world.separation.take(bodies) + world.separation.take(slots)[:, None] - TOLERANCE
-    meets = (world.layer_bits.take(bodies) & world.layer_bits.take(slots)[:, None]) != 0
-    meets &= bodies != world.target.take(slots)[:, None]
-    meets &= bodies != slots[:, None]
-    meets &= way[:, 0, None] * going[:, 0] + way[:, 1, None] * going[:, 1] <= 0.0
-    meets &= offset[..., 0] ** 2 + offset[..., 1] ** 2 < (apart + SEEN_AHEAD) ** 2
     free = np.ones(headings.shape[:2], dtype=np.bool_)
-    k, m = meets.nonzero()
+    k, body, apart = _in_the_way(world, slots, start, way)
     if k.size:
-        ahead, body = headings[k], offset[k, m]  # (p, h, 2), (p, 2)
+        ahead = headings[k]  # (p, h, 2)
         along = ahead[..., 0] * body[:, 0, None] + ahead[..., 1] * body[:, 1, None]
         across = ahead[..., 0] * body[:, 1, None] - ahead[..., 1] * body[:, 0, None]
         reach = np.maximum(along - SEEN_AHEAD, 0.0)
-        struck = (along > 0.0) & (across**2 + reach**2 < apart[k, m, None] ** 2)
-        for pair in which(struck.any(axis=1)).tolist():
-            free[k[pair]] &= ~struck[pair]
+        struck = (along > 0.0) & (across**2 + reach**2 < apart[:, None] ** 2)
+        np.logical_and.at(free, k, ~struck)
     return free & _on_ground(world, slots, start[:, None, :] + headings * SEEN_AHEAD)
+
+
+def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
+    """Bodies near ``slots`` that do not go their way: (p,) index into these, (p, 2) offset, (p,) distance to keep."""
+    bodies = world.live[~world.walled[world.live]]
+    number = np.full(world.top, -1)
+    number[slots] = np.arange(len(slots))
+    widest = float(world.separation.take(bodies).max())
+    one, other, _ = within(world.pos.take(bodies, 0), 2.0 * widest + SEEN_AHEAD)
+    one, other = bodies.take(np.concatenate((one, other))), bodies.take(np.concatenate((other, one)))
+    looks = number.take(one) >= 0
+    one, other = one[looks], other[looks]
+    k = number.take(one)
+    offset = world.pos.take(other, 0) - start.take(k, 0)
+    apart = world.separation.take(one) + world.separation.take(other) - TOLERANCE
+    product = way.take(k, 0) * world.intended.take(other, 0)
+    meets = (world.layer_bits.take(one) & world.layer_bits.take(other)) != 0
+    meets &= other != world.target.take(one)
+    meets &= product[:, 0] + product[:, 1] <= 0.0
+    meets &= offset[:, 0] ** 2 + offset[:, 1] ** 2 < (apart + SEEN_AHEAD) ** 2
+    return k[meets], offset[meets], apart[meets]
 
 
 def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:

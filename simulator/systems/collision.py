@@ -1,9 +1,10 @@
 """Collision: bodies are pushed apart and kept off cliffs, structures and the edge of the map.
 
 All bodies take their intended step, overlapping pairs are pushed apart along the line between their centres a few
-times over, and finally everybody is put where its layer allows. Who gives way: a walker before one that fights or
-holds, an idle unit before a friend that comes through, nobody before an enemy. How much is an estimate (see
-``data/mechanics.yaml``); that nobody ends inside a wall is not.
+times over, and finally everybody is put where its layer allows. Who gives way: a walker before one that fights, an
+idle unit before a friend that comes through, nobody before an enemy, and one that holds its place before nobody.
+Flyers pass through each other and drift apart where they stop. How much is an estimate (see ``data/mechanics.yaml``);
+that nobody ends inside a wall is not.
 """
 
 from __future__ import annotations
@@ -17,18 +18,17 @@ import numpy as np
 from simulator import geometry
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
+from simulator.contacts import OVERLAP_ALLOWED, Bodies, Pairs
 from simulator.mechanics import MECHANICS
 from simulator.systems import avoidance
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
-    from simulator.columns import Ints
+    from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
     from simulator.pathing import Surface
     from simulator.world import World
 
-CONTACT_SKIN = 0.1
-OVERLAP_ALLOWED = 0.005
 OVERLAP_PRESSED = 0.03
 SAME_POINT = 1e-9
 STIR = 1e3
@@ -60,21 +60,52 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
     Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
     that a crowd does not press itself together.
     """
-    pairs = _contacts(world, slots, after)
-    if pairs is None:
+    if world.bodies is None:
+        world.bodies = Bodies.of(world)
+    found = world.bodies.near(after)
+    if found is None:
         return False
+    _part(after, found)
     start = after.copy()
-    deep = pairs.relax(after, MECHANICS.push_rounds)
-    if deep.size:
-        pressed = pairs.one[deep]
-        after[pressed] = start[pressed] = before[pressed]
-        pairs.relax(after, MECHANICS.push_rounds - 1)
+    drifting = False
+    if world.bodies.any_flying:
+        flying = world.bodies.flying
+        soft = flying.take(found.one) | flying.take(found.other)
+        drifting = _drift_apart(world, slots, after, _only(found, soft))
+        found = _only(found, ~soft)
+    if found.one.size:
+        pairs = _Pairs(found.one, found.other, found.apart, _shares(world, slots, found.one, found.other))
+        deep = pairs.relax(after, MECHANICS.push_rounds)
+        if deep.size:
+            pressed = pairs.one[deep]
+            after[pressed] = start[pressed] = before[pressed]
+            pairs.relax(after, MECHANICS.push_rounds - 1)
     shift = after - start
     far = geometry.length(shift)
     if far.max() > MECHANICS.push_limit:
         shift *= np.minimum(1.0, MECHANICS.push_limit / np.maximum(far, 1e-12))[:, None]
         np.add(start, shift, out=after)
-    return True
+    return bool(found.one.size) or drifting
+
+
+def _only(pairs: Pairs, chosen: Bools) -> Pairs:
+    return Pairs(pairs.one[chosen], pairs.other[chosen], pairs.apart[chosen])
+
+
+def _drift_apart(world: World, slots: Ints, at: Floats, pairs: Pairs) -> bool:
+    """Part flyers that hover over each other little by little, in place; those on their way pass through."""
+    still = ~world.wants.take(slots) & ~world.holds.take(slots) & (world.step_max.take(slots) > 0.0)
+    gives = still.take(pairs.one) & ~world.wants.take(slots).take(pairs.other)
+    if not some(gives):
+        return False
+    pairs = _only(pairs, gives)
+    offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
+    distance = geometry.length(offset)
+    depth = np.maximum(pairs.apart - distance, 0.0)
+    push = np.minimum(depth * MECHANICS.flyer_drift, MECHANICS.flyer_drift_limit) / np.maximum(distance, SAME_POINT)
+    offset *= push[:, None]
+    np.add.at(at, pairs.one, offset)
+    return some(depth > OVERLAP_ALLOWED)
 
 
 @dataclass(slots=True)
@@ -107,46 +138,14 @@ class _Pairs:
         return which(depth > OVERLAP_PRESSED)
 
 
-def _contacts(world: World, slots: Ints, at: Floats) -> _Pairs | None:
-    """The pairs of bodies that touch or nearly do; None when no two touch."""
-    if world.pairs is None:
-        world.pairs = pair_table(world)
-    touching, near, apart = world.pairs
-    x, y = at[:, 0], at[:, 1]
-    squared = x[:, None] - x
-    squared *= squared
-    dy = y[:, None] - y
-    dy *= dy
-    squared += dy
-    if not some(squared < touching):
-        return None
-    flat = which((squared < near).ravel())  # one index into a table costs a third of two
-    one, other = np.divmod(flat, len(slots))
-    same = squared.take(flat) < SAME_POINT
-    if some(same):
-        _stir(at, one[same])
-    return _Pairs(one, other, apart.take(flat), _shares(world, slots, one, other))
-
-
-def _stir(at: Floats, same: Ints) -> None:
+def _part(at: Floats, pairs: Pairs) -> None:
     """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
-    at[same] += EIGHT_DIRECTIONS[same % 8] * (1.0 + same[:, None]) * SAME_POINT * STIR
-
-
-def pair_table(world: World) -> tuple[Floats, Floats, Floats]:
-    """Three distances of every pair of living units: touching squared, worth looking at squared, and to be kept.
-
-    The squared ones are -1 for pairs that never meet. Bodies collide when they share a layer; what stands on a
-    footprint is a wall, not a body.
-    """
-    slots = world.live
-    bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
-    radius = world.separation[slots]
-    apart = radius[:, None] + radius
-    meets = (bits[:, None] & bits) != 0
-    np.fill_diagonal(meets, val=False)
-    touching = np.where(meets, np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2, -1.0)
-    return touching, np.where(meets, (apart + CONTACT_SKIN) ** 2, -1.0), apart
+    offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
+    offset *= offset
+    same = offset[:, 0] + offset[:, 1] < SAME_POINT
+    if some(same):
+        stirred = np.unique(pairs.one[same])
+        at[stirred] += EIGHT_DIRECTIONS[stirred % 8] * (1.0 + stirred[:, None]) * SAME_POINT * STIR
 
 
 def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
@@ -165,13 +164,12 @@ def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
     """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
     firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
-    immobile = world.step_max.take(slots) <= 0.0
+    immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
     if some(immobile):
         firm[immobile] = IMMOBILE_YIELDING
     idle = world.target.take(slots) == NOBODY
     if not some(idle):
         return firm, None
-    idle &= ~world.holds.take(slots)
     idle &= firm == MECHANICS.push_firm
     return firm, np.where(idle, MECHANICS.push_idle, firm)
 

@@ -57,9 +57,12 @@ def _give_life(world: World, slot: int) -> None:
 
 def strike(world: World, source: int, owner: int, victim: int, damage: Damage, fraction: float = 1.0) -> None:
     """Take one hit's damage from one unit and count it in both players' scores."""
-    amount = damage.against(int(world.stats.attribute_bits[world.type[victim]])) * fraction
+    attributes = int(world.stats.attribute_bits[world.type[victim]])
+    amount = damage.against(attributes) * fraction
     kind = "splash" if fraction < 1.0 else damage.hit.kind
     if source != NOBODY:
+        if world.bonus_bits[source] & attributes:
+            amount += float(world.bonus_add[source]) * fraction
         amount *= float(world.dealt_factor[source])
     wound(world, source, owner, victim, amount, kind=kind, pierces=damage.hit.ignores_armor)
 
@@ -167,7 +170,9 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
     found = [
         int(near[i])
         for i in order
-        if edge[i] <= radius and near[i] != shot.prior and _in_arc(*offset[i].tolist(), *forward, search.arc_deg)
+        if edge[i] <= radius
+        and near[i] != shot.prior
+        and _in_arc(float(offset[i, 0]), float(offset[i, 1]), *forward, search.arc_deg)
     ]
     return found[: search.max_count] if search.max_count else found
 

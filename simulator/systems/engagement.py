@@ -83,7 +83,9 @@ def _close_in(world: World, slots: Ints) -> None:
     beyond &= ~world.holds.take(slots)
     passing = world.walks.take(slots) & ~world.looks_around.take(slots)
     if some(passing):  # a unit that fires while it walks stays on its way
-        slots, goal, bodies, reach, beyond = (array[~passing] for array in (slots, goal, bodies, reach, beyond))
+        rest = which(~passing)
+        slots, goal, bodies = slots[rest], goal[rest], bodies[rest]
+        reach, beyond = reach[rest], beyond[rest]
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
     world.wants[slots] = beyond

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 from simulator import commands
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
+from simulator.crowds import packed
 from simulator.mechanics import MECHANICS
 
 if TYPE_CHECKING:
     from simulator.world import World
 
 PACKED_AFTER_LOOPS = 2
+CROWD_PERIOD = 2  # whether the crowd at a goal is dense is looked over so often
 
 
 def carry_out(world: World) -> None:
@@ -46,20 +48,7 @@ def _arrived(world: World) -> list[int]:
     there = squared <= MECHANICS.arrival_radius**2
     there |= world.nav_end.take(walkers)
     stuck = world.blocked.take(walkers) >= PACKED_AFTER_LOOPS
-    if some(stuck):
-        for i in which(stuck & ~there).tolist():
-            there[i] = _packed(world, int(walkers[i]), float(squared[i]))
+    stuck &= ~there
+    if world.loop % CROWD_PERIOD == 0 and some(stuck):
+        there[stuck] = packed(world, walkers[stuck], squared[stuck])
     return walkers[there].tolist() if some(there) else []
-
-
-def _packed(world: World, slot: int, squared: float) -> bool:
-    """Whether friends' bodies fill the ground between a blocked unit and its goal, or keep it out for long nearby."""
-    near = world.separation[slot] + MECHANICS.crowd_near
-    if world.blocked[slot] >= MECHANICS.crowd_patience and squared < near**2:
-        return True
-    friends = world.units_of(int(world.owner[slot]))
-    friends = friends[(world.layer_bits[friends] & world.layer_bits[slot] != 0) & (friends != slot)]
-    offset = world.pos[friends] - world.order_point[slot]
-    inside = offset[:, 0] ** 2 + offset[:, 1] ** 2 < squared
-    area = float((world.separation[friends[inside]] ** 2).sum())
-    return area >= MECHANICS.crowd_share * squared

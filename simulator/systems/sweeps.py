@@ -19,6 +19,7 @@ from simulator.systems import damage
 
 if TYPE_CHECKING:
     from simulator import records
+    from simulator.columns import Bools
     from simulator.geometry import Floats
     from simulator.shots import Shot
     from simulator.world import World
@@ -67,8 +68,8 @@ def _draw(world: World, sweep: Sweep) -> None:
     points = _places(world, shot, line, first, sweep.ahead)
     near = damage.affected(world, line.affects, shot)
     offset = world.pos[near][:, None, :] - points
-    reached = geometry.length(offset) <= line.radius + world.radius[near][:, None]
-    for i in which(reached.any(axis=1)).tolist():
+    reached: Bools = geometry.length(offset) <= line.radius + world.radius[near][:, None]
+    for i in which(np.logical_or.reduce(reached, axis=1)).tolist():
         slot = int(near[i])
         if slot not in sweep.touched:
             sweep.touched.append(slot)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -38,7 +39,7 @@ def test_a_unit_brakes_no_harder_than_it_can(field: Any, name: str, rate_n: floa
         before = now
     top = world.catalog.unit(name).speed_n / 16
     assert max(steps) == pytest.approx(top)
-    losses = [a - b for a, b in zip(steps, steps[1:], strict=False)]
+    losses = [a - b for a, b in pairwise(steps)]
     assert sorted(losses)[-3] <= rate_n / 256 + 1e-9
     assert max(losses) <= 1.5 * rate_n / 256  # the last bit, less than a step, is cut to arrive exactly
     assert before == pytest.approx(26, abs=1e-9)

@@ -84,7 +84,7 @@ def test_a_weapon_says_which_of_its_numbers_are_estimates() -> None:
 
 @pytest.mark.parametrize("version", ["4.10", "5.0.13"])
 def test_every_condition_of_a_hit_is_known_or_never_holds(version: str) -> None:
-    """The last two are of a lowered Supply Depot, and of which side a Cyclone fires from: the other branch is the same."""
+    """Those that never hold: a lowered depot, and which side a Cyclone fires from; the other branch is the same."""
     named = {hit.when for weapon in load_catalog(version).weapons for hit in weapon.hits} - {"", "else"}
     assert named - set(CONDITIONS) <= {"unknown", "IsSupplyDepotLowered", "CycloneWeaponLaunchMissileAlternate"}
 

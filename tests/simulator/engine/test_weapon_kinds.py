@@ -221,7 +221,6 @@ def test_a_sieged_tank_leaves_alone_what_is_too_near(field: Any) -> None:
 
 
 def test_a_sieged_tank_hits_friends_beside_its_target(field: Any) -> None:
-    world = field.world
     target, friend = dummy(field, "Marauder", 20, 16), dummy(field, "Marauder", 20, 17.2, owner=1)
     tank = shot_at(field, "SiegeTankSieged", 10, target)
     one_shot(field, tank)
@@ -300,7 +299,6 @@ def test_a_unit_that_may_not_attack_does_not(field: Any) -> None:
 
 
 def test_a_weapon_that_launches_units_calls_its_launcher(field: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    world = field.world
     target = dummy(field, "SpineCrawler", 15, 16)
     launched: list[tuple[int, int]] = []
     monkeypatch.setitem(weapons.LAUNCHERS, "BroodlingStrike", lambda _, source, aim: launched.append((source, aim)))
