@@ -55,6 +55,7 @@ class Score:
     damage_taken: Vitals = field(default_factory=Vitals)
     healed: Vitals = field(default_factory=Vitals)
     curriculum: float = 0.0  # what the map's script gives
+    collected: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were brought home
 
 
 @dataclass(slots=True)

@@ -78,10 +78,17 @@ def _start_raw(seat: Seat) -> raw_pb2.StartRaw:
     (start.playable_area.p1.x, start.playable_area.p1.y) = (x1 - int(seat.origin[0]), y1 - int(seat.origin[1]))
     write_image(start.placement_grid, _crop(seat, terrain.build), 1)
     write_image(start.terrain_height, _crop(seat, terrain.height), 8)
-    for number, spec in seat.world.map.scenario.players.items():
-        if number != seat.player and spec.start is not None:
-            start.start_locations.add(x=spec.start[0] - seat.origin[0], y=spec.start[1] - seat.origin[1])
+    for x, y in _start_locations(seat):
+        start.start_locations.add(x=x - seat.origin[0], y=y - seat.origin[1])
     return start
+
+
+def _start_locations(seat: Seat) -> list[tuple[float, float]]:
+    """Where others may have started: every start location of the map but the player's own."""
+    scenario = seat.world.map.scenario
+    fixed = [spec.start for spec in scenario.players.values() if spec.start is not None]
+    own = seat.world.players[seat.player].start
+    return [place for place in dict.fromkeys((*fixed, *scenario.start_locations)) if place != own]
 
 
 def _crop(seat: Seat, grid: NDArray[np.generic]) -> NDArray[np.generic]:

@@ -1,5 +1,7 @@
 """`Observation.score` and `player_common`: sums over a player's units and counters.
 
+Where the map gives a score of its own, or asks for what was gathered, that is the score, and its type is Curriculum.
+
 The names are the API's. What the game's own total is made of was never published; here it is the value of what a
 player has plus the value of what he killed, which is an estimate. Values are the catalog's `score_make`.
 """
@@ -33,6 +35,7 @@ class Holdings:
 
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.player: Player = world.players[player]
+        self.kind = world.map.scenario.score
         slots = world.units_of(player)
         rows = world.type[slots]
         names, columns = _columns(types)
@@ -70,8 +73,8 @@ class Holdings:
             total_value_structures=totals["value of structures"],
             killed_value_units=counted.killed_value_units,
             killed_value_structures=counted.killed_value_structures,
-            collected_minerals=0,
-            collected_vespene=0,
+            collected_minerals=counted.collected[0],
+            collected_vespene=counted.collected[1],
             collection_rate_minerals=0,
             collection_rate_vespene=0,
             spent_minerals=0,
@@ -93,6 +96,9 @@ class Holdings:
         self._by_category(details.used_vespene, "vespene")
         _add(details.total_used_minerals, details.used_minerals, details.lost_minerals)
         _add(details.total_used_vespene, details.used_vespene, details.lost_vespene)
+        if self.kind != "melee":
+            given = counted.curriculum if self.kind == "curriculum" else sum(counted.collected)
+            return score_pb2.Score(score_type=score_pb2.Score.Curriculum, score=int(given), score_details=details)
         total = (
             details.total_value_units
             + details.total_value_structures

@@ -68,8 +68,10 @@ class Seat:
         self.view: View = next(iter(self.views.values()), View(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
         self.unread = False  # nobody asks for what is to be told
-        self.hands = Hands(world.map.camera, self.ground_z(*world.map.camera))
+        camera = world.players[player].camera or world.map.camera
+        self.hands = Hands(camera, self.ground_z(*camera))
         self.deaths_told = 0
+        self.mishaps_told = 0
         self.known: frozenset[int] = frozenset()  # tags in the last observation
         self.observed_loop = -1
         self.alarm_loop = -(1 << 30)  # when an attack was last reported
