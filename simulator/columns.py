@@ -69,6 +69,7 @@ class UnitColumns:
     expires: Ints = state(int)  # loop at which its timed life ends, 0 without one
     carrier: Ints = state(int, NOBODY)  # slot of the unit that it is inside, or NOBODY
     addon: Ints = state(int, NOBODY)  # slot of the add-on at its side, or NOBODY
+    home: Ints = state(int, NOBODY)  # slot of the unit that it belongs to and comes back to, or NOBODY
     barrier: Floats = state(float)  # damage that a barrier around it still takes
     damaged_loop: Ints = state(int, LONG_AGO)  # last loop with damage to it
     order_kind: Ints = state(int)  # OrderKind
@@ -78,6 +79,7 @@ class UnitColumns:
     order_aimed: Bools = state(bool)  # the point was given with the order
     order_origin: Floats = state(float, width=2)  # the other end of a patrol
     cast_at: Floats = state(float, -1)  # loop at which the ability it uses takes effect, -1 before it begins
+    cast_begun: Floats = state(float, -1)  # loop at which it began to prepare that
     channels: Bools = state(bool)  # that effect has come and goes on
     target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
     attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
@@ -98,6 +100,16 @@ class UnitColumns:
     cooldown: Floats = state(float)  # loops until the next attack may start
     windup: Floats = state(float, -1)  # loops until the started attack takes effect, -1 when none is started
     backswing: Floats = state(float)  # loops the body stays in the finished attack unless ordered away
+    build_loops: Floats = state(float)  # loops that its construction takes in all, 0 when it is complete
+    self_made: Bools = state(bool)  # its construction goes on by itself
+    site: Ints = state(int, NOBODY)  # slot of the structure that it is building, or NOBODY
+    worked: Ints = state(int, LONG_AGO)  # last loop in which somebody built it
+    harvest: Ints = state(int)  # harvesting.Phase, 0 when it does not gather
+    patch: Ints = state(int, NOBODY)  # slot of the resource that it harvests, or NOBODY
+    occupant: Ints = state(int, NOBODY)  # slot of the worker that is at this resource now, or NOBODY
+    load: Ints = state(int)  # resources that it carries
+    contents: Ints = state(int)  # resources that are left in it
+    work_until: Floats = state(float)  # loop at which it is done at its resource
     help_loop: Ints = state(int, LONG_AGO)  # last loop this unit called for help
     nav_point: Floats = state(float, width=2)  # next corner of the path
     nav_loop: Ints = state(int)  # loop at which the path is looked over again
@@ -155,6 +167,8 @@ class UnitColumns:
     melee_add: Floats = trait(float)  # to that of every melee hit
     taken_factor: Floats = trait(float, 1)  # times the damage that it takes
     dealt_factor: Floats = trait(float, 1)  # times the damage that it deals
+    bonus_bits: Ints = trait(int)  # attributes (bits) against which its hits deal
+    bonus_add: Floats = trait(float)  # more damage, before armor
     walks: Bools = trait(bool)  # its order is to walk to a point
     looks_around: Bools = trait(bool)  # its order lets it pick fights
     holds: Bools = trait(bool)  # its order is to stay on the spot
@@ -162,6 +176,8 @@ class UnitColumns:
     wants: Bools = trait(bool)  # it wants to move this loop
     goal: Floats = trait(float, width=2)  # and where to
     stop_at: Floats = trait(float)  # distance from the goal, centre to centre, at which it stops
+    work_rate: Floats = trait(float, 1)  # loops of production that pass in one loop
+    powered: Bools = trait(bool, 1)  # it stands in a power field, or needs none
     creep_factor: Floats = trait(float, 1)  # speed on creep, times the ordinary one
     life_max: Floats = trait(float)
     life_regen: Floats = trait(float)  # per loop

@@ -23,6 +23,8 @@ class OrderKind(IntEnum):
     PATROL = 6
     SCAN_MOVE = 7
     CAST = 8
+    GATHER = 9
+    RETURN = 10
 
 
 WALKS: Final = frozenset({OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL})
@@ -42,7 +44,8 @@ ATTACK: Final = 23
 class Order:
     """One order: its kind, the specific ability id the API reports, and its target.
 
-    ``target`` is a unit tag or 0, ``point`` world coordinates or None. ``origin`` is the other end of a patrol.
+    ``target`` is a unit tag or 0, ``point`` world coordinates or None. ``origin`` is the other end of a patrol,
+    ``progress`` how far the work on it is, 0..1.
     """
 
     kind: OrderKind
@@ -50,3 +53,4 @@ class Order:
     target: int = 0
     point: tuple[float, float] | None = None
     origin: tuple[float, float] | None = None
+    progress: float = 0.0

@@ -120,6 +120,7 @@ class World(UnitColumns):
         self.settled = -1  # the population among which no body touched another when all last stood still
         self.bodies: Bodies | None = None  # of this population
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
+        self.harvesting = False  # whether anybody harvests
         self.mortal = False  # whether anybody's life is timed
         self.hiding = False  # whether anybody is cloaked or burrowed
         self.creep_counts = bool(game_map.terrain.creep.any())
@@ -148,6 +149,7 @@ class World(UnitColumns):
         self.energy[slot] = self.stats.energy_start[owner, unit.row]
         self.burrowed[slot] = unit.burrowed
         self.born_loop[slot] = self.loop
+        self.contents[slot] = unit.resource_amount
         autocast = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
         if autocast and not unit.passive:
             self.autocast[slot] = autocast
@@ -165,7 +167,7 @@ class World(UnitColumns):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        for column in (self.target, self.order_target, self.attacker, self.carrier, self.addon):
+        for column in (self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home):
             column[column == slot] = NOBODY
         self.buffs.forget(slot)
         self.timers.pop(slot, None)
@@ -293,8 +295,14 @@ class World(UnitColumns):
             target=self.tag_of(int(self.order_target[slot])) if targeted else NO_TAG,
             point=None if pointless else _point(self.order_point, slot),
             origin=_point(self.order_origin, slot) if kind is OrderKind.PATROL else None,
+            progress=self._progress(slot) if kind is OrderKind.CAST else 0.0,
         )
         return [current, *self.queue[slot]]
+
+    def _progress(self, slot: int) -> float:
+        """How much of the time is over that an ability takes to prepare, 0..1."""
+        end, begun = float(self.cast_at[slot]), float(self.cast_begun[slot])
+        return min(max((self.loop - begun) / (end - begun), 0.0), 1.0) if end > begun >= 0.0 else 0.0
 
     # sight --------------------------------------------------------------------------------------------------------
 

@@ -59,18 +59,28 @@ class Outcome:
     slots: tuple[int, ...] = ()
 
 
-def _refused(why: Refusal) -> Outcome:
+def result_of(why: Refusal) -> Result:
+    """The API's word for a refusal."""
     result: Result = error_pb2.ActionResult.Value(error_pb2.ActionResult.Name(int(why)))  # type: ignore[arg-type]  # same numbers
-    return Outcome(result)
+    return result
 
 
-def meant(catalog: Catalog, row: int, requested: int) -> Ability | None:
-    """What a requested id, general or specific, means to units of the type in this row; None for nothing."""
-    card = catalog.abilities_of(row) if requested > 0 else ()
+def _refused(why: Refusal) -> Outcome:
+    return Outcome(result_of(why))
+
+
+def meant(world: World, slot: int, requested: int) -> Ability | None:
+    """What a requested id, general or specific, means to a unit; None for nothing.
+
+    Of several that one general id stands for, such as the ways to cancel, the first that the unit can use now.
+    """
+    card = world.catalog.abilities_of(int(world.type[slot])) if requested > 0 else ()
     exact = next((a for a in card if a.id == requested), None)
     if exact is not None:
         return exact
-    return next((a for a in card if a.general == requested and casting.is_modelled(a)), None)
+    fitting = [a for a in card if a.general == requested and casting.is_modelled(a)]
+    now = (a for a in fitting if casting.refusal(world, slot, a) is Refusal.SUCCESS)
+    return next(now, fitting[0] if fitting else None)
 
 
 @functools.lru_cache(maxsize=2048)
@@ -91,6 +101,7 @@ def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
 
 def judge(world: World, player: int, command: Command) -> Outcome:
     """How a command would go now, without giving it."""
+    command = _without_snapshot(world, player, command)
     slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
     own = [slot for slot in slots if world.owner[slot] == player]
     if not own:
@@ -117,6 +128,7 @@ def judge(world: World, player: int, command: Command) -> Outcome:
 def carry_out(world: World, player: int, command: Command) -> Outcome:
     """Gives a command to the units that can take it; the others are left alone."""
     outcome = judge(world, player, command)
+    command = _without_snapshot(world, player, command)
     if outcome.result != error_pb2.Success:
         return outcome
     taken: list[int] = []
@@ -125,6 +137,16 @@ def carry_out(world: World, player: int, command: Command) -> Outcome:
     if not taken:
         return _refused(Refusal.ORDER_QUEUE_IS_FULL if command.queue else Refusal.ERROR)
     return Outcome(error_pb2.Success, outcome.ability, tuple(taken))
+
+
+def _without_snapshot(world: World, player: int, command: Command) -> Command:
+    """A command at a snapshot as one at what it shows: a resource that still lies there, or else its place."""
+    snapshot = world.memories[player].find(command.target) if command.target != NO_TAG else None
+    if snapshot is None:
+        return command
+    if world.catalog.units[snapshot.row].resource and world.slot_of(snapshot.unit) != NOBODY:
+        return dataclasses.replace(command, target=snapshot.unit)
+    return dataclasses.replace(command, target=NO_TAG, point=snapshot.pos)
 
 
 def _name_of(able: list[tuple[Ability, list[int]]]) -> int:
@@ -136,7 +158,7 @@ def _groups(world: World, slots: list[int], requested: int) -> list[tuple[Abilit
     """The specific abilities that a requested id stands for, with the units that have each, by ascending id."""
     groups: dict[int, tuple[Ability, list[int]]] = {}
     for slot in slots:
-        ability = meant(world.catalog, int(world.type[slot]), requested)
+        ability = meant(world, slot, requested)
         if ability is not None and casting.is_modelled(ability):
             groups.setdefault(ability.id, (ability, []))[1].append(slot)
     return [groups[number] for number in sorted(groups)]
@@ -151,7 +173,8 @@ def _refusal(world: World, player: int, slot: int, ability: Ability, command: Co
     target = NOBODY
     if command.aim is Aim.UNIT:
         target = world.slot_of(command.target)
-        if target == NOBODY or not world.visible[player, target]:
+        known = target != NOBODY and command.target in world.memories[player].of_unit
+        if target == NOBODY or not (known or world.visible[player, target]):
             return Refusal.MUST_TARGET_VISIBLE_UNIT
     why = casting.refusal(world, slot, ability)
     if why is not Refusal.SUCCESS:

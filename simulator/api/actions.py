@@ -49,6 +49,10 @@ def perform(seat: Seat, action: sc.Action, loop: int) -> None:
     """Lets an action take effect, and notes what the next observation is to report of it."""
     for command in _commands(seat, action):
         _give(seat, command, loop, by_tags=action.action_raw.HasField("unit_command"))
+    if action.action_raw.HasField("toggle_autocast"):
+        toggle = action.action_raw.toggle_autocast
+        if clicks.toggle_autocast(seat.world, seat.player, toggle.ability_id, toggle.unit_tags):
+            seat.report(loop).action_raw.toggle_autocast.CopyFrom(toggle)
     if action.action_raw.HasField("camera_move"):
         point = action.action_raw.camera_move.center_world_space
         if _finite(point):

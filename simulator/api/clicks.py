@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import spatial_pb2, ui_pb2
 
+from simulator import casting
 from simulator.api import selection as picking
+from simulator.api.abilities import meant
 from simulator.api.selection import GROUPS, panel_order
 from simulator.api.sight import Alliance
+from simulator.columns import NOBODY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from simulator.api.projection import Screen
     from simulator.api.seat import Seat
+    from simulator.world import World
 
 Point = spatial_pb2.ActionSpatialUnitSelectionPoint
 Group = ui_pb2.ActionControlGroup
@@ -53,7 +57,11 @@ def press(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
             done = _select_idle_worker(seat, ui.select_idle_worker.type)
         case "multi_panel":
             done = is_possible(seat, ui) and _use_panel(seat, ui.multi_panel)
-        case _:  # no cargo, no production queue and no autocast in the world yet
+        case "toggle_autocast":
+            done = toggle_autocast(seat.world, seat.player, ui.toggle_autocast.ability_id, seat.selection.tags)
+        case "cargo_panel":
+            done = _unload(seat, ui.cargo_panel.unit_index)
+        case _:
             done = False
     return done
 
@@ -65,7 +73,50 @@ def is_possible(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
         return ui.control_group.control_group_index < GROUPS
     if kind == "multi_panel":
         return 0 <= ui.multi_panel.unit_index < len(seat.selection.tags)
-    return kind not in {"cargo_panel", "production_panel", "toggle_autocast"}
+    if kind == "cargo_panel":
+        return 0 <= ui.cargo_panel.unit_index < len(_cargo(seat))
+    if kind == "toggle_autocast":
+        return bool(_autocasters(seat.world, seat.player, ui.toggle_autocast.ability_id, seat.selection.tags))
+    return kind != "production_panel"
+
+
+def toggle_autocast(world: World, player: int, requested: int, tags: Iterable[int]) -> bool:
+    """Switch whether units use an ability by themselves; on for all unless all of them do so already."""
+    chosen = _autocasters(world, player, requested, tags)
+    all_on = all(number in world.autocast.get(slot, ()) for slot, number in chosen)
+    for slot, number in chosen:
+        kept = tuple(n for n in world.autocast.get(slot, ()) if n != number)
+        world.autocast[slot] = kept if all_on else (*kept, number)
+    return bool(chosen)
+
+
+def _autocasters(world: World, player: int, requested: int, tags: Iterable[int]) -> list[tuple[int, int]]:
+    """The player's units among ``tags`` (slots) that could use an ability by themselves, with its specific id."""
+    chosen: list[tuple[int, int]] = []
+    for slot in map(world.slot_of, tags):
+        ability = meant(world, slot, requested) if slot != NOBODY and world.owner[slot] == player else None
+        if ability is not None and ability.autocast:
+            chosen.append((slot, ability.id))
+    return chosen
+
+
+def _cargo(seat: Seat) -> list[int]:
+    """Tags of what is inside the selected transport, in the order of the panel."""
+    slots = seat.selection.slots(seat.world)
+    return [seat.world.tag_of(s) for s in seat.world.passengers(slots[0])] if len(slots) == 1 else []
+
+
+def _unload(seat: Seat, index: int) -> bool:
+    """Have the selected transport set down one of its passengers."""
+    cargo = _cargo(seat)
+    if not 0 <= index < len(cargo):
+        return False
+    (carrier,) = seat.selection.slots(seat.world)
+    card = seat.world.catalog.abilities_of(int(seat.world.type[carrier]))
+    unload = next((a for a in card if a.does == "unload_unit"), None)
+    if unload is None:
+        return False
+    return bool(casting.use(seat.world, [carrier], unload, target=cargo[index]))
 
 
 def _choose(seat: Seat, tags: Iterable[int], *, add: bool = False) -> bool:

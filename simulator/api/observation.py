@@ -15,7 +15,8 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import ui, wire
-from simulator.api.abilities import usable
+from simulator.api.abilities import result_of, usable
+from simulator.api.effects import seen_buffs, write_effects, write_power
 from simulator.api.layers import Frame
 from simulator.api.raw import Units, write_image
 from simulator.api.score import Holdings
@@ -44,7 +45,7 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
     attacked = _attacked(seat, sight)
     told = sc.ResponseObservation(
         actions=seat.hands.echoes,
-        action_errors=seat.hands.errors,
+        action_errors=[*seat.hands.errors, *_mishaps(seat)],
         player_result=game.results(),
         chat=seat.hands.chat,
     )
@@ -57,6 +58,8 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
         observation.score.CopyFrom(holdings.score())
     if seat.options.raw:
         _write_raw(observation.raw_data, seat, sight, selected)
+        write_effects(observation.raw_data, seat, through_fog=disable_fog or seat.sees_all)
+        write_power(observation.raw_data, seat, sight)
     images: list[Part] = []
     if seat.views:
         fogged = world.fog and not (disable_fog or seat.sees_all)
@@ -72,8 +75,18 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
 def _told(seat: Seat, sight: Sight) -> None:
     seat.hands.forget()
     seat.deaths_told = len(seat.world.deaths)
+    seat.mishaps_told = len(seat.world.mishaps)
     seat.known = frozenset(sight.tag.tolist())
     seat.observed_loop = seat.world.loop
+
+
+def _mishaps(seat: Seat) -> list[sc.ActionError]:
+    """Orders of the player's that could not be carried out in the end, since the last observation."""
+    return [
+        sc.ActionError(unit_tag=m.tag, ability_id=m.ability, result=result_of(m.refusal))
+        for m in seat.world.mishaps[seat.mishaps_told :]
+        if m.player == seat.player
+    ]
 
 
 def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
@@ -108,9 +121,9 @@ def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: 
     x, y = seat.camera
     camera = raw.player.camera
     camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
-    camera.z = seat.hands.camera_z
+    camera.z = seat.camera_z
     raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
-    Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin).write(raw)
+    Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight)).write(raw)
     visibility, creep = world.visibility[seat.player], terrain.creep
     if seat.options.raw_crop_to_playable_area:
         x0, y0, x1, y1 = terrain.playable

@@ -13,6 +13,8 @@ import numpy as np
 from s2clientprotocol import raw_pb2
 
 from simulator.api.sight import Alliance
+from simulator.buffs import FOREVER
+from simulator.columns import NOBODY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from s2clientprotocol import common_pb2
 
+    from simulator.api.effects import Worn
     from simulator.api.sight import Sight
     from simulator.api.types import Types
     from simulator.orders import Order
@@ -38,10 +41,12 @@ class Units:
     selected: Bools
     on_screen: Bools
     origin: tuple[float, float]  # world point that is (0, 0) for the client
+    worn: Worn | None = None  # buffs on them
 
     def write(self, raw: raw_pb2.ObservationRaw) -> None:
         """Adds all units to an observation."""
         orders = self._orders()
+        first = len(raw.units)
         for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
             unit = raw.units.add()
             _write_known(unit, *known)
@@ -53,6 +58,9 @@ class Units:
                 self._write_own(unit, slot)
                 for order, height in orders[slot]:
                     self._write_order(unit.orders.add(), order, height)
+        if self.worn is not None:
+            for row, number in zip(self.worn.row.tolist(), self.worn.id.tolist(), strict=True):
+                raw.units[first + row].buff_ids.append(number)
 
     def _slots(self) -> list[int]:
         slots: list[int] = self.sight.slot.tolist()
@@ -84,13 +92,49 @@ class Units:
             unit.weapon_cooldown = max(0.0, float(world.cooldown[slot]))
             if target := world.tag_of(int(world.target[slot])):
                 unit.engaged_target_tag = target
-        if types.detect[row]:
-            unit.detect_range = float(types.detect[row])
+        if world.detects[slot]:
+            unit.detect_range = float(world.detects[slot])
+        if world.addon[slot] != NOBODY:
+            unit.add_on_tag = world.tag_of(int(world.addon[slot]))
         if types.cargo[row]:
-            unit.cargo_space_taken, unit.cargo_space_max = 0, int(types.cargo[row])
+            self._write_cargo(unit, slot)
+        self._write_durations(unit, slot)
+
+    def _write_cargo(self, unit: raw_pb2.Unit, slot: int) -> None:
+        """Who is inside, and how much room that takes."""
+        world, inside = self.world, self.world.passengers(slot)
+        unit.cargo_space_max = int(self.types.cargo[world.type[slot]])
+        unit.cargo_space_taken = sum(world.unit_type(s).cargo_size for s in inside)
+        for s in inside:
+            unit.passengers.add(
+                tag=world.tag_of(s),
+                unit_type=world.unit_type(s).id,
+                health=float(world.life[s]),
+                health_max=float(world.life_max[s]),
+                shield=float(world.shields[s]),
+                shield_max=float(world.shields_max[s]),
+                energy=float(world.energy[s]),
+                energy_max=float(world.energy_max[s]),
+            )
+
+    def _write_durations(self, unit: raw_pb2.Unit, slot: int) -> None:
+        """How long its timed life, or else the buff that ends last, still goes on."""
+        world = self.world
+        if world.expires[slot]:
+            unit.buff_duration_remain = max(0, int(world.expires[slot]) - world.loop)
+            unit.buff_duration_max = int(world.expires[slot] - world.born_loop[slot])
+        elif len(world.buffs):
+            rows = world.buffs.of(slot)
+            rows = rows[rows["end"] < FOREVER]
+            if len(rows):
+                last = rows[rows["end"].argmax()]
+                unit.buff_duration_remain = max(0, round(float(last["end"]) - world.loop))
+                unit.buff_duration_max = round(float(last["end"]) - int(last["begun"]))
 
     def _write_order(self, message: raw_pb2.UnitOrder, order: Order, height: float) -> None:
         message.ability_id = order.ability
+        if order.progress:
+            message.progress = order.progress
         if order.target:
             message.target_unit_tag = order.target
         elif order.point is not None:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 API_NEUTRAL = 16
 EMPTY_SLOT = 0
+OBSERVER = 0  # the player id of a seat that owns nothing and sees everything
 _VISIBLE_CELL = 2
 
 # Columns are compared with the `value` of an enum: converting the enum itself takes numpy 2 us more each time.
@@ -100,7 +101,7 @@ def look(world: World, types: Types, player: int, *, show_cloaked: bool, through
     """The units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
     seen = world.is_visible(player)
     owner = world.owner[world.live]
-    own = owner == player
+    own = (owner == player) & (player != OBSERVER)
     cloak = _cloak(world, player, own)
     undetected = cloak == Cloak.CLOAKED.value
     told = (seen | through_fog) & (show_cloaked | through_fog | ~undetected)
@@ -183,7 +184,7 @@ def _alliance(owner: Ints, own: Bools) -> Ints:
 def _cloak(world: World, player: int, own: Bools) -> Ints:
     """[live] what is known of each unit's cloak, seen or not."""
     hiding = world.cloaked[world.live] | (world.burrowed[world.live] & ~own)
-    detected = world.visible[player, world.live]
+    detected = world.visible[player, world.live] | (player == OBSERVER)
     enemy = np.where(detected, Cloak.DETECTED.value, Cloak.CLOAKED.value)
     return np.where(hiding, np.where(own, Cloak.ALLIED.value, enemy), Cloak.NOT_CLOAKED.value)
 

@@ -66,6 +66,7 @@ def _begin(world: World, cast: Cast) -> None:
         _give_up(world, cast, why)
         return
     _face(world, cast)
+    world.cast_begun[slot] = world.loop
     world.cast_at[slot] = world.loop + casting.prep_loops(world, cast.ability)
     prepare = casting.skill_of(cast.ability).prepare
     if prepare is not None:
