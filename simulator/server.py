@@ -4,6 +4,8 @@ Requests come as text frames from PySC2 and as binary frames from python-sc2; bo
 not decoded. Connections come and go while the session lives on: the newest one is served, and whatever was open
 before it is dropped, so that a client that vanished without a word locks nobody out.
 
+A client that goes away while its request is being answered takes the request with it.
+
 It knows nothing of the game: that is `session.py`, called with the bytes of one request at a time.
 """
 
@@ -36,6 +38,7 @@ class Server:
         self.session = session
         self.done = asyncio.Event()
         self._transport: asyncio.Transport | None = None
+        self._turn = asyncio.Lock()  # a client that was replaced still has to hear that its request is dropped
 
     async def connect(self, request: web.Request) -> web.WebSocketResponse:
         """Answers one client until it leaves, is replaced, or ends the process with quit."""
@@ -56,10 +59,13 @@ class Server:
         async for frame in client:
             if frame.type not in _REQUESTS:
                 continue
-            await client.send_bytes(self.session.handle(frame.data))
-            if self.session.status is Status.quit:
-                self.done.set()
-                return
+            async with self._turn:
+                answer = await self.session.answer(frame.data)
+            try:
+                await client.send_bytes(answer)
+            finally:
+                if self.session.status is Status.quit:
+                    self.done.set()
 
 
 def run(sock: socket.socket, arguments: Arguments) -> None:
@@ -79,7 +85,7 @@ async def serve(sock: socket.socket, session: Session) -> None:
     server = Server(session)
     app = web.Application()
     app.router.add_get(ENDPOINT, server.connect)
-    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1)
+    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1, handler_cancellation=True)
     await runner.setup()
     ends = [asyncio.create_task(server.done.wait()), asyncio.create_task(orphaned(server.has_client))]
     try:

@@ -1,14 +1,18 @@
 """One game process without its socket: the bytes of a request in, the bytes of its response out.
 
+Most answers are there at once. Some wait: for the other processes of a game, for the wall clock, or, in a long step,
+for the event loop to look after everything else.
+
 Every response carries the status and the request's id. A request that is not legal now, or that is no request at
 all, is a usage error: `Response.error` and no body. A legal request that fails has its own body with its own error.
-Nothing that a client sends may raise out of `Session.handle`.
+Nothing that a client sends may raise out of `Session.answer`.
 
 Above: `server.py`. Below: `status.py` (what is legal when), `api/` (what a request means to a game).
 """
 
 from __future__ import annotations
 
+import inspect
 import traceback
 from typing import TYPE_CHECKING
 
@@ -44,30 +48,48 @@ class Session:
         return self._machine.status
 
     def handle(self, data: bytes) -> bytes:
-        """Answers one request; never raises, and never leaves a request half done."""
+        """`answer` for a caller without an event loop, who plays alone.
+
+        Raises:
+            RuntimeError: the answer has to wait for something outside of this process.
+        """
+        answering = self.answer(data)
+        try:
+            while answering.send(None) is None:
+                pass  # a pause for an event loop that is not there
+        except StopIteration as answered:
+            response: bytes = answered.value
+            return response
+        answering.close()
+        raise RuntimeError("this request waits for other processes or for the time: use Session.answer")
+
+    async def answer(self, data: bytes) -> bytes:
+        """Answers one request, one at a time; never raises. Cancelled, it leaves the process in the state it was in."""
         try:
             request = sc.Request.FromString(data)
         except DecodeError:
             return self._respond([_error("The request is not a protobuf message of the SC2 API")], None)
-        return self._respond(self._answer(request), request)
+        return self._respond(await self._answer(request), request)
 
-    def _answer(self, request: sc.Request) -> list[Part]:
+    async def _answer(self, request: sc.Request) -> list[Part]:
         kind = request.WhichOneof("request")
         if kind is None:
             return [_error("The request is empty or of an unknown kind")]
         try:
-            return self._dispatch(kind, request)
+            return await self._dispatch(kind, request)
         except UsageError as error:
             return [_error(str(error))]
         except Exception as error:  # noqa: BLE001  # a fault of ours: the client must get an answer, and we a trace
             traceback.print_exc()
             return [_error(f"The simulator failed in {kind}: {type(error).__name__}: {error}")]
 
-    def _dispatch(self, kind: str, request: sc.Request) -> list[Part]:
+    async def _dispatch(self, kind: str, request: sc.Request) -> list[Part]:
         move = "join_lan" if kind == "join_game" and request.join_game.HasField("server_ports") else kind
         self._machine.check(move)
         try:
             body = HANDLERS[kind](self._process, getattr(request, kind))
+            if inspect.isawaitable(body):
+                body = await body
         except Failure as failure:
             body = failure.body
         else:

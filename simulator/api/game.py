@@ -4,11 +4,12 @@ Actions and debug commands are noted with the loop they belong to and take effec
 the order in which they came. So the log, the setup and the seed are the whole game: a replay is the same class fed
 from a log instead of a client.
 
-Above: `lobby.py`, `play.py`, `replay.py`. Below: `tick.py`, `actions.py`, `debug.py`.
+Above: `joining.py`, `play.py`, `replay.py`. Below: `tick.py`, `actions.py`, `debug.py`.
 """
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import actions, debug
 from simulator.api.seat import Seat
+from simulator.api.sight import OBSERVER
 from simulator.api.types import types_of
 from simulator.catalog import load_catalog
 from simulator.players import PlayerSetup
@@ -43,6 +45,7 @@ class Setup:
     seed: int
     disable_fog: bool
     realtime: bool
+    observers: tuple[sc.PlayerSetup, ...] = ()  # their ids follow those of the players
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Entry:
 
 
 class Game:
-    """A running game. With a log it is a replay: it ends at `end_loop`, and `watch` gives it a viewer."""
+    """A running game. With a log it is a replay, and ends at `end_loop`."""
 
     def __init__(self, setup: Setup, version: str, log: Iterable[Entry] = (), end_loop: int | None = None) -> None:
         self.setup = setup
@@ -67,8 +70,12 @@ class Game:
         if setup.disable_fog:
             self.world.fog = False
             self.world.visibility[:] = _VISIBLE
+        self.world.visibility[OBSERVER] = _VISIBLE
         self.seats: dict[int, Seat] = {}
         self.log: list[Entry] = list(log)
+        self.not_before = 0  # what clients do takes effect at this loop at the earliest
+        self.delay = 0  # loops from when a client acts until that takes effect
+        self.unsent: list[Entry] | None = None  # what was done here since somebody last told the other processes
         self._done = 0  # entries of the log that have taken effect
 
     @property
@@ -81,26 +88,30 @@ class Game:
         self.seats[player] = Seat(self.world, self.types, player, options)
         return self.seats[player]
 
-    def watch(self, player: int, options: sc.InterfaceOptions) -> Seat:
-        """A second interface for a player, that shows what the first one shows and can do nothing."""
-        viewer = Seat(self.world, self.types, player, options)
-        viewer.share(self.seats[player])
-        return viewer
-
     def act(self, player: int, action: sc.Action) -> error_pb2.ActionResult.ValueType:
         """Notes an action of a player, and says how it looks as things stand."""
         result = actions.judge(self.seats[player], action)
         if action.ListFields():
             copy = sc.Action()
             copy.CopyFrom(action)
-            self.log.append(Entry(self.world.loop, player, copy))
+            self._do(player, copy)
         return result
 
     def debug(self, player: int, command: debug_pb2.DebugCommand) -> None:
         """Notes a debug command of a player."""
         copy = debug_pb2.DebugCommand()
         copy.CopyFrom(command)
-        self.log.append(Entry(self.world.loop, player, copy))
+        self._do(player, copy)
+
+    def _do(self, player: int, act: sc.Action | debug_pb2.DebugCommand) -> None:
+        entry = Entry(max(self.world.loop + self.delay, self.not_before), player, act)
+        self.note(entry)
+        if self.unsent is not None:
+            self.unsent.append(entry)
+
+    def note(self, entry: Entry) -> None:
+        """Puts an entry into the log: by its loop, then by its player, then as it came."""
+        bisect.insort(self.log, entry, lo=self._done, key=lambda e: (e.loop, e.player))
 
     def step(self, count: int) -> int:
         """Advances by up to `count` loops, fewer if the game ends, and returns the loop that was reached."""
@@ -113,6 +124,8 @@ class Game:
             advance(self.world, min(until, target) - self.world.loop)
             for seat in self.seats.values():
                 seat.selection.forget_dead(self.world)
+                if seat.unread:
+                    seat.hands.forget()
         return self.world.loop
 
     def results(self) -> list[sc.PlayerResult]:

@@ -6,16 +6,20 @@ the parts of its bytes. Above: `requests.py`. Below: `game.py`, `observation.py`
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import query_pb2
+from s2clientprotocol import error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import data, query, replay
+from simulator.api.lan import CHUNK_LOOPS
 from simulator.api.observation import observe
+from simulator.api.viewer import Viewer
 from simulator.status import UsageError
 
 if TYPE_CHECKING:
+    from simulator.api.game import Game
     from simulator.api.process import Process
     from simulator.api.wire import Part
 
@@ -30,30 +34,50 @@ def tables(process: Process, request: sc.RequestData) -> sc.ResponseData:
     return data.answer(process.table.game.catalog, request)
 
 
-def observation(process: Process, request: sc.RequestObservation) -> list[Part]:
+async def observation(process: Process, request: sc.RequestObservation) -> list[Part]:
     """What the player knows now; with a game loop in real time, not before that loop."""
     table = process.table
     if table.clock is not None:
-        table.clock.wait_for(request.game_loop)
+        await table.clock.wait_for(request.game_loop)
     return observe(table.game, table.seat, disable_fog=request.disable_fog)
 
 
-def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
-    """Advances the game, by one loop unless the request says how many."""
-    if process.table.clock is not None:
+async def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
+    """Advances the game, by one loop unless the request says how many; together with the other processes, if any."""
+    table, count = process.table, request.count or 1
+    if table.clock is not None:
         raise UsageError("step is not possible in a game in real time")
-    return sc.ResponseStep(simulation_loop=process.table.game.step(request.count or 1))
+    if table.peers is not None:
+        await table.peers.step(count)
+    else:
+        await _advance(table.game, count)
+    return sc.ResponseStep(simulation_loop=table.game.world.loop)
+
+
+async def _advance(game: Game, count: int) -> None:
+    target = game.world.loop + count
+    while True:
+        game.step(min(target - game.world.loop, CHUNK_LOOPS))
+        if game.world.loop >= target or game.over:
+            return
+        await asyncio.sleep(0)
 
 
 def action(process: Process, request: sc.RequestAction) -> sc.ResponseAction:
     """Notes actions of the player, and says of each how it looks as things stand."""
     table = process.table
+    if isinstance(table.seat, Viewer):
+        return sc.ResponseAction(result=[error_pb2.NotSupported] * len(request.actions))
     results = [table.game.act(table.seat.player, action) for action in request.actions]
     return sc.ResponseAction(result=results)
 
 
-def obs_action(_: Process, __: sc.RequestObserverAction) -> sc.ResponseObserverAction:
-    """Accepted; the only observer there is watches a replay through its player's eyes."""
+def obs_action(process: Process, request: sc.RequestObserverAction) -> sc.ResponseObserverAction:
+    """Turns the view of an observer, or of the viewer of a replay; a player has no such view, and nothing happens."""
+    seat = process.table.seat
+    if isinstance(seat, Viewer):
+        for action in request.actions:
+            seat.obey(action)
     return sc.ResponseObserverAction()
 
 
@@ -63,8 +87,10 @@ def ask(process: Process, request: query_pb2.RequestQuery) -> query_pb2.Response
 
 
 def debug(process: Process, request: sc.RequestDebug) -> sc.ResponseDebug:
-    """Notes debug commands; they take effect with the next loop."""
+    """Notes debug commands; they take effect with the next loop. An observer's do nothing."""
     table = process.table
+    if isinstance(table.seat, Viewer):
+        return sc.ResponseDebug()
     for command in request.debug:
         table.game.debug(table.seat.player, command)
     return sc.ResponseDebug()

@@ -3,7 +3,7 @@
 The format is ours: a line that marks it, one line of JSON with the setup, then for each entry of the log its loop,
 player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside.
 
-Above: `lobby.py`. Below: `game.py`.
+Above: `viewing.py`, `lockstep.py`. Below: `game.py`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ from simulator.api.game import Entry, Game, Setup
 from simulator.mapfile import read_map
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from simulator.api.seat import Seat
-
-_MARK = b"Khala replay 1\n"
+_MARK = b"Khala replay 2\n"
 _ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
 _KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
 
@@ -55,14 +53,12 @@ class Replay:
             "interfaces": {player: _hex(options) for player, options in self.interfaces.items()},
             "seed": setup.seed,
             "disable_fog": setup.disable_fog,
+            "realtime": setup.realtime,
+            "observers": [_hex(observer) for observer in setup.observers],
             "loops": self.loops,
             "results": self.results,
         }
-        parts = [json.dumps(head).encode(), b"\n"]
-        for entry in self.log:
-            data = entry.act.SerializeToString(deterministic=True)
-            parts += [_ENTRY.pack(entry.loop, entry.player, _KINDS.index(type(entry.act)), len(data)), data]
-        return _MARK + zlib.compress(b"".join(parts))
+        return _MARK + zlib.compress(json.dumps(head).encode() + b"\n" + pack(self.log))
 
     @classmethod
     def decode(cls, data: bytes) -> Replay:
@@ -86,21 +82,36 @@ class Replay:
             players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in fields["players"]),
             seed=fields["seed"],
             disable_fog=fields["disable_fog"],
-            realtime=False,
+            realtime=fields["realtime"],
+            observers=tuple(sc.PlayerSetup.FromString(bytes.fromhex(observer)) for observer in fields["observers"]),
         )
         interfaces = {
             int(player): sc.InterfaceOptions.FromString(bytes.fromhex(options))
             for player, options in fields["interfaces"].items()
         }
         results = {int(player): result for player, result in fields["results"].items()}
-        return cls(setup, interfaces, fields["loops"], results, tuple(_entries(log)))
+        return cls(setup, interfaces, fields["loops"], results, tuple(unpack(log)))
 
 
 def _hex(message: Message) -> str:
     return message.SerializeToString(deterministic=True).hex()
 
 
-def _entries(log: bytes) -> Iterator[Entry]:
+def pack(log: Iterable[Entry]) -> bytes:
+    """Entries of a log as bytes."""
+    parts = []
+    for entry in log:
+        data = entry.act.SerializeToString(deterministic=True)
+        parts += [_ENTRY.pack(entry.loop, entry.player, _KINDS.index(type(entry.act)), len(data)), data]
+    return b"".join(parts)
+
+
+def unpack(log: bytes) -> Iterator[Entry]:
+    """The entries in bytes that `pack` made.
+
+    Raises:
+        struct.error, LookupError, DecodeError: they are no such bytes.
+    """
     at = 0
     while at < len(log):
         loop, player, kind, size = _ENTRY.unpack_from(log, at)
@@ -121,15 +132,9 @@ def record(game: Game) -> Replay:
     )
 
 
-def rerun(replay: Replay, version: str, player: int, options: sc.InterfaceOptions) -> tuple[Game, Seat]:
-    """A game that plays a replay, and the seat of somebody who looks over a player's shoulder.
-
-    The players sit at their own interfaces, because what a click means depends on the size of the screen; the viewer
-    shares camera and selection with one of them. So the reported clicks are in pixels of the recorded interface.
-    """
+def rerun(replay: Replay, version: str) -> Game:
+    """A game that plays a replay, with the players in their seats."""
     game = Game(replay.setup, version, log=replay.log, end_loop=replay.loops)
     for number, recorded in replay.interfaces.items():
         game.sit(number, recorded)
-    kept = sc.InterfaceOptions()
-    kept.CopyFrom(options)
-    return game, game.watch(player, kept)
+    return game

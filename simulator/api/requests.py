@@ -1,32 +1,33 @@
 """Which function answers which request.
 
-Each takes the process and the request and gives the body of the response: a message, or the parts of its bytes.
-Above: `session.py`. Below: `lobby.py`, `play.py`, `viewing.py`.
+Each takes the process and the request and gives the body of the response, at once or as an awaitable: a message, or the
+parts of its bytes. Above: `session.py`. Below: `lobby.py`, `joining.py`, `play.py`, `viewing.py`.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from simulator.api import lobby, play, viewing
+from simulator.api import joining, lobby, play, viewing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Awaitable, Callable
 
     from google.protobuf.message import Message
 
     from simulator.api.process import Process
     from simulator.api.wire import Part
 
-    Handler = Callable[[Process, Any], Message | list[Part]]
+    Body = Message | list[Part]
+    Handler = Callable[[Process, Any], Body | Awaitable[Body]]
 
 HANDLERS: Final[dict[str, Handler]] = {
     "ping": lobby.ping,
     "available_maps": lobby.available_maps,
     "save_map": lobby.save_map,
     "create_game": lobby.create_game,
-    "join_game": lobby.join_game,
-    "restart_game": lobby.restart_game,
+    "join_game": joining.join_game,
+    "restart_game": joining.restart_game,
     "leave_game": lobby.leave_game,
     "quit": lobby.end,
     "start_replay": viewing.start_replay,

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.clock import LOOPS_PER_SECOND
+from simulator.api.clock import LOOPS_PER_SECOND, Clock
 from simulator.api.game_info import GameInfo
 from simulator.api.process import Failure, Playing
 from simulator.api.projection import size_problem
 from simulator.api.replay import Replay, ReplayError, rerun
+from simulator.api.viewer import Viewer
 
 if TYPE_CHECKING:
     from simulator.api.process import Process
@@ -31,7 +32,11 @@ class _Unreadable(Exception):
 
 
 def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.ResponseStartReplay:
-    """Simulates a game anew, seen by one of its players: his camera, his selection, his actions."""
+    """Simulates a game anew, seen by one of its players (his camera, his selection, his actions) or, by 0, all of it.
+
+    The players sit at their own interfaces, because what a click means depends on the size of the screen; so the
+    reported clicks are in pixels of the recorded interface.
+    """
     try:
         replay = _read(process, request)
     except _Unreadable as error:
@@ -41,12 +46,16 @@ def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.Respons
     if problem := size_problem(request.options):
         raise _cannot_start("LaunchError", problem)
     player = request.observed_player_id
-    if player not in replay.interfaces:
-        raise _cannot_start("InvalidObservedPlayerId", f"Nobody played as player {player} in the replay")
-    game, seat = rerun(replay, process.tables, player, request.options)
+    if player > len(replay.setup.players):
+        raise _cannot_start("InvalidObservedPlayerId", f"There is no player {player} in the replay")
+    game = rerun(replay, process.tables)
+    options = sc.InterfaceOptions()
+    options.CopyFrom(request.options)
+    seat = Viewer(game, player, options)
     seat.sees_all = request.disable_fog and not replay.setup.disable_fog
     process.setup = None
-    process.playing = Playing(game, seat, GameInfo(game, seat), replay=True)
+    clock = Clock(game) if request.realtime else None
+    process.play(Playing(game, seat, GameInfo(game, seat), replay=True, clock=clock))
     return sc.ResponseStartReplay()
 
 

@@ -182,7 +182,7 @@ def at(path: str = "", data: bytes = b"") -> sc.LocalMap:
     [
         ({}, "MissingMap", "Name a map by its path or send its data"),
         ({"battlenet_map_name": "Ladder"}, "InvalidMapName", "Maps of battle.net are not available"),
-        ({"local_map": at("nowhere.SC2Map")}, "InvalidMapPath", "No map nowhere.SC2Map; shipped are llm_smac/"),
+        ({"local_map": at("nowhere.SC2Map")}, "InvalidMapPath", "No map nowhere.SC2Map; shipped are "),
         ({"local_map": at("x.SC2Map", b"zzz")}, "InvalidMapData",
          "x.SC2Map holds neither a map of the simulator nor a StarCraft II archive"),
         ({"local_map": at("x.SC2Map", b"MPQ\x1b")}, "InvalidMapData",
@@ -204,11 +204,10 @@ def test_a_game_that_cannot_be_created(client: Client, request_: dict[str, Any],
 @pytest.mark.parametrize(
     ("request_", "error", "details"),
     [
-        ({"options": interface()}, "MissingParticipation", "Say with which race to play"),
+        ({"options": interface()}, "MissingParticipation", "Say with which race to play, or whom to observe"),
         ({"race": 1}, "MissingOptions", "Say what to observe"),
-        ({"observed_player_id": 1, "options": interface()}, "FeatureUnsupported", "Observers are not supported yet"),
-        ({"race": 1, "options": interface(), "server_ports": sc.PortSet(game_port=1)}, "FeatureUnsupported",
-         "Games over several processes are not supported yet"),
+        ({"observed_player_id": 1, "options": interface()}, "GameFull", "No place for an observer is free"),
+        ({"observed_player_id": 3, "options": interface()}, "InvalidObservedPlayerId", "There is no player 3"),
         ({"race": 1, "options": sc.InterfaceOptions(render=sc.SpatialCameraSetup())}, "OtherError",
          "Rendered images of 0 x 0 pixels; between 1 and 4096 are possible"),
         ({"race": 1, "options": sc.InterfaceOptions(feature_layer=sc.SpatialCameraSetup())}, "OtherError",
@@ -221,6 +220,13 @@ def test_a_game_that_cannot_be_joined(client: Client, request_: dict[str, Any], 
     assert JoinError.Name(response.join_game.error) == error
     assert response.join_game.error_details == details
     assert response.status == sc.init_game
+
+
+def test_two_participants_need_two_processes(client: Client) -> None:
+    client.ask(create_game=sc.RequestCreateGame(local_map=at("2s3z"), player_setup=[PARTICIPANT] * 2))
+    joined = client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface())).join_game
+    assert joined.error == JoinError.MissingPorts
+    assert joined.error_details == "1 more have to join, each with its own process: name the ports on which they meet"
 
 
 def test_joining_where_no_game_was_created_is_a_usage_error(client: Client) -> None:

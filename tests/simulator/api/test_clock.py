@@ -17,7 +17,7 @@ class Wall:
     def now(self) -> float:
         return self.now_s
 
-    def sleep(self, duration_s: float) -> None:
+    async def sleep(self, duration_s: float) -> None:
         self.now_s += duration_s
 
 
@@ -25,7 +25,7 @@ class Wall:
 def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     wall = Wall()
     real = clocks.Clock
-    monkeypatch.setattr("simulator.api.lobby.Clock", lambda game: real(game, wall.now, wall.sleep))
+    monkeypatch.setattr("simulator.api.joining.Clock", lambda game: real(game, wall.now, wall.sleep))
     return wall
 
 
