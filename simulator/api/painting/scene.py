@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 GRID_FROM = 5.0
 """Pixels per cell from which the cells are shown."""
 SPARK_LOOPS = 2
-SMALL, TALL = 5.0, 30.0
+SMALL, TALL = 6.0, 30.0
 """Radius in pixels below which bars are one pixel high, and from which they are three."""
 BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 """What has no bars until it is damaged."""
@@ -90,8 +90,8 @@ class ScenePainter:
         looks, selected = self._looks(frame.sight), frame.selected.tolist()
         for actor in actors:
             if selected[actor.row]:
-                width = 1 + (actor.radius > 9)
-                marks.ring(image, (actor.x, actor.y), actor.radius * 1.3 + 1.5, palette.SELECTED, width)
+                width = 1 + (actor.radius > TALL)
+                marks.ring(image, (actor.x, actor.y), actor.radius * 1.18 + 1.5, palette.SELECTED, width)
         for actor in actors:
             look = looks[actor.row]
             sprite = self._sprites.get(look)
@@ -122,7 +122,7 @@ class ScenePainter:
             self._beams(image, frame, attacker[~melee], target[~melee])
         hurt = (world.loop - world.damaged_loop[sight.slot] <= SPARK_LOOPS) & (sight.display == Display.VISIBLE.value)
         for row in np.flatnonzero(hurt).tolist():
-            size = max(1.5, sight.radius[row] * self._scale * 0.55)
+            size = max(1.5, sight.radius[row] * self._scale * 0.42)
             marks.spark(image, self._pixel(frame, sight.pos[row]), size, int(sight.slot[row]) + world.loop)
         flying = in_flight(world, frame.player, through_fog=not frame.fogged)
         for pos, goal, side in zip(*flying, strict=True) if flying else ():

@@ -162,7 +162,7 @@ CODES: dict[str, str] = {
 }  # fmt: skip
 """Letters of the types that players know; others have those of their name."""
 
-_FORMS = re.compile(r"(Burrowed|Uprooted|Flying|Lowered|Sieged|SiegeMode|Alternate|Rich|AG|Phasing|Phased|Queen)$")
+_FORMS = re.compile(r"(Burrowed|Uprooted|Flying|Lowered|Sieged|SiegeMode|Alternate|Rich|AG|Phasing|Phased|Queen|_RL)$")
 _BARREN = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 
 

@@ -1,0 +1,237 @@
+"""Takes pictures of six moments as a client sees them: `python -m docs.moments [NAME ...]`.
+
+Each is a battle on the simulator with a fixed seed, led by a few lines of script, up to a chosen loop; what is shown
+is `render_data` of the observation there, the screen beside the minimap, and how the sides fare. Written to
+docs/images/moments, and docs/design/rendering.md shows them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from simulator.catalog import load_catalog
+from simulator.client import Client, command, interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+    from s2clientprotocol import common_pb2
+
+    Image = NDArray[np.uint8]
+    Point = tuple[float, float]
+
+OUT = Path(__file__).parent / "images" / "moments"
+SCREEN, MINIMAP, GAP = 512, 256, 12
+QUALITY = 88
+SIDES = {"own": raw_pb2.Self, "enemy": raw_pb2.Enemy}
+GROUND, TEXT, FAINT = (20, 18, 17), (240, 236, 232), (168, 160, 152)
+COLOURS = {"own": (255, 150, 70), "enemy": (52, 96, 244)}  # blue, green, red, as OpenCV writes files
+SANS = cv2.FontFace("sans")
+
+LOOPS_PER_SECOND = 22.4
+REACH = 9.0
+"""World units around own units within which somebody belongs to the fight."""
+ATTACK, MOVE, STORM, FORCE_FIELD, GUARDIAN_SHIELD = 3674, 3794, 1036, 1526, 76
+"""Abilities, by the API's numbers."""
+
+
+class Stage:
+    """A game that is led by a script."""
+
+    def __init__(self, map_name: str, seed: int) -> None:
+        self._client = Client()
+        self._catalog = load_catalog()
+        options = interface(screen=0)
+        options.raw_affects_selection = False
+        options.render.resolution.x = options.render.resolution.y = SCREEN
+        options.render.minimap_resolution.x = options.render.minimap_resolution.y = MINIMAP
+        self.seen = self._client.play(map_name, options, seed=seed)
+
+    def step(self, loops: int) -> None:
+        """Plays on."""
+        self.seen = self._client.step(loops)
+
+    def units(self, side: str, *names: str) -> list[raw_pb2.Unit]:
+        """Units of a side, of these types or of all."""
+        rows = [unit for unit in self.seen.observation.raw_data.units if unit.alliance == SIDES[side]]
+        return [unit for unit in rows if not names or self.name(unit) in names]
+
+    def name(self, unit: raw_pb2.Unit) -> str:
+        """Its type's name."""
+        row = self._catalog.row_of_id.get(unit.unit_type)
+        return "" if row is None else self._catalog.units[row].name
+
+    def order(self, ability: int, units: list[raw_pb2.Unit], point: Point | None = None) -> None:
+        """Orders own units."""
+        self._client.act(command(ability, [unit.tag for unit in units], point=point))
+
+    def look(self, point: Point) -> None:
+        """Points the camera."""
+        action = sc.Action()
+        centre = action.action_raw.camera_move.center_world_space
+        centre.x, centre.y = point
+        self._client.act(action)
+
+    def watch(self) -> None:
+        """Points the camera at the fight."""
+        army = [unit for side in SIDES for unit in self.units(side) if self._fights(unit)]
+        own = [unit for unit in army if unit.alliance == SIDES["own"]]
+        near = [u for u in army if own and min(np.hypot(u.pos.x - o.pos.x, u.pos.y - o.pos.y) for o in own) < REACH]
+        self.look(self.middle(near or army))
+        self.step(1)
+
+    @staticmethod
+    def middle(units: list[raw_pb2.Unit]) -> Point:
+        """The mean of the places of units."""
+        x, y = np.mean([(unit.pos.x, unit.pos.y) for unit in units], axis=0).tolist()
+        return x, y
+
+    @staticmethod
+    def distance(some: list[raw_pb2.Unit], others: list[raw_pb2.Unit]) -> float:
+        """Between the nearest two of two groups."""
+        return min(float(np.hypot(a.pos.x - b.pos.x, a.pos.y - b.pos.y)) for a in some for b in others)
+
+    def attack(self, loops: int) -> None:
+        """Lets the own army attack the nearest enemies for so long."""
+        for _ in range(0, loops, 16):
+            army, enemies = [u for u in self.units("own") if self._fights(u)], self.units("enemy")
+            if army and enemies:
+                nearest = min(enemies, key=lambda unit: self.distance([unit], army))
+                self.order(ATTACK, army, (nearest.pos.x, nearest.pos.y))
+            self.step(16)
+
+    def picture(self, title: str) -> Image:
+        """The screen, beside it the minimap and how the sides fare."""
+        sent = self.seen.observation.render_data
+        image = np.full((SCREEN, SCREEN + GAP + MINIMAP, 3), GROUND, np.uint8)
+        image[:, :SCREEN] = _pixels(sent.map)
+        image[:MINIMAP, SCREEN + GAP :] = _pixels(sent.minimap)
+        time_s = self.seen.observation.game_loop / LOOPS_PER_SECOND
+        left, line = SCREEN + GAP, MINIMAP + 40
+        _write(image, title, (left, line), TEXT, 22)
+        _write(image, f"{int(time_s) // 60}:{int(time_s) % 60:02d}", (SCREEN + GAP + MINIMAP - 48, line), FAINT, 20)
+        for side in SIDES:
+            line = self._strength(image, side, (left, line + 34))
+        return image
+
+    def _strength(self, image: Image, side: str, at: Point) -> int:
+        """A side's fighters by type, and what is left of them; returns the last line."""
+        units = [unit for unit in self.units(side) if self._fights(unit)]
+        counts = Counter(self.name(unit).removesuffix("_RL").removesuffix("Burrowed") for unit in units)
+        vigour = round(sum(unit.health + unit.shield for unit in units))
+        x, y = int(at[0]), int(at[1])
+        cv2.rectangle(image, (x, y - 12), (x + 8, y + 2), COLOURS[side], -1)
+        _write(image, f"{side}: {len(units)} units, {vigour} hp", (x + 18, y), TEXT, 15)
+        for name, count in counts.most_common(5):
+            y += 19
+            _write(image, f"{count} {name}", (x + 18, y), FAINT, 14)
+        return y
+
+    def _fights(self, unit: raw_pb2.Unit) -> bool:
+        row = self._catalog.row_of_id.get(unit.unit_type)
+        return row is not None and self._catalog.units[row].army
+
+
+def _pixels(image: common_pb2.ImageData) -> Image:
+    """A picture as OpenCV writes files: blue, green, red."""
+    return np.frombuffer(image.data, np.uint8).reshape(image.size.y, image.size.x, 3)[..., ::-1]
+
+
+def _write(image: Image, text: str, at: tuple[int, int], colour: tuple[int, int, int], size: int) -> None:
+    cv2.putText(image, text, at, colour, SANS, size, 500)
+
+
+# scripts --------------------------------------------------------------------------------------------------------------
+
+
+def clash(stage: Stage) -> None:
+    """Both sides run into each other."""
+    stage.attack(104)
+
+
+def cliff(stage: Stage) -> None:
+    """Colossi step up the cliff and burn what runs up the ramps after them."""
+    stage.attack(104)
+    stage.order(MOVE, stage.units("own"), (16, 17))
+    stage.step(48)
+    stage.attack(32)
+
+
+def marauders(stage: Stage) -> None:
+    """Medivacs fly behind the infantry."""
+    stage.attack(128)
+
+
+def roaches(stage: Stage) -> None:
+    """Marines open fire as soon as they can."""
+    stage.attack(96)
+    stage.watch()
+
+
+def base(stage: Stage) -> None:
+    """The enemy is at the gates."""
+    stage.step(200)
+    stage.attack(160)
+    stage.watch()
+
+
+def storm(stage: Stage) -> None:
+    """Force fields hold the swarm where the storms fall."""
+    stage.step(160)
+    while stage.distance(stage.units("own", "Stalker"), stage.units("enemy", "Zergling")) > 6:
+        stage.step(8)
+    front = stage.middle(stage.units("enemy", "Zergling"))
+    stage.order(GUARDIAN_SHIELD, stage.units("own", "Sentry")[:1])
+    for templar, shift in zip(stage.units("own", "HighTemplar"), (-1.5, 1.5, 0.0), strict=False):
+        stage.order(STORM, [templar], (front[0] + 0.5, front[1] + shift))
+    for sentry, shift in zip(stage.units("own", "Sentry")[1:], (-2.5, 0.0, 2.5), strict=False):
+        stage.order(FORCE_FIELD, [sentry], (front[0] - 2.5, front[1] + shift))
+    stage.step(24)
+    stage.watch()
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One picture: where, what happens, and from which seed."""
+
+    map_name: str
+    script: Callable[[Stage], None]
+    seed: int = 1
+
+
+MOMENTS = {
+    "clash": Moment("llm_smac/2s3z", clash),
+    "cliff": Moment("llm_smac/2c_vs_64zg", cliff),
+    "infantry": Moment("SMAC_Maps/MMM2", marauders),
+    "roaches": Moment("mini_games/DefeatRoaches", roaches),
+    "base": Moment("llm_pysc2/pvz_task5_level1", base),
+    "storm": Moment("llm_pysc2/pvz_task6_level1", storm),
+}
+
+
+def main() -> None:
+    """Takes the pictures that are named, or all."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    for name in sys.argv[1:] or MOMENTS:
+        moment = MOMENTS[name]
+        stage = Stage(moment.map_name, moment.seed)
+        moment.script(stage)
+        path = OUT / f"{name}.webp"
+        image = stage.picture(moment.map_name.partition("/")[2])
+        if not cv2.imwrite(str(path), image, [cv2.IMWRITE_WEBP_QUALITY, QUALITY]):
+            raise SystemExit(f"{path} cannot be written")
+        sys.stdout.write(f"{path}: {path.stat().st_size / 1e3:.0f} kB\n")
+
+
+if __name__ == "__main__":
+    main()
