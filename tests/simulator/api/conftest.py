@@ -64,8 +64,11 @@ class Table:
     def put(self, name: str, owner: int, x: float, y: float, facing: float = 0.0) -> int:
         return self.world.spawn(self.world.catalog.unit(name), owner, (x, y), facing)
 
+    def respond(self) -> sc.ResponseObservation:
+        return sc.ResponseObservation.FromString(b"".join(observe(self.game, self.seat)))
+
     def observe(self) -> sc.Observation:
-        return sc.ResponseObservation.FromString(b"".join(observe(self.game, self.seat))).observation
+        return self.respond().observation
 
     def screen(self, name: str) -> NDArray[Any]:
         return unpack(getattr(self.observe().feature_layer_data.renders, name))
