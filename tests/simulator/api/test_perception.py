@@ -11,6 +11,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator import buffs, casting
 from simulator.api.sight import Display
 from simulator.client import command
+from simulator.refusal import Refusal
 from simulator.tick import advance
 from simulator.world import Mishap
 
@@ -100,7 +101,7 @@ def test_without_fog_there_are_no_snapshots(make_table: Any) -> None:
     table.put("Marine", 1, 4, 16)
     table.put("Pylon", 2, 26, 16)
     advance(table.world, 8)
-    assert [unit.display_type for unit in units(table, alliance=raw_pb2.Enemy)] == [Display.VISIBLE]
+    assert [int(unit.display_type) for unit in units(table, alliance=raw_pb2.Enemy)] == [Display.VISIBLE]
 
 
 def test_an_attack_on_a_snapshot_goes_to_its_place(fogged: Any) -> None:
@@ -157,8 +158,8 @@ def test_a_transport_tells_who_is_inside(make_table: Any) -> None:
 def test_an_order_that_failed_on_the_way_is_an_action_error_once(make_table: Any) -> None:
     table = make_table(RAW)
     tag = table.world.tag_of(table.put("Marine", 1, 10, 16))
-    table.world.mishaps.append(Mishap(1, 1, tag, 380, casting.Refusal.NOT_ENOUGH_ENERGY))
-    table.world.mishaps.append(Mishap(1, 2, tag, 380, casting.Refusal.COOLDOWN))
+    table.world.mishaps.append(Mishap(1, 1, tag, 380, Refusal.NOT_ENOUGH_ENERGY))
+    table.world.mishaps.append(Mishap(1, 2, tag, 380, Refusal.COOLDOWN))
     errors = table.respond().action_errors
     assert [(e.unit_tag, e.ability_id, e.result) for e in errors] == [(tag, 380, 17)]
     assert not table.respond().action_errors
