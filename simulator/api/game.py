@@ -124,6 +124,7 @@ class Game:
             advance(self.world, min(until, target) - self.world.loop)
             for seat in self.seats.values():
                 seat.selection.forget_dead(self.world)
+                seat.follow_script()
                 if seat.unread:
                     seat.hands.forget()
         return self.world.loop
@@ -160,10 +161,11 @@ def _result(world: World, player: int) -> sc.Result.ValueType:
 
 
 def _player_setups(setup: Setup) -> list[PlayerSetup]:
-    """Everybody in the world: the players of the request, and those that only the map knows."""
+    """Everybody in the world: the players of the request, and those that only the map knows; no open slots."""
     specs = setup.game_map.scenario.players
+    taken = [number for number, spec in specs.items() if spec.control != "open"]
     players = []
-    for number in range(1, max(len(setup.players), *specs) + 1):
+    for number in range(1, max([len(setup.players), *taken]) + 1):
         asked = setup.players[number - 1] if number <= len(setup.players) else None
         spec = specs.get(number)
         control = "agent" if asked is not None and asked.type == sc.Participant else "computer"

@@ -70,6 +70,8 @@ class Seat:
         self.unread = False  # nobody asks for what is to be told
         camera = world.players[player].camera or world.map.camera
         self.hands = Hands(camera, self.ground_z(*camera))
+        self._followed = 0  # selections of the map's script that have been made here
+        self.follow_script()
         self.deaths_told = 0
         self.mishaps_told = 0
         self.known: frozenset[int] = frozenset()  # tags in the last observation
@@ -99,6 +101,14 @@ class Seat:
     def selection(self) -> Selection:
         """The selected units and the control groups."""
         return self.hands.selection
+
+    def follow_script(self) -> None:
+        """Selects what the map's script has selected for the player since this was last asked."""
+        made = self.world.script.selections
+        for player, tags in made[self._followed :]:
+            if player == self.player:
+                self.hands.selection.choose(tags)
+        self._followed = len(made)
 
     def look(self, *, through_fog: bool = False) -> Sight:
         """What the player perceives now."""

@@ -181,7 +181,7 @@ def test_energies_and_facings_are_those_of_the_map() -> None:
 
 def test_the_types_of_smac_are_numbered_as_smac_derives_them() -> None:
     catalog = begun("SMAC_Maps/MMM").catalog
-    names = "Colossus Stalker Zealot Marauder Marine Medivac Baneling Zergling Hydralisk".split()
+    names = ["Colossus", "Stalker", "Zealot", "Marauder", "Marine", "Medivac", "Baneling", "Zergling", "Hydralisk"]
     ids = {name: catalog.unit(f"{name}_RL").id for name in names}
     assert ids["Stalker"] == ids["Colossus"] + 1
     assert ids["Zealot"] == ids["Stalker"] + 1
