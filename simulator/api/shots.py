@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from simulator.api.sight import Display, alliance_of, sees
+from simulator.api.sight import API_NEUTRAL, Display, alliance_of, sees
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY
+from simulator.players import NEUTRAL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,6 +42,7 @@ class InFlight(NamedTuple):
 
     pos: Floats  # [m, 2] world
     goal: Floats  # [m, 2]
+    owner: Ints  # 16 is neutral
     alliance: Ints
 
 
@@ -71,7 +73,9 @@ def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlig
     rows = world.missiles.rows
     pos = rows["pos"]
     seen = np.ones(len(rows), np.bool_) if through_fog else sees(world, player, pos)
-    return InFlight(pos[seen], rows["goal"][seen], alliance_of(rows["owner"][seen], player))
+    owner = rows["owner"][seen]
+    told = np.where(owner == NEUTRAL, API_NEUTRAL, owner)
+    return InFlight(pos[seen], rows["goal"][seen], told, alliance_of(owner, player))
 
 
 @functools.cache

@@ -60,7 +60,8 @@ class OverviewPainter:
         order = known[np.lexsort((last[known], first[known]))]
         x, y = self._minimap.to_pixels(sight.pos[order, 0], sight.pos[order, 1])
         radius = np.maximum(sight.radius[order] / scale * 0.9, LEAST)
-        columns = (sight.row[order], sight.alliance[order], x, y, radius, structure[order])
+        sides = palette.sides(sight.owner, sight.alliance, frame.player)
+        columns = (sight.row[order], sides[order], x, y, radius, structure[order])
         for row, side, column, line, size, square in zip(*(part.tolist() for part in columns), strict=True):
             unit = self._types.catalog.units[row]
             colour = palette.livery_of(unit, side).body if unit.resource else palette.LIVERIES[side].dot

@@ -10,10 +10,14 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-from simulator.api.sight import Alliance
+import numpy as np
+
+from simulator.api.sight import API_NEUTRAL, OBSERVER, Alliance
 
 if TYPE_CHECKING:
     from typing import TypeAlias
+
+    from numpy.typing import NDArray
 
     from simulator.records import UnitType
 
@@ -51,6 +55,9 @@ LIVERIES: dict[int, Livery] = {
     ),
 }  # fmt: skip
 
+_OF_PLAYER = np.array([Alliance.NEUTRAL, Alliance.SELF, Alliance.ENEMY, Alliance.ALLY])
+"""In which side's colours an observer sees the units of a player; it has no side itself."""
+
 VOID: Colour = (12, 13, 18)
 LOW: Colour = (62, 68, 74)
 """Ground at the height of the lowest cliff level, and at the highest."""
@@ -85,6 +92,15 @@ def mix(one: Colour, other: Colour, part: float) -> Colour:
         round(one[1] + (other[1] - one[1]) * part),
         round(one[2] + (other[2] - one[2]) * part),
     )
+
+
+def sides(owner: NDArray[np.int64], alliance: NDArray[np.int64], player: int) -> NDArray[np.int64]:
+    """(n,) keys of LIVERIES for units of these owners: their alliance, or for an observer their player's colours."""
+    if player != OBSERVER:
+        return alliance
+    number = np.where(owner == API_NEUTRAL, 0, owner)
+    row = np.where(number == 0, 0, 1 + (number - 1) % (len(_OF_PLAYER) - 1))
+    return _OF_PLAYER.take(row)
 
 
 def livery_of(unit: UnitType, side: int) -> Livery:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from simulator.api.painting.palette import Colour
     from simulator.api.painting.sprites import Sprite
     from simulator.api.projection import Screen
-    from simulator.api.sight import Sight
     from simulator.api.types import Types
 
     Image = NDArray[np.uint8]
@@ -34,6 +33,8 @@ if TYPE_CHECKING:
 GRID_FROM = 5.0
 """Pixels per cell from which the cells are shown."""
 SPARK_LOOPS = 2
+TAIL = 0.6
+"""World units that a missile draws behind it."""
 SMALL, TALL = 6.0, 30.0
 """Radius in pixels below which bars are one pixel high, and from which they are three."""
 BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
@@ -87,7 +88,7 @@ class ScenePainter:
     # units ------------------------------------------------------------------------------------------------------------
 
     def _units(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
-        looks, selected = self._looks(frame.sight), frame.selected.tolist()
+        looks, selected = self._looks(frame), frame.selected.tolist()
         for actor in actors:
             if selected[actor.row]:
                 width = 1 + (actor.radius > TALL)
@@ -99,13 +100,15 @@ class ScenePainter:
                 sprite = self._sprites[look] = self._sprite(look, actor.radius)
             sprite.stamp(image, int(actor.x), int(actor.y))
 
-    def _looks(self, sight: Sight) -> list[tuple[int, int, int, bool, bool]]:
+    def _looks(self, frame: Frame) -> list[tuple[int, int, int, bool, bool]]:
         """For each unit what its sprite depends on: type, side, direction, whether translucent, whether unfinished."""
+        sight = frame.sight
         turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
         turn *= ~self._types.structure[sight.row]
         veiled = (sight.cloak != Cloak.NOT_CLOAKED.value) | (sight.display != Display.VISIBLE.value)
         veiled |= sight.hallucination | sight.burrowed
-        columns = (sight.row, sight.alliance, turn, veiled, sight.build_progress < 1)
+        sides = palette.sides(sight.owner, sight.alliance, frame.player)
+        columns = (sight.row, sides, turn, veiled, sight.build_progress < 1)
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def _sprite(self, look: tuple[int, int, int, bool, bool], radius: float) -> Sprite:
@@ -124,16 +127,22 @@ class ScenePainter:
         for row in np.flatnonzero(hurt).tolist():
             size = max(1.5, sight.radius[row] * self._scale * 0.42)
             marks.spark(image, self._pixel(frame, sight.pos[row]), size, int(sight.slot[row]) + world.loop)
-        flying = in_flight(world, frame.player, through_fog=not frame.fogged)
-        for pos, goal, side in zip(*flying, strict=True) if flying else ():
+        self._missiles(image, frame)
+
+    def _missiles(self, image: Image, frame: Frame) -> None:
+        shown = in_flight(frame.world, frame.player, through_fog=not frame.fogged)
+        if shown is None:
+            return
+        sides = palette.sides(shown.owner, shown.alliance, frame.player).tolist()
+        for pos, goal, side in zip(shown.pos, shown.goal, sides, strict=True):
             way = goal - pos
-            behind = pos - way / max(math.hypot(*way), 1e-6) * 0.6
-            livery = palette.LIVERIES[int(side)]
-            size = max(1.0, 0.11 * self._scale)
-            marks.missile(image, self._pixel(frame, pos), self._pixel(frame, behind), livery.beam, size)
+            behind = pos - way / max(math.hypot(*way), 1e-6) * TAIL
+            head, tail = self._pixel(frame, pos), self._pixel(frame, behind)
+            marks.missile(image, head, tail, palette.LIVERIES[side].beam, max(1.0, 0.11 * self._scale))
 
     def _beams(self, image: Image, frame: Frame, attacker: NDArray[np.int64], target: NDArray[np.int64]) -> None:
         sight = frame.sight
+        sides = palette.sides(sight.owner, sight.alliance, frame.player)
         shots: list[tuple[Point, Point, Colour]] = []
         for one, other in zip(attacker.tolist(), target.tolist(), strict=True):
             way = sight.pos[other] - sight.pos[one]
@@ -142,7 +151,7 @@ class ScenePainter:
                 sight.pos[one] + ahead * sight.radius[one],
                 sight.pos[other] - ahead * sight.radius[other] * 0.7,
             )
-            beam = palette.LIVERIES[int(sight.alliance[one])].beam
+            beam = palette.LIVERIES[int(sides[one])].beam
             shots.append((self._pixel(frame, start), self._pixel(frame, end), beam))
         if shots:
             marks.beams(image, shots, 1 + (self._scale > 14))

@@ -12,7 +12,8 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api.painting import palette, sprites
 from simulator.api.painting.silhouettes import CODES, OUTLINES, code_of, outline_of
-from simulator.api.sight import Alliance
+from simulator.api.sight import OBSERVER, Alliance
+from simulator.api.viewer import Viewer
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
 from simulator.client import Client, command, interface
 from simulator.fields import Field
@@ -144,9 +145,13 @@ def test_bars_tell_life_and_shields(make_table: Any) -> None:
 def test_a_selected_unit_has_a_ring(make_table: Any) -> None:
     table = make_table(options())
     slot = table.put("Zealot", 1, 16, 16)
-    assert near(table.picture(), palette.SELECTED, 30) == 0
+    bare = table.picture()
     table.seat.selection.choose([table.world.tag_of(slot)])
-    assert near(table.picture(), palette.SELECTED, 30) > 8
+    rows, columns = np.nonzero((table.picture() != bare).any(axis=2))
+    distance = np.hypot(rows + 0.5 - 96, columns + 0.5 - 96)
+    assert len(distance) > 20
+    assert 3.5 < distance.min() < distance.max() < 8
+    assert table.picture()[rows, columns, 1].mean() > bare[rows, columns, 1].mean() + 40
 
 
 def test_an_attack_is_a_line_between_the_two(make_table: Any) -> None:
@@ -191,6 +196,17 @@ def test_the_minimap_shows_where_the_camera_looks(make_table: Any) -> None:
     assert white[55, 8:56].all()
     table.seat.move_camera(12, 16)
     assert (table.overview()[8, 0:48] == 255).all()
+
+
+def test_an_observer_tells_players_apart_by_colour(make_table: Any) -> None:
+    table = make_table(options())
+    table.put("Nexus", 1, 8, 16)
+    table.put("Nexus", 2, 24, 16)
+    table.seat = Viewer(table.game, OBSERVER, options())
+    picture = table.picture()
+    assert near(picture[:, :96], BODY[Alliance.SELF]) > 50
+    assert near(picture[:, 96:], BODY[Alliance.ENEMY]) > 50
+    assert near(picture[:, :96], BODY[Alliance.ENEMY], 40) == 0
 
 
 # what must not be on them ---------------------------------------------------------------------------------------------
