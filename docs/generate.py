@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.pages import cli, configs, game, language, messages, simulator
+from docs.pages import cli, configs, game, language, messages, rules, simulator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,6 +28,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "maps.md": game.maps,
     "task-files.md": configs.task_files,
     "model-files.md": configs.model_files_page,
+    "rules.md": rules.page,
     "simulator.md": simulator.page,
 }
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from simulator.catalog import Catalog, Hit, UnitType, Weapon
     from simulator.geometry import Floats
+    from simulator.records import Change
 
 ATTRIBUTES: Final = (
     "light", "armored", "biological", "mechanical", "robotic", "psionic", "massive", "structure",
@@ -33,6 +34,23 @@ LAYERS: Final = (
 GROUND_PLANE: Final = 1
 AIR_PLANE: Final = 2
 INSTANT_ACCELERATION_N: Final = 1000.0
+
+
+READ: Final = {
+    "unit": {
+        "Acceleration", "EnergyMax", "EnergyStart", "LifeArmor", "LifeMax", "LifeRegenRate", "LifeStart", "ShieldArmor",
+        "ShieldsMax", "Sight", "Speed",
+    },
+    "weapon": {"MinScanRange", "Range", "RateMultiplier"},
+    "effect": {"Amount"},
+}  # fmt: skip
+"""The fields whose changes by upgrades have an effect here; attribute bonuses of effects as well."""
+
+
+def reads(change: Change) -> bool:
+    """Whether a change that an upgrade makes has an effect."""
+    bonus = change.catalog == "effect" and change.field.startswith("AttributeBonus[")
+    return bonus or change.field in READ.get(change.catalog, ())
 
 
 @dataclass(frozen=True, slots=True)
