@@ -204,6 +204,9 @@ def use(
     casts = [Cast(slot, ability, victim, point) for slot in slots]
     casts = [c for c in casts if refusal(world, c.slot, ability) is Refusal.SUCCESS]
     casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
+    give = SKILLS[ability.does].give
+    if give is not None:
+        return give(world, [cast.slot for cast in casts], ability, target, point, queue) if casts else []
     if ability.solo and len(casts) > 1:
         casts = [min(casts, key=lambda c: (_busy(world, c), _away(world, c), c.slot))]
     taken: list[int] = []

@@ -257,6 +257,9 @@ def _unit(row: int, raw: dict[str, Any], weapon_of_id: dict[str, Weapon]) -> Uni
         weapons=tuple(weapon_of_id[w] for w in raw.pop("weapons", ())),
         resource=resource.get("kind", ""),
         resource_amount=resource.get("amount", 0),
+        per_trip=resource.get("per_trip", 0),
+        harvest_loops=resource.get("harvest_n", 0.0) * LOOPS_PER_NORMAL_SECOND,
+        ideal_harvesters=resource.get("ideal", 0),
         power=tuple((p["radius"], p.get("level", 0)) for p in raw.pop("power", ())),
         **raw,
     )

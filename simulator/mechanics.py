@@ -55,6 +55,9 @@ class Mechanics:
     crowd_patience: int
     vision_period: int
     high_ground_step: float
+    harvest_gap: float
+    harvest_search: float
+    harvest_leaving: float
 
 
 def entries() -> tuple[Entry, ...]:

@@ -236,6 +236,9 @@ class UnitType:
     placement: str = ""
     resource: str = ""
     resource_amount: int = 0
+    per_trip: int = 0
+    harvest_loops: float = 0.0
+    ideal_harvesters: int = 0
     power: tuple[tuple[float, int], ...] = ()
     needs_power: bool = False
     needs_creep: bool = False

@@ -18,6 +18,7 @@ from simulator.systems import (
     death,
     engagement,
     fields,
+    harvest,
     hits,
     lifetimes,
     missiles,
@@ -46,6 +47,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     autocast.look_out,  # what to use, without being told
     engagement.measure,  # who is in reach of his target, who wants to walk where
     casts.carry_on,  # abilities are prepared, take effect, go on
+    harvest.run,  # workers take, carry home and come again
     passives.run,  # what units do by their nature
     weapons.fire,  # attacks start, take effect, cool down
     navigation.find_ways,  # the next corner on the way to every goal

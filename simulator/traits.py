@@ -44,7 +44,7 @@ def body_traits(world: World, slot: int) -> None:
     world.separation[slot] = unit.separation
     world.clearance[slot] = min(unit.separation if unit.inner is None else unit.inner, MECHANICS.body_clearance)
     world.layer[slot] = layer_of(unit)
-    world.layer_bits[slot] = world.stats.layer_bits[unit.row]
+    world.layer_bits[slot] = 0 if world.harvest[slot] else world.stats.layer_bits[unit.row]
     world.plane_bits[slot] = world.stats.plane_bits[unit.row]
     world.step_max[slot] = world.stats.step[at]
     world.step_gain[slot] = world.stats.step_gain[at]
@@ -95,6 +95,7 @@ def _plain(world: World, slot: int) -> None:
         world.range_add, world.armor_add, world.shield_armor_add, world.ranged_add, world.melee_add,
     ):  # fmt: skip
         column[slot] = 0.0
+    world.work_rate[slot] = 1.0
     world.can_act[slot] = world.can_attack[slot] = world.can_cast[slot] = True
     if world.hallucination[slot]:
         world.dealt_factor[slot] = 0.0
@@ -111,6 +112,7 @@ def _change(world: World, slot: int, buff: Buff) -> None:
     world.range_add[slot] += buff.range_add
     world.armor_add[slot] += buff.armor_add
     world.shield_armor_add[slot] += buff.shield_armor_add
+    world.work_rate[slot] *= buff.work_rate * buff.time
     world.sight[slot] += buff.sight_add
     world.detects[slot] = max(float(world.detects[slot]), buff.detect)
     world.life_max[slot] += buff.life_max_add

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.skills import basics
+from simulator.skills import basics, harvest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
     from simulator.world import World
 
-SKILLS: Final[dict[str, Skill]] = {**basics.SKILLS}
+SKILLS: Final[dict[str, Skill]] = {**basics.SKILLS, **harvest.SKILLS}
 FIELDS: Final[dict[str, FieldRule]] = {}
 TICKS: Final[dict[str, BuffRule]] = {}
 ENDS: Final[dict[str, BuffRule]] = {}

@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 Effect: TypeAlias = Callable[["World", "Cast"], None]
 FieldRule: TypeAlias = Callable[["World", "Field"], None]
 BuffRule: TypeAlias = Callable[["World", int, "np.void"], None]
+Give: TypeAlias = Callable[["World", "list[int]", "Ability", int, "Point | None", bool], "list[int]"]
 UnitRule: TypeAlias = Callable[["World", "list[int]"], None]
+
+
+def no_effect(_: World, __: Cast) -> None:
+    """An ability that is carried out in its own way."""
 
 
 def nothing_against_it(_: World, __: Cast) -> Refusal:
@@ -40,6 +45,9 @@ class Skill:
 
     Args:
         effect: Called when it takes effect; cost and cooldown are taken by then.
+        give: Carries the order out in its own way instead of as a cast, such as by a structure's queue: called with
+            the units that may, the ability, the target (tag), the point and whether to queue it; returns those that
+            took it. It charges what it costs.
         refuse: Reasons of its own against the cast, ``Refusal.SUCCESS`` for none.
         hold: Makes it a channel: called in every later loop, False when it is over.
         end: Called when a channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused).
@@ -48,7 +56,8 @@ class Skill:
         estimates: What of it is no fact of the sources, a sentence each.
     """
 
-    effect: Effect
+    effect: Effect = no_effect
+    give: Give | None = None
     refuse: Callable[[World, Cast], Refusal] = nothing_against_it
     hold: Callable[[World, Cast], bool] | None = None
     end: Effect | None = None

@@ -13,6 +13,7 @@ import numpy as np
 from simulator import geometry
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
+from simulator.harvesting import Phase, reach_of
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 
@@ -24,6 +25,7 @@ EDGE_TOLERANCE = 1e-9
 ON_TARGET = 1e-9
 FOLLOW_GAP = 0.5
 ANYWHERE = 500.0
+HARVEST_OVERLAP = 0.05
 FOLLOW = int(OrderKind.FOLLOW)
 
 
@@ -42,6 +44,8 @@ def measure(world: World) -> None:
     if some(world.casts[:n]):
         _approach(world)
     if some(world.returning[:n]):
+    if world.harvesting:
+        _haul(world)
         _go_back(world)
     if fighters.size:
         _close_in(world, fighters)
@@ -106,6 +110,21 @@ def _follow(world: World) -> None:
 
 
 def _approach(world: World) -> None:
+def _haul(world: World) -> None:
+    """Workers on their way to a resource or a town hall walk until they are there."""
+    n = world.top
+    phase = world.harvest[:n]
+    slots = which(((phase == TO_RESOURCE) | (phase == TO_HALL)) & (world.order_target[:n] >= 0))
+    if slots.size:
+        place = world.order_target[slots]
+        goal = world.pos[place]
+        offset = goal - world.pos[slots]
+        stop_at = reach_of(world, slots, place)
+        world.goal[slots] = goal
+        world.stop_at[slots] = stop_at - HARVEST_OVERLAP
+        world.wants[slots] = offset[:, 0] ** 2 + offset[:, 1] ** 2 > stop_at * stop_at
+
+
     """Units that are to use an ability walk until it reaches, and stand from then on."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])

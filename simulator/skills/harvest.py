@@ -1,0 +1,45 @@
+"""Skills of workers: gathering and returning. The orders are ``commands``', the round itself ``systems.harvest``'s."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import commands, harvesting
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.casts import Cast, Point
+    from simulator.world import World
+
+
+def _gather(world: World, slots: list[int], _: Ability, target: int, __: Point | None, queue: bool) -> list[int]:
+    return commands.gather(world, slots, target, queue=queue)
+
+
+def _return(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, queue: bool) -> list[int]:
+    return commands.return_cargo(world, slots, queue=queue)
+
+
+def _can_gather(world: World, cast: Cast) -> Refusal:
+    if cast.target == NOBODY or not world.unit_type(cast.target).resource:
+        return Refusal.MUST_TARGET_RESOURCES
+    if harvesting.can_harvest(world, cast.slot, cast.target):
+        return Refusal.SUCCESS
+    bare = world.owner[cast.target] == 0
+    return Refusal.MUST_BUILD_REFINERY_FIRST if bare else Refusal.CANT_HARVEST_THAT_RESOURCE
+
+
+def _can_return(world: World, cast: Cast) -> Refusal:
+    if not world.load[cast.slot]:
+        return Refusal.ERROR
+    found = harvesting.nearest_hall(world, cast.slot) != NOBODY
+    return Refusal.SUCCESS if found else Refusal.CANT_FIND_DROP_OFF
+
+
+SKILLS: Final = {
+    "gather": Skill(give=_gather, refuse=_can_gather),
+    "return": Skill(give=_return, refuse=_can_return),
+}

@@ -1,0 +1,202 @@
+"""Harvesting: rounds, loads, room at a field, exhaustion, and the income that comes of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from simulator import buffs, casting, commands, harvesting
+from simulator.casts import Cast
+from simulator.maps import load_map
+from simulator.players import PlayerSetup
+from simulator.refusal import Refusal
+from simulator.tick import advance, new_game
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.simulator.engine.conftest import Field
+
+WORKERS = {"Probe": "Nexus", "SCV": "CommandCenter", "Drone": "Hatchery"}
+RECORDED_RATE = (671, 699)  # minerals per minute of 12 workers, as two recorded games (4.0) report it
+
+
+class Base:
+    """A town hall with what a test puts around it."""
+
+    def __init__(self, field: Field, worker: str = "Probe", resource: str = "MineralField") -> None:
+        self.world = field.world
+        self.field = field
+        self.hall = field.put(WORKERS.get(worker, "CommandCenter"), 1, 50.5, 50.5)
+        gas = resource not in ("MineralField", "RichMineralField")
+        self.resource = field.put(resource, 1 if gas else 0, 57.5 if gas else 57.0, 50.5)
+        self.worker = field.put(worker, 1, 54.5, 50.5)
+
+    def gather(self) -> None:
+        commands.gather(self.world, [self.worker], self.world.tag_of(self.resource))
+
+    def first(self, condition: Callable[[], bool], limit: int = 600) -> int:
+        for loop in self.field.loops(limit):
+            if condition():
+                return loop
+        raise AssertionError("it never came")
+
+    @property
+    def minerals(self) -> float:
+        return self.world.players[1].minerals
+
+
+@pytest.fixture
+def field(make_field: Callable[..., Field]) -> Field:
+    return make_field("{flat: [72, 72]}")
+
+
+@pytest.fixture
+def base(field: Field) -> Base:
+    field.world.players[1].minerals = 0.0
+    return Base(field)
+
+
+@pytest.mark.parametrize(
+    ("worker", "resource", "amount", "buff"),
+    [
+        ("Probe", "MineralField", 5, "CarryMineralFieldMinerals"),
+        ("SCV", "RichMineralField", 7, "CarryHighYieldMineralFieldMinerals"),
+        ("Drone", "Extractor", 4, "CarryHarvestableVespeneGeyserGasZerg"),
+        ("Probe", "AssimilatorRich", 8, "CarryHarvestableVespeneGeyserGasProtoss"),
+        ("MULE", "MineralField", 25, "CarryMineralFieldMinerals"),
+    ],
+)
+def test_a_trip_brings_what_the_resource_gives(
+    field: Field, worker: str, resource: str, amount: int, buff: str
+) -> None:
+    base = Base(field, worker, resource)
+    player = field.world.players[1]
+    before, contents = player.minerals + player.vespene, int(field.world.contents[base.resource])
+    base.gather()
+    base.first(lambda: bool(field.world.load[base.worker]))
+    assert buffs.has(field.world, base.worker, buff)
+    base.first(lambda: player.minerals + player.vespene > before)
+    assert player.minerals + player.vespene - before == amount
+    assert field.world.contents[base.resource] == contents - amount
+    assert not buffs.has(field.world, base.worker, buff)
+
+
+@pytest.mark.parametrize(("worker", "factor"), [("Probe", 1.0), ("MULE", 2.05)])
+def test_a_worker_stays_at_its_field_as_long_as_the_tables_say(field: Field, worker: str, factor: float) -> None:
+    base = Base(field, worker)
+    base.gather()
+    phase = field.world.harvest
+    began = base.first(lambda: phase[base.worker] == harvesting.Phase.AT_RESOURCE)
+    done = base.first(lambda: phase[base.worker] != harvesting.Phase.AT_RESOURCE)
+    assert done - began == pytest.approx(2.786 * 16 * factor, abs=1.0)
+
+
+def test_its_order_says_which_way_a_worker_goes(base: Base) -> None:
+    base.gather()
+    base.field.play(1)
+    (order,) = base.world.orders_of(base.worker)
+    assert (order.ability, order.target) == (298, base.world.tag_of(base.resource))
+    base.first(lambda: base.world.harvest[base.worker] == harvesting.Phase.TO_HALL)
+    (order,) = base.world.orders_of(base.worker)
+    assert (order.ability, order.target) == (299, base.world.tag_of(base.hall))
+
+
+def test_only_one_worker_at_a_time_is_at_a_field(base: Base) -> None:
+    second = base.field.put("Probe", 1, 54.5, 51.5)
+    commands.gather(base.world, [base.worker, second], base.world.tag_of(base.resource))
+    both = [base.worker, second]
+    for _ in base.field.loops(500):
+        assert (base.world.harvest[both] == harvesting.Phase.AT_RESOURCE).sum() <= 1
+    assert base.minerals >= 35.0
+
+
+def test_a_worker_before_a_taken_field_goes_to_a_free_one(base: Base) -> None:
+    other = base.field.put("MineralField", 0, 57.0, 53.5)
+    second = base.field.put("Probe", 1, 54.5, 49.5)
+    commands.gather(base.world, [base.worker, second], base.world.tag_of(base.resource))
+    base.field.play(60)
+    assert {int(base.world.patch[s]) for s in (base.worker, second)} == {base.resource, other}
+
+
+def test_an_empty_field_vanishes_and_its_worker_finds_another(base: Base) -> None:
+    other = base.field.put("MineralField", 0, 57.0, 54.5)
+    base.world.contents[base.resource] = 7
+    tag = base.world.tag_of(base.resource)
+    base.gather()
+    base.first(lambda: base.minerals >= 7.0)
+    assert base.world.slot_of(tag) < 0
+    assert base.world.deaths[-1].tag == tag
+    base.first(lambda: base.minerals >= 12.0)
+    assert base.world.patch[base.worker] == other
+
+
+def test_a_worker_without_a_field_left_is_idle(base: Base) -> None:
+    base.world.contents[base.resource] = 5
+    base.gather()
+    base.first(lambda: base.minerals >= 5.0)
+    base.field.play(2)
+    assert base.world.orders_of(base.worker) == []
+
+
+def test_a_worker_in_a_gas_structure_is_out_of_sight(field: Field) -> None:
+    base = Base(field, "SCV", "Refinery")
+    base.gather()
+    began = base.first(lambda: base.world.carrier[base.worker] == base.resource)
+    assert base.worker not in base.world.live
+    done = base.first(lambda: base.worker in base.world.live)
+    assert done - began == pytest.approx(1.981 * 16, abs=1.0)
+
+
+def test_workers_on_their_round_pass_through_each_other_and_others_do_not(base: Base) -> None:
+    assert base.world.layer_bits[base.worker]
+    base.gather()
+    assert not base.world.layer_bits[base.worker]
+    commands.move(base.world, [base.worker], (50.0, 40.0))
+    assert base.world.layer_bits[base.worker]
+
+
+def test_a_right_click_gathers_and_brings_home(base: Base) -> None:
+    commands.smart(base.world, [base.worker], target=base.world.tag_of(base.resource))
+    base.first(lambda: bool(base.world.load[base.worker]))
+    commands.move(base.world, [base.worker], (56.0, 44.0))
+    base.field.play(40)
+    commands.smart(base.world, [base.worker], target=base.world.tag_of(base.hall))
+    base.first(lambda: base.minerals == 5.0)
+
+
+def test_an_order_that_waits_begins_after_the_load_is_delivered(base: Base) -> None:
+    base.gather()
+    base.first(lambda: bool(base.world.load[base.worker]))
+    commands.return_cargo(base.world, [base.worker])
+    commands.move(base.world, [base.worker], (50.0, 40.0), queue=True)
+    base.first(lambda: base.minerals == 5.0)
+    assert base.world.orders_of(base.worker)[0].point == (50.0, 40.0)
+
+
+@pytest.mark.parametrize(
+    ("worker", "target", "owner", "refusal"),
+    [
+        ("Probe", "Nexus", 1, Refusal.MUST_TARGET_RESOURCES),
+        ("Probe", "VespeneGeyser", 0, Refusal.MUST_BUILD_REFINERY_FIRST),
+        ("Probe", "Assimilator", 2, Refusal.CANT_HARVEST_THAT_RESOURCE),
+        ("Probe", "MineralField", 0, Refusal.SUCCESS),
+    ],
+)
+def test_what_can_be_gathered(field: Field, worker: str, target: str, owner: int, refusal: Refusal) -> None:
+    slot, resource = field.put(worker, 1, 54.5, 50.5), field.put(target, owner, 60.5, 50.5)
+    assert casting.aim_refusal(field.world, Cast(slot, field.world.catalog.ability(298), resource)) is refusal
+
+
+def test_twelve_workers_earn_what_recorded_games_show() -> None:
+    world = new_game(load_map("Simple64"), (PlayerSetup(1, "protoss", "agent"), PlayerSetup(2, "terran", "agent")))
+    advance(world, 320)
+    before = [player.score.collected[0] for player in world.players[1:]]
+    advance(world, 4032)  # three minutes
+    low, high = RECORDED_RATE
+    for player, start in zip(world.players[1:], before, strict=True):
+        rate = (player.score.collected[0] - start) / 3
+        assert low * 0.93 <= rate <= high * 1.07
+    fields = harvesting.assigned(world)
+    assert fields.max() == 2  # two to a field at most
