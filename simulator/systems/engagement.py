@@ -27,6 +27,7 @@ FOLLOW_GAP = 0.5
 ANYWHERE = 500.0
 HARVEST_OVERLAP = 0.05
 FOLLOW = int(OrderKind.FOLLOW)
+TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
 
 
 def measure(world: World) -> None:
@@ -43,9 +44,9 @@ def measure(world: World) -> None:
         _follow(world)
     if some(world.casts[:n]):
         _approach(world)
-    if some(world.returning[:n]):
     if world.harvesting:
         _haul(world)
+    if some(world.returning[:n]):
         _go_back(world)
     if fighters.size:
         _close_in(world, fighters)
@@ -109,7 +110,6 @@ def _follow(world: World) -> None:
         world.wants[slots] = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) > stop_at + FOLLOW_GAP
 
 
-def _approach(world: World) -> None:
 def _haul(world: World) -> None:
     """Workers on their way to a resource or a town hall walk until they are there."""
     n = world.top
@@ -125,6 +125,7 @@ def _haul(world: World) -> None:
         world.wants[slots] = offset[:, 0] ** 2 + offset[:, 1] ** 2 > stop_at * stop_at
 
 
+def _approach(world: World) -> None:
     """Units that are to use an ability walk until it reaches, and stand from then on."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])
