@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-from simulator import harvesting
 from simulator.columns import NOBODY
 from simulator.orders import (
     ATTACK,
@@ -25,7 +24,7 @@ from simulator.orders import (
     OrderKind,
 )
 from simulator.players import GameResult
-from simulator.targets import disengage, engage
+from simulator.targets import disengage, engage, weapon_for
 from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
     taken: list[int] = []
     for slot in slots:
         unit = world.unit_type(slot)
-        if can_attack(unit):
+        if can_attack(world, slot):
             order = Order(OrderKind.ATTACK_MOVE, ATTACK, point=_inside(world, point))
         elif can_move(unit):
             order = Order(OrderKind.SCAN_MOVE, SCAN_MOVE, point=_inside(world, point))
@@ -105,39 +104,15 @@ def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """The right click: attack an enemy, harvest a resource, drop off a load, follow anybody else, walk to a point."""
+    """The right click: attack an enemy, follow a friend or a neutral unit, walk to a point."""
     victim = world.slot_of(target)
     if victim == NOBODY:
         return [] if point is None else move(world, slots, point, queue=queue)
     slots = list(slots)
     foes = [s for s in slots if is_enemy(world, int(world.owner[s]), int(world.owner[victim]))]
-    taken = attack_unit(world, foes, target, queue=queue) + gather(world, slots, target, queue=queue)
-    if harvesting.is_drop_off(world, victim):
-        loaded = [s for s in slots if world.load[s] and world.owner[s] == world.owner[victim]]
-        taken += return_cargo(world, loaded, queue=queue)
-    rest = [s for s in slots if s not in taken]
-    return taken + follow(world, rest, target, queue=queue)
-
-
-def gather(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
-    """Harvest a mineral field or a gas structure (a tag) until told otherwise."""
-    resource = world.slot_of(target)
-    taken: list[int] = []
-    for slot in slots:
-        if harvesting.can_harvest(world, slot, resource):
-            ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][0]
-            taken += give(world, [slot], Order(OrderKind.GATHER, ability.id if ability else 0, target), queue=queue)
-    return taken
-
-
-def return_cargo(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
-    """Carry what is loaded to the nearest town hall, and go on harvesting."""
-    taken: list[int] = []
-    for slot in slots:
-        ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][1]
-        if ability is not None and (queue or world.load[slot]):
-            taken += give(world, [slot], Order(OrderKind.RETURN, ability.id), queue=queue)
-    return taken
+    attackers = attack_unit(world, foes, target, queue=queue)
+    rest = [s for s in slots if s not in attackers]
+    return attackers + follow(world, rest, target, queue=queue)
 
 
 def surrender(world: World, player: int) -> None:
@@ -198,19 +173,17 @@ def can_move(unit: UnitType) -> bool:
     return unit.speed_n > 0.0 and _commandable(unit)
 
 
-def can_attack(unit: UnitType) -> bool:
-    """Whether units of this type have a weapon that they can aim by themselves."""
-    usable = unit.weapon_against("ground") or unit.weapon_against("air")
-    return usable is not None and _commandable(unit)
+def can_attack(world: World, slot: int) -> bool:
+    """Whether the unit has a weapon that it can aim now."""
+    armed = world.ground_weapon[slot] >= 0 or world.air_weapon[slot] >= 0
+    return bool(armed) and _commandable(world.unit_type(slot))
 
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
-    """Whether the unit has a weapon for the plane on which ``victim`` is."""
-    unit, other = world.unit_type(slot), world.unit_type(victim)
-    if other.untargetable or not _commandable(unit):
+    """Whether the unit has a weapon that it can aim at ``victim`` now."""
+    if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
         return False
-    planes = other.planes or (("air",) if other.flying else ("ground",))
-    return any(unit.weapon_against(plane) is not None for plane in planes)
+    return weapon_for(world, slot, victim) >= 0
 
 
 def is_enemy(world: World, player: int, other: int) -> bool:
@@ -264,8 +237,6 @@ def _of_its_own(world: World, slot: int, order: Order) -> Order:
 
 def begin(world: World, slot: int, order: Order | None) -> None:
     """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
-    if world.harvest[slot]:
-        _end_harvest(world, slot)
     order = order or Order(OrderKind.IDLE, 0)
     target = world.slot_of(order.target)
     world.order_kind[slot] = order.kind
@@ -286,25 +257,6 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.scan_now = world.orders_changed = True
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0
-    if order.kind in (OrderKind.GATHER, OrderKind.RETURN):
-        _begin_harvest(world, slot, order.kind, target)
-
-
-def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> None:
-    """Begin a round of harvesting; other bodies are no obstacle on it."""
-    world.harvesting = True
-    if kind is OrderKind.GATHER and target != NOBODY:
-        harvesting.head_for_resource(world, slot, target)
-    elif not harvesting.head_for_hall(world, slot):
-        begin(world, slot, None)
-        return
-    world.refresh(slot)
-
-
-def _end_harvest(world: World, slot: int) -> None:
-    harvesting.leave(world, slot)
-    world.harvest[slot] = harvesting.Phase.NONE
-    world.refresh(slot)
     world.returning[slot] = world.nav_end[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
 
