@@ -125,12 +125,12 @@ class Lockstep:
         foreign = any(entry.loop < before or entry.player != message.member for entry in message.entries)
         if foreign or message.through < before:
             raise LockstepError(f"member {message.member} says what it has said before, or what is not its to say")
-        for entry in message.entries:
-            self.game.note(entry)
-        self._through[message.member] = message.through
         if message.digests:
             self._unchecked.append(message)
             self._check()
+        for entry in message.entries:
+            self.game.note(entry)
+        self._through[message.member] = message.through
 
     def leave(self, member: int) -> Leave:
         """Waits no more for a member that is gone; the message is for all others."""
