@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from simulator import harvesting
 from simulator.columns import NOBODY
 from simulator.orders import (
     ATTACK,
@@ -104,15 +105,39 @@ def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """The right click: attack an enemy, follow a friend or a neutral unit, walk to a point."""
+    """The right click: attack an enemy, harvest a resource, drop off a load, follow anybody else, walk to a point."""
     victim = world.slot_of(target)
     if victim == NOBODY:
         return [] if point is None else move(world, slots, point, queue=queue)
     slots = list(slots)
     foes = [s for s in slots if is_enemy(world, int(world.owner[s]), int(world.owner[victim]))]
-    attackers = attack_unit(world, foes, target, queue=queue)
-    rest = [s for s in slots if s not in attackers]
-    return attackers + follow(world, rest, target, queue=queue)
+    taken = attack_unit(world, foes, target, queue=queue) + gather(world, slots, target, queue=queue)
+    if harvesting.is_drop_off(world, victim):
+        loaded = [s for s in slots if world.load[s] and world.owner[s] == world.owner[victim]]
+        taken += return_cargo(world, loaded, queue=queue)
+    rest = [s for s in slots if s not in taken]
+    return taken + follow(world, rest, target, queue=queue)
+
+
+def gather(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Harvest a mineral field or a gas structure (a tag) until told otherwise."""
+    resource = world.slot_of(target)
+    taken: list[int] = []
+    for slot in slots:
+        if harvesting.can_harvest(world, slot, resource):
+            ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][0]
+            taken += give(world, [slot], Order(OrderKind.GATHER, ability.id if ability else 0, target), queue=queue)
+    return taken
+
+
+def return_cargo(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Carry what is loaded to the nearest town hall, and go on harvesting."""
+    taken: list[int] = []
+    for slot in slots:
+        ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][1]
+        if ability is not None and (queue or world.load[slot]):
+            taken += give(world, [slot], Order(OrderKind.RETURN, ability.id), queue=queue)
+    return taken
 
 
 def surrender(world: World, player: int) -> None:
@@ -239,6 +264,8 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
     order = order or Order(OrderKind.IDLE, 0)
     target = world.slot_of(order.target)
+    if world.harvest[slot]:
+        _end_harvest(world, slot)
     world.order_kind[slot] = order.kind
     world.order_ability[slot] = order.ability
     world.order_target[slot] = target
@@ -259,6 +286,25 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.backswing[slot] = 0.0
     world.returning[slot] = world.nav_end[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
+    if order.kind in (OrderKind.GATHER, OrderKind.RETURN):
+        _begin_harvest(world, slot, order.kind, target)
+
+
+def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> None:
+    """Begin a round of harvesting; other bodies are no obstacle on it."""
+    world.harvesting = True
+    if kind is OrderKind.GATHER and target != NOBODY:
+        harvesting.head_for_resource(world, slot, target)
+    elif not harvesting.head_for_hall(world, slot):
+        begin(world, slot, None)
+        return
+    world.refresh(slot)
+
+
+def _end_harvest(world: World, slot: int) -> None:
+    harvesting.leave(world, slot)
+    world.harvest[slot] = harvesting.Phase.NONE
+    world.refresh(slot)
 
 
 def begin_next(world: World, slot: int) -> None:
