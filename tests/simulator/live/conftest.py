@@ -52,14 +52,9 @@ def make_env(sc2: Path) -> Iterator[Callable[..., Any]]:  # the install must be 
             use_raw_units=True,
             use_camera_position=True,
         )
-        env = sc2_env.SC2Env(
-            map_name=map_name,
-            players=[
-                sc2_env.Agent(sc2_env.Race.protoss),
-                sc2_env.Bot(sc2_env.Race.random, sc2_env.Difficulty.very_hard),
-            ],
-            **{"agent_interface_format": layers, "step_mul": 8, "random_seed": 1, **options},
-        )
+        players = [sc2_env.Agent(sc2_env.Race.protoss), sc2_env.Bot(sc2_env.Race.random, sc2_env.Difficulty.very_hard)]
+        usual = {"players": players, "agent_interface_format": layers, "step_mul": 8, "random_seed": 1}
+        env = sc2_env.SC2Env(map_name=map_name, **{**usual, **options})
         made.append(env)
         return env
 
