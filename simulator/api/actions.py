@@ -76,8 +76,8 @@ def _spatial(seat: Seat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, 
 
 
 def _images(seat: Seat, action: sc.Action) -> Iterator[tuple[spatial_pb2.ActionSpatial, View]]:
-    """The part of a report for each kind of images that the client has, with these images."""
-    return ((getattr(action, kind), view) for kind, view in seat.views.items())
+    """The part of a report for each kind of images that its reader has, with these images."""
+    return ((getattr(action, kind), view) for kind, view in seat.reported.items())
 
 
 def _finite(point: common_pb2.Point) -> bool:

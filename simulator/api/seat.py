@@ -65,6 +65,7 @@ class Seat:
             view = view_of(render, self.playable if crop or render.crop_to_playable_area else whole, otherwise)
             self.views["action_render"] = view
             self.renders = _renders(view, types)
+        self.reported = self.views  # in whose pixels clicks are reported: a viewer's, when one watches this seat
         self.view: View = next(iter(self.views.values()), View(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
         self.unread = False  # nobody asks for what is to be told

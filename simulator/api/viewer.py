@@ -40,6 +40,7 @@ class Viewer(Seat):
         self.hands = followed.hands if followed is not None else self._own
         for seat in self._seats.values():
             seat.unread = seat is not followed
+            seat.reported = self.views if seat is followed else seat.views
 
     @property
     def camera(self) -> tuple[float, float]:

@@ -34,8 +34,8 @@ class _Unreadable(Exception):
 def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.ResponseStartReplay:
     """Simulates a game anew, seen by one of its players (his camera, his selection, his actions) or, by 0, all of it.
 
-    The players sit at their own interfaces, because what a click means depends on the size of the screen; so the
-    reported clicks are in pixels of the recorded interface.
+    The players sit at their own interfaces, because what a click means depends on the size of the screen; to the
+    viewer clicks are reported in pixels of its own.
     """
     try:
         replay = _read(process, request)

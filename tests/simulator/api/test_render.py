@@ -381,6 +381,26 @@ def test_a_replay_shows_the_same_pictures() -> None:
     assert [client.step(20).observation.render_data for _ in range(4)] == pictures
 
 
+def test_a_replay_reports_clicks_in_the_pixels_of_its_viewer() -> None:
+    client = Client()
+    first = client.play("2s3z", interface(screen=96))
+    tags = [u.tag for u in first.observation.raw_data.units if u.alliance == raw_pb2.Self]
+    client.act(command(3794, tags, point=(20.0, 18.0)))
+    unit = first.observation.raw_data.units[0]
+    client.act(click("action_feature_layer", **point(int((unit.pos.x - 4) * 4), int((28 - unit.pos.y) * 4))))
+    client.step(2)
+    data = client.ask(save_replay=sc.RequestSaveReplay()).save_replay.data
+    start = sc.RequestStartReplay(replay_data=data, observed_player_id=1, options=options((240, 240), (32, 32)))
+    client.ask(start_replay=start)
+    moved, selected = client.step().actions
+    assert {field.name for field, _ in moved.ListFields()} == {"game_loop", "action_raw", "action_render"}
+    target = moved.action_render.unit_command.target_screen_coord
+    assert (target.x, target.y) == (160, 100)
+    clicked = selected.action_render.unit_selection_point.selection_screen_coord
+    assert clicked.x == pytest.approx((unit.pos.x - 4) * 10, abs=3)
+    assert clicked.y == pytest.approx((28 - unit.pos.y) * 10, abs=3)
+
+
 # raw data -------------------------------------------------------------------------------------------------------------
 
 
