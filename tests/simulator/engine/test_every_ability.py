@@ -1,0 +1,156 @@
+"""Every ability that has a rule is used once, and its rule changes the world.
+
+A world is set up in which as much as possible is allowed, and twice the same order is given in it: once with the
+skill's effect, once with an effect that does nothing. Whatever differs then is what the ability does. How much it does
+is the matter of the tests of skills.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import pytest
+
+from simulator import casting
+from simulator.abilities import Aim
+from simulator.casts import Cast
+from simulator.catalog import VERSION_OF_BUILD, load_catalog
+from simulator.columns import NOBODY
+from simulator.maps import load_map
+from simulator.players import PlayerSetup
+from simulator.refusal import Refusal
+from simulator.skills import SKILLS
+from simulator.tick import advance
+from simulator.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from simulator.abilities import Ability
+    from simulator.casts import Point
+
+LONGEST = 2500  # loops, for what takes its time before it begins
+CENTRE = (32.0, 32.0)
+OWN = (
+    ("Nexus", 14.5, 32.5), ("Pylon", 22, 36), ("CommandCenter", 14.5, 46.5), ("Hatchery", 14.5, 18.5),
+    ("SupplyDepot", 22, 46), ("Barracks", 24.5, 52.5), ("CyberneticsCore", 21.5, 28.5),
+    ("Marine", 34, 32), ("Stalker", 34, 34), ("SiegeTank", 36, 30), ("VikingFighter", 30, 36), ("Zergling", 30, 30),
+    ("HighTemplar", 36, 35), ("Roach", 28, 34), ("Medivac", 28, 30),
+)  # fmt: skip
+FOES = (
+    ("Marine", 36, 32), ("Roach", 37, 33), ("SiegeTank", 38, 30), ("VikingFighter", 35, 37), ("HighTemplar", 38, 35),
+    ("SupplyDepot", 40, 34), ("Hatchery", 46.5, 32.5), ("Stalker", 37, 28),
+)  # fmt: skip
+NEUTRAL = (("MineralField", 8, 32.5), ("VespeneGeyser", 8.5, 40.5), ("VespeneGeyser", 8.5, 24.5))
+
+
+def modelled(version: str) -> list[Ability]:
+    catalog = load_catalog(version)
+    found = {a.id: a for unit in catalog.units if not unit.not_in_melee for a in catalog.abilities_of(unit.row)}
+    return [a for _, a in sorted(found.items()) if a.does in SKILLS]
+
+
+def stage(version: str) -> World:
+    """A flat map with something of everything on it; the first player may do what he likes, and nobody fights."""
+    players = (PlayerSetup(1, "protoss", "agent"), PlayerSetup(2, "zerg", "agent"))
+    world = World(load_map("Melee/Flat64"), players, seed=3, catalog=load_catalog(version))
+    world.fog = False
+    world.visibility[:] = 2
+    world.players[1].cheats += ["free", "tech_tree", "cooldown", "food"]
+    for owner, group in ((1, OWN), (2, FOES), (0, NEUTRAL)):
+        for name, x, y in group:
+            slot = world.spawn(world.catalog.unit(name), owner, (x, y))
+            world.energy[slot] = world.energy_max[slot]
+            if owner and not world.unit_type(slot).structure:
+                world.life[slot] *= 0.6
+                world.shields[slot] *= 0.5
+    return world
+
+
+def casters(world: World, ability: Ability) -> Iterator[int]:
+    """One unit of each type that has the ability, put in the middle one after the other."""
+    for name in ability.users:
+        unit = world.catalog.unit(name) if name in world.catalog.row_of_name else None
+        if unit is not None and ability in world.catalog.abilities_of(unit.row):
+            slot = world.spawn(unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
+            world.energy[slot] = world.energy_max[slot]
+            yield slot
+            world.remove(slot)
+
+
+def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point | None]]:
+    """Everything that the ability could be aimed at here, the nearest first."""
+    if Aim.NONE in ability.aim:
+        yield NOBODY, None
+    if Aim.UNIT in ability.aim:
+        for other in world.live.tolist():
+            if other != slot:
+                yield other, None
+    if Aim.POINT in ability.aim:
+        x, y = world.pos[slot].tolist()
+        for far in (3.0, 5.0, 7.0, 9.0):
+            for dx, dy in ((far, 0.0), (0.0, far), (-far, 0.0), (0.0, -far), (far, far), (-far, far)):
+                yield NOBODY, (x + dx, y + dy)
+        for field in ("VespeneGeyser",):
+            for other in world.live[world.type[world.live] == world.catalog.unit(field).row].tolist():
+                px, py = world.pos[other].tolist()
+                yield NOBODY, (px, py)
+
+
+PREPARE: dict[str, Callable[[World, int], None]] = {}
+"""By a skill's name: what has to be the case before a unit can use it."""
+
+
+def attempt(world: World, ability: Ability) -> list[int]:
+    """Give the order to the first caster and at the first aim that takes it; returns who did."""
+    for slot in casters(world, ability):
+        if ability.does in PREPARE:
+            PREPARE[ability.does](world, slot)
+        if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+            continue
+        for target, point in aims(world, slot, ability):
+            if casting.aim_refusal(world, Cast(slot, ability, target, point)) is Refusal.SUCCESS:
+                taken = casting.use(world, [slot], ability, target=world.tag_of(target), point=point)
+                if taken:
+                    return taken
+    return []
+
+
+def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch, *, inert: bool) -> tuple[str, int]:
+    """The world's digest soon after the effect, and how often it took effect."""
+    skill, calls = SKILLS[ability.does], 0
+
+    def effect(world: World, cast: Cast) -> None:
+        nonlocal calls
+        calls += 1
+        if not inert:
+            skill.effect(world, cast)
+
+    with monkeypatch.context() as patch:
+        world = stage(version)
+        patch.setitem(SKILLS, ability.does, dataclasses.replace(skill, effect=effect))
+        assert attempt(world, ability), "no unit could use it"
+        for _ in range(LONGEST):
+            if calls:
+                break
+            advance(world)
+    return world.digest(), calls
+
+
+CASES = [pytest.param(v, a, id=f"{v}-{a.id}-{a.does}") for v in VERSION_OF_BUILD.values() for a in modelled(v)]
+
+
+@pytest.mark.parametrize(("version", "ability"), CASES)
+def test_an_ability_with_a_rule_changes_the_world(
+    version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if getattr(SKILLS[ability.does], "give", None) is not None:
+        world, idle = stage(version), stage(version)
+        assert attempt(world, ability), "no unit could use it"
+        assert world.digest() != idle.digest()
+        return
+    with_effect, calls = state_after(version, ability, monkeypatch, inert=False)
+    without, _ = state_after(version, ability, monkeypatch, inert=True)
+    assert calls
+    assert with_effect != without
