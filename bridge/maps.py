@@ -1,6 +1,6 @@
 """The maps that can be played: a typed reading of `bridge/data/maps.yaml`.
 
-Where a map is and who plays on it; what stands on it is known by the game alone.
+Where a map is, who plays on it and what for; what else stands on it is known by the game alone.
 """
 
 from __future__ import annotations
@@ -34,11 +34,18 @@ class MapSpec(Frozen):
     """Below the directory `Maps` of the install."""
     race: Race
     """Of the agents' side."""
-    opponent: Race
+    opponent: Race | None
+    """Of the computer player; None if the map is played alone."""
     difficulty: Difficulty = "very_hard"
     """Of the computer player; the paper's setting."""
     limit_loops: int | None = None
     """Game loop at which the map itself ends the game."""
+    goal: str = ""
+    """What has to be done there."""
+    units: tuple[str, ...] = ()
+    """Types of the agents' units, for a task that is made for the map."""
+    upgrades: tuple[str, ...] = ()
+    """What the map grants the agents' side, as far as actions need it; named as in `pysc2.lib.upgrades`."""
 
 
 @functools.cache

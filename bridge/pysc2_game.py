@@ -136,10 +136,9 @@ class PySC2Game:
 class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
     """A map as PySC2 takes it. The class has no file name, which keeps it out of PySC2's global table of maps."""
 
-    players = 2
-
     def __init__(self, spec: MapSpec) -> None:
         file = PurePosixPath(spec.file)
+        self.players = 1 if spec.opponent is None else 2
         self._name = spec.name
         self.directory = str(file.parent)
         self.filename = file.name
@@ -210,14 +209,11 @@ def _start(config: GameConfig) -> Any:
         use_raw_units=True,
         send_observation_proto=True,
     )
-    players = [
-        sc2_env.Agent(sc2_env.Race[config.map.race], "Khala"),
-        sc2_env.Bot(
-            sc2_env.Race[config.map.opponent],
-            sc2_env.Difficulty[config.map.difficulty],
-            sc2_env.BotBuild.macro,  # `random` would be drawn from Python's own generator
-        ),
-    ]
+    players: list[Any] = [sc2_env.Agent(sc2_env.Race[config.map.race], "Khala")]
+    if config.map.opponent is not None:
+        # the build `random` would be drawn from Python's own generator
+        difficulty, build = sc2_env.Difficulty[config.map.difficulty], sc2_env.BotBuild.macro
+        players.append(sc2_env.Bot(sc2_env.Race[config.map.opponent], difficulty, build))
     if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; their defaults are wanted, not our command line
         flags.FLAGS.mark_as_parsed()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s

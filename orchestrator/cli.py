@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from orchestrator import show
-from orchestrator.config import load_task, task_files
+from orchestrator.config import all_tasks
 from protocol.bus.config import BusConfig
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
@@ -65,7 +65,7 @@ def router(
 
 def tasks(*, as_json: Json = False) -> None:
     """List what can be played."""
-    found = [load_task(str(path)) for path in task_files()]
+    found = list(all_tasks())
     if as_json:
         rows = [
             {"name": t.name, "map": t.map, "agents": [a.name for a in t.agents], "description": t.description}

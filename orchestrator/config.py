@@ -1,6 +1,7 @@
 """What a match is configured with: a task file, and what the command line changes of it.
 
-Task files are found by their name below `configs/tasks/`, or by a path. Their model is `bridge.task.TaskConfig`.
+Task files are found by their name below `configs/tasks/`, or by a path. Their model is `bridge.task.TaskConfig`. A map
+without a task file is a task, too: `bridge.standard` makes it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, ValidationError
 
+from bridge.maps import known_maps
+from bridge.standard import standard_task
 from bridge.task import TaskConfig
 from protocol.configfile import load
 from protocol.errors import ConfigError
@@ -48,6 +51,13 @@ def task_files() -> Iterator[Path]:
     yield from sorted((CONFIGS / "tasks").rglob("*.yaml"), key=lambda path: (path.parent.name, path.stem))
 
 
+def all_tasks() -> Iterator[TaskConfig]:
+    """Everything that can be played by name: the shipped task files, then the maps that have none."""
+    files = {path.stem: path for path in task_files()}
+    yield from (load(path, TaskConfig) for path in files.values())
+    yield from (standard_task(spec) for name, spec in known_maps().items() if name not in files)
+
+
 def load_task(name: str) -> TaskConfig:
     """The task of this name, or of the file at this path.
 
@@ -57,11 +67,13 @@ def load_task(name: str) -> TaskConfig:
     if name.endswith((".yaml", ".yml")):
         return load(name, TaskConfig)
     files = {path.stem: path for path in task_files()}
-    if name not in files:
-        close = difflib.get_close_matches(name, files, n=3)
-        hint = f"did you mean {', '.join(close)}? " if close else ""
-        raise ConfigError(f"there is no task {name!r}: {hint}`khala tasks` lists all; a path to a .yaml file works too")
-    return load(files[name], TaskConfig)
+    if name in files:
+        return load(files[name], TaskConfig)
+    if name in known_maps():
+        return standard_task(known_maps()[name])
+    close = difflib.get_close_matches(name, {*files, *known_maps()}, n=3)
+    hint = f"did you mean {', '.join(close)}? " if close else ""
+    raise ConfigError(f"there is no task {name!r}: {hint}`khala tasks` lists all; a path to a .yaml file works too")
 
 
 def change(task: TaskConfig, **changes: Any) -> TaskConfig:

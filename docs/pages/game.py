@@ -10,17 +10,17 @@ from bridge.data import table as data_table
 from bridge.knowledge import RACES, UnitType
 from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
-from orchestrator.config import load_task, task_files
+from orchestrator.config import all_tasks, task_files
 from protocol.messages import LOOPS_PER_S
 from simulator.maps import MapError, load_map
-from simulator.scenario import Create
+from simulator.tick import new_game
 
 if TYPE_CHECKING:
     from bridge.catalog import Action
     from bridge.knowledge import Weapon
     from bridge.maps import MapSpec
     from bridge.task import AgentConfig, TaskConfig
-    from simulator.scenario import Scenario
+    from simulator.world import World
 
 AGENTS, OPPONENT = 1, 2
 """Player numbers on the shipped maps."""
@@ -28,16 +28,17 @@ AGENTS, OPPONENT = 1, 2
 
 def tasks() -> str:
     """Every shipped task with its agents."""
-    found = [load_task(str(path)) for path in task_files()]
+    found = list(all_tasks())
+    written = {path.stem for path in task_files()}
     overview = [
-        (f"[`{task.name}`](#{task.name.lower()})", ", ".join(agent.name for agent in task.agents), task.description)
-        for task in found
+        (_link(task) if task.name in written else code(task.name), _agents(task), task.description) for task in found
     ]
     return join(
-        head("Tasks", "`configs/tasks`"),
-        "What `khala run` and `khala host` take by name. To make one: [write a task](../how-to/write-a-task.md).",
+        head("Tasks", "`configs/tasks`, and the maps for which none is there"),
+        "What `khala run` and `khala host` take by name. To make one: [write a task](../how-to/write-a-task.md). A map "
+        "without a task file is played by one commander of all units, with every action that they have.",
         table(("task", "agents", "about"), overview),
-        *(_task(task) for task in found),
+        *(_task(task) for task in found if task.name in written),
     )
 
 
@@ -81,6 +82,14 @@ def maps() -> str:
         "affair; the last columns are what the simulator's maps hold.",
         table(("map", "file", "race", "against", "limit", "cells", "agents' units", "enemy units"), rows),
     )
+
+
+def _link(task: TaskConfig) -> str:
+    return f"[`{task.name}`](#{task.name.lower()})"
+
+
+def _agents(task: TaskConfig) -> str:
+    return ", ".join(agent.name for agent in task.agents)
 
 
 def _task(task: TaskConfig) -> str:
@@ -185,20 +194,18 @@ def _weapon(weapon: Weapon) -> str:
 
 def _map_row(spec: MapSpec) -> tuple[object, ...]:
     limit = f"{spec.limit_loops} loops, {spec.limit_loops / LOOPS_PER_S:.0f} s" if spec.limit_loops else ""
-    row = (code(spec.name), code(spec.file), spec.race, f"{spec.opponent}, {spec.difficulty}", limit)
+    against = f"{spec.opponent}, {spec.difficulty}" if spec.opponent else "nobody"
+    row = (code(spec.name), code(spec.file), spec.race, against, limit)
     try:
         shipped = load_map(spec.file.removesuffix(".SC2Map"))
     except MapError:
         return (*row, "not in the simulator", "", "")
-    width, height = shipped.terrain.size
-    return (*row, f"{width} x {height}", *(_army(shipped.scenario, player) for player in (AGENTS, OPPONENT)))
+    x0, y0, x1, y1 = shipped.terrain.playable
+    begun = new_game(shipped)
+    return (*row, f"{x1 - x0} x {y1 - y0}", *(_army(begun, player) for player in (AGENTS, OPPONENT)))
 
 
-def _army(scenario: Scenario, player: int) -> str:
-    """What the map's script makes for a player when the game starts."""
-    begun = (action for trigger in scenario.triggers if "start" in trigger.when for action in trigger.do)
-    made: Counter[str] = Counter()
-    for action in begun:
-        if isinstance(action, Create) and action.create.player == player:
-            made[action.create.unit] += action.create.count
-    return ", ".join(f"{count} {unit}" for unit, count in made.items())
+def _army(world: World, player: int) -> str:
+    """What a player has when the game begins."""
+    names = [world.unit_type(slot).name for slot in world.units_of(player).tolist()]
+    return ", ".join(f"{count} {name.removesuffix('_RL')}" for name, count in Counter(names).items())

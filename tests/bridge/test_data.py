@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from bridge.catalog import catalogue, catalogue_sha256
 from bridge.compat import actions, units, upgrades
 from bridge.knowledge import RACES, is_armed, knowledge
 from bridge.maps import known_maps
+from bridge.names import unit_name
+from bridge.standard import standard_task
 
 NUMBERS = {member.name: int(member) for race in (units.Protoss, units.Terran, units.Zerg) for member in race}
 
@@ -94,19 +97,30 @@ def test_damage_per_second_counts_hits_and_period() -> None:
     assert blades.per_second == pytest.approx(8 * 2 / 0.86)
 
 
-def test_the_nine_battles_are_known() -> None:
-    assert list(known_maps()) == [
-        "2s3z",
-        "3s5z",
-        "1c3s5z",
-        "3s5z_vs_3s6z",
-        "3s_vs_3z",
-        "3s_vs_4z",
-        "3s_vs_5z",
-        "2c_vs_64zg",
-        "2s_vs_1sc",
-    ]
-    assert all(spec.file == f"llm_smac/{name}.SC2Map" for name, spec in known_maps().items())
+def test_the_maps_of_every_family_are_known() -> None:
+    families = Counter(spec.file.partition("/")[0] for spec in known_maps().values())
+    assert families == {"llm_smac": 9, "llm_pysc2": 25, "SMAC_Maps": 23, "mini_games": 7, "Melee": 8}
+    names = [(name.removeprefix("smac_"), spec.file) for name, spec in known_maps().items()]
+    assert all(file.endswith(f"/{name}.SC2Map") for name, file in names)
+
+
+@pytest.mark.parametrize("name", list(known_maps()))
+def test_a_task_can_be_made_for_every_map(name: str) -> None:
+    spec = known_maps()[name]
+    task = standard_task(spec)
+    (agent,) = task.agents
+    assert (task.name, task.map, task.task) == (name, name, spec.goal)
+    assert [team.unit_types for team in agent.teams] == [(unit,) for unit in spec.units]
+    assert all("Move_Screen" in listed for listed in agent.actions.values())
+    assert all(upgrade in upgrades.Upgrades.__members__ for upgrade in spec.upgrades)
+    blinks = "Ability_Blink_Screen" in agent.actions.get("Stalker", ())
+    assert blinks == ("Blink" in spec.upgrades and "Stalker" in spec.units)
+
+
+def test_copies_on_smacs_maps_have_the_names_of_what_they_copy() -> None:
+    assert [unit_name(number) for number in (1961, 1962, 1963, 1966, 1970, 1971)] == [
+        "MineralField450", "Colossus", "Stalker", "Marine", "Hydralisk", "Unit1971",
+    ]  # fmt: skip
 
 
 def test_the_sources_of_every_data_file_are_told() -> None:

@@ -29,7 +29,7 @@ agents:
 """
 
 
-@pytest.mark.parametrize("name", list(known_maps()))
+@pytest.mark.parametrize("name", [n for n, spec in known_maps().items() if spec.file.startswith("llm_smac/")])
 def test_a_task_of_llm_smac_has_the_agent_and_teams_of_the_paper(
     name: str, task: Callable[..., TaskConfig], paper_teams: dict[str, dict[str, int]]
 ) -> None:

@@ -1,0 +1,54 @@
+"""The task that a map is played with when no task file is there for it: one commander for all of its units.
+
+So every map is a task. It is made of what `bridge/data/maps.yaml` says of the map: what has to be done there, which
+types of units there are, and which upgrades the map grants. A file in `configs/tasks` of the map's name comes first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bridge.catalog import catalogue
+from bridge.knowledge import is_armed
+from bridge.task import AgentConfig, TaskConfig, TeamConfig
+from protocol.messages import Clock
+
+if TYPE_CHECKING:
+    from bridge.catalog import Action
+    from bridge.maps import MapSpec
+
+AGENT = "Commander"
+STEP_LOOPS = 11
+"""Half a second of the game between two decisions, as in the other tasks."""
+
+
+def standard_task(spec: MapSpec) -> TaskConfig:
+    """The task that is made for a map."""
+    return TaskConfig(
+        name=spec.name,
+        description=spec.goal,
+        map=spec.name,
+        task=spec.goal,
+        clock=Clock(step_loops=STEP_LOOPS),
+        agents=(_commander(spec),),
+    )
+
+
+def _commander(spec: MapSpec) -> AgentConfig:
+    return AgentConfig(
+        name=AGENT,
+        role="You command the units of your side.",
+        admits="any",
+        teams=tuple(TeamConfig(name=unit, unit_types=(unit,)) for unit in spec.units),
+        actions={unit: tuple(a.name for a in catalogue().values() if _usable(a, unit, spec)) for unit in spec.units},
+    )
+
+
+def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
+    """Whether units of a type have the action on this map."""
+    needs = action.needs
+    return (
+        action.fits(unit)
+        and (not needs.weapon or is_armed(unit))
+        and (needs.upgrade is None or needs.upgrade in spec.upgrades)
+    )
