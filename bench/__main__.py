@@ -10,7 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-MEASUREMENTS = ("turn", "bus", "simulator_env", "simulator_engine", "observe", "http_client", "recording")
+MEASUREMENTS = (
+    "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "http_client", "recording",
+)  # fmt: skip
 
 
 def main() -> None:
