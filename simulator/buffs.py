@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 
     from simulator.world import World
 
+FRENZIED: Final = frozenset({"Ultralisk", "UltraliskBurrowed"})
+"""Types that the catalog gives the behaviour Frenzy."""
 FOREVER: Final = 1 << 40  # end of a buff that does not run out
 FLAGS: Final = (
     "stunned", "disarmed", "rooted", "unturning", "silenced", "invulnerable", "cloak", "uncloaked", "revealed",
     "detected", "blind", "detector", "stasis", "passive", "benign", "bodiless", "uncommandable", "no_passenger",
-    "no_life_regen", "no_shield_regen", "no_energy_regen",
+    "no_life_regen", "no_shield_regen", "no_energy_regen", "spares_frenzied",
 )  # fmt: skip
 
 
@@ -32,7 +34,7 @@ class Response:
     """What a buff does to damage that its bearer takes (``on`` defender) or deals (attacker).
 
     ``add`` to and ``factor`` of each hit, except hits of ``not_kinds`` (ranged, melee, spell, splash, noproc);
-    ``limit`` is how much a barrier takes in all.
+    ``limit`` is how much a barrier takes in all. With ``from_air`` only hits of flyers count.
     """
 
     on: str = "defender"
@@ -40,6 +42,7 @@ class Response:
     factor: float = 1.0
     limit: float = 0.0
     most: float = 0.0
+    from_air: bool = False
     not_kinds: tuple[str, ...] = ()
 
 
@@ -161,6 +164,8 @@ def apply(
         loops: How long it lasts, as the catalog says by default; 0 is without an end.
     """
     buff = world.catalog.buff(name)
+    if "spares_frenzied" in buff.flags and frenzied(world, slot):
+        return
     lasts = buff.loops if loops is None else loops
     end = world.loop + lasts if lasts else FOREVER
     if owner is None:
@@ -176,6 +181,11 @@ def apply(
     fresh = np.array([(slot, buff.row, source, owner, world.loop, end, due, 1)], dtype=_ROW)
     table.rows = np.concatenate((table.rows, fresh))
     world.refresh(slot)
+
+
+def frenzied(world: World, slot: int) -> bool:
+    """Whether a unit can be neither slowed nor moved nor taken over: an Ultralisk."""
+    return world.unit_type(slot).name in FRENZIED
 
 
 def remove(world: World, slot: int, name: str) -> bool:

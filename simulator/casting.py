@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import commands
 from simulator.casts import Cast
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
 ANYWHERE: Final = 500.0
 ORDINARY: Final = frozenset({"smart", "stop", "move", "patrol", "hold_position", "scan_move", "attack"})
 """What ``commands`` carries out; everything else is a skill."""
+MORPHS: Final = frozenset({"morph", "grow", "root", "burrow_tumor"})
+"""Abilities whose time, or a random part of it, passes before they take effect."""
+PAID_FIRST: Final = frozenset({"grow"})
+"""Those that are paid for when they begin: their time passes after the effect."""
 
 
 def is_modelled(ability: Ability) -> bool:
@@ -40,12 +45,29 @@ def is_modelled(ability: Ability) -> bool:
     return ability.does in ORDINARY or ability.does in SKILLS
 
 
-def prep_loops(world: World, ability: Ability) -> float:
+def prep_loops(world: World, slot: int, ability: Ability) -> float:
     """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
     loops = ability.intro_loops + ability.prep_loops
-    if ability.does == "morph":
-        loops += ability.loops + world.rng.random() * ability.random_loops
-    return loops
+    if ability.does not in MORPHS:
+        return loops
+    takes, random = _morph_loops(world, int(world.owner[slot]), ability)
+    if random:
+        takes += world.rng.random() * random
+    return loops + takes
+
+
+def _morph_loops(world: World, owner: int, ability: Ability) -> tuple[float, float]:
+    """Loops that a morph takes with the owner's upgrades, and the most that chance adds to them."""
+    takes, random = 0.0 if ability.does in PAID_FIRST else ability.loops, ability.random_loops
+    for number in world.players[owner].upgrades:
+        for change in world.catalog.upgrade(number).changes:
+            if change.catalog == "abil" and change.entry == ability.link and change.op == "subtract":
+                loops = float(change.value) * LOOPS_PER_NORMAL_SECOND
+                if change.field.endswith("RandomDelayMax"):
+                    random -= loops
+                elif "[Stats]" in change.field:
+                    takes -= loops
+    return max(takes, 0.0), max(random, 0.0)
 
 
 # may it ---------------------------------------------------------------------------------------------------------------

@@ -17,7 +17,8 @@ Point = tuple[float, float]
 class Cast:
     """A unit (slot) uses an ability on a unit (slot), at a point (world), or on nothing.
 
-    ``begun`` is the loop in which it takes effect; a channel goes on from there.
+    ``begun`` is the loop in which it takes effect; a channel goes on from there. ``was`` is the row of the caster's
+    type before it did.
     """
 
     slot: int
@@ -25,3 +26,4 @@ class Cast:
     target: int = NOBODY
     point: Point | None = None
     begun: int = 0
+    was: int = -1

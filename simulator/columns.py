@@ -81,6 +81,7 @@ class UnitColumns:
     cast_at: Floats = state(float, -1)  # loop at which the ability it uses takes effect, -1 before it begins
     cast_begun: Floats = state(float, -1)  # loop at which it began to prepare that
     channels: Bools = state(bool)  # that effect has come and goes on
+    firm: Bools = state(bool)  # what it does can't be broken off: other orders wait behind it
     target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
     attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
     scan_loop: Ints = state(int)  # loop from which it looks for a target again
@@ -166,6 +167,7 @@ class UnitColumns:
     ranged_add: Floats = trait(float)  # to the damage of every ranged hit that it takes, before armor
     melee_add: Floats = trait(float)  # to that of every melee hit
     taken_factor: Floats = trait(float, 1)  # times the damage that it takes
+    air_taken_factor: Floats = trait(float, 1)  # and times that of hits, not spells, of flyers
     dealt_factor: Floats = trait(float, 1)  # times the damage that it deals
     bonus_bits: Ints = trait(int)  # attributes (bits) against which its hits deal
     bonus_add: Floats = trait(float)  # more damage, before armor

@@ -58,6 +58,9 @@ class Mechanics:
     harvest_gap: float
     harvest_search: float
     harvest_leaving: float
+    creep_cells_per_step: int
+    creep_decay_loops: float
+    off_creep_damage: float
 
 
 def entries() -> tuple[Entry, ...]:

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 ALIAS: Final = "Alias_"
+NATURES: Final[dict[str, Callable[[World, int], bool]]] = {
+    "IsTransportOverlord": lambda world, slot: world.unit_type(slot).name == "OverlordTransport",
+    "QueenMustBeOnCreep": lambda world, slot: world.on_creep(slot),
+}
+"""Behaviours that units have by their type or their place; they are never laid on as buffs."""
 COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
     "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
 }  # fmt: skip
@@ -65,6 +70,8 @@ def _constant(_: World, __: int, need: Need) -> float:
 
 
 def _buffs(world: World, slot: int, need: Need) -> float:
+    if need.name in NATURES:
+        return float(NATURES[need.name](world, slot))
     return float(need.name in world.catalog.buff_of_name and buffs.has(world, slot, need.name))
 
 

@@ -38,7 +38,7 @@ def engage(world: World, slot: int, target: int) -> bool:
     weapon = world.catalog.weapons[row]
     world.target[slot] = target
     world.weapon[slot] = row
-    world.reach[slot] = world.stats.range[world.owner[slot], row] + world.range_add[slot]
+    measure_reach(world, slot)
     bites = world.close_weapon[slot] >= 0
     world.reach_min[slot] = -math.inf if bites or not weapon.min_range else weapon.min_range
     world.slop[slot] = weapon.slop
@@ -49,6 +49,12 @@ def engage(world: World, slot: int, target: int) -> bool:
     world.aim_cos[slot] = -1.0 if fixed else math.cos(math.radians(angle))
     world.nav_loop[slot] = 0
     return True
+
+
+def measure_reach(world: World, slot: int) -> None:
+    """Write the reach of the weapon at hand, with what buffs add to it or take from it."""
+    reach = float(world.stats.range[world.owner[slot], world.weapon[slot]] + world.range_add[slot])
+    world.reach[slot] = max(reach, 0.0)
 
 
 def disengage(world: World, slot: int) -> None:

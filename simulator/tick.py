@@ -15,6 +15,7 @@ from simulator.systems import (
     buffs,
     casts,
     collision,
+    creep,
     death,
     engagement,
     fields,
@@ -60,6 +61,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     fields.run,  # storms, scans and whatever else lies on the ground
     buffs.run_out,
     regeneration.regenerate,
+    creep.spread,
     lifetimes.run_out,
     death.bury,
     vision.look,
@@ -80,6 +82,7 @@ def new_game(
     """
     world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog)
     triggers.start(world)
+    creep.spread(world)
     vision.look(world)
     return world
 

@@ -11,6 +11,7 @@ from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.mechanics import MECHANICS
 from simulator.stats import INSTANT_ACCELERATION_N
+from simulator.targets import measure_reach
 
 if TYPE_CHECKING:
     from simulator.buffs import Buff
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 INSTANT_TURN_DEG: Final = 180.0
+DISGUISE: Final = "Changeling"  # types that look armed and are not
 
 
 class Layer(IntEnum):
@@ -69,6 +71,10 @@ def body_traits(world: World, slot: int) -> None:
         _change(world, slot, kind)
     if kinds or world.build_progress[slot] < 1.0:
         _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
+    if unit.name.startswith(DISGUISE):
+        world.can_attack[slot] = world.acquires[slot] = False
+    if world.weapon[slot] >= 0:
+        measure_reach(world, slot)
 
 
 def _turning(world: World, slot: int, unit: UnitType) -> None:
@@ -90,7 +96,7 @@ def _braking(unit: UnitType) -> float:
 
 def _plain(world: World, slot: int) -> None:
     """What a unit is like without any buff."""
-    world.attack_rate[slot] = world.taken_factor[slot] = world.dealt_factor[slot] = 1.0
+    world.attack_rate[slot] = world.taken_factor[slot] = world.dealt_factor[slot] = world.air_taken_factor[slot] = 1.0
     for column in (
         world.range_add, world.armor_add, world.shield_armor_add, world.ranged_add, world.melee_add,
     ):  # fmt: skip
@@ -122,7 +128,9 @@ def _change(world: World, slot: int, buff: Buff) -> None:
     if buff.dealt_fraction:
         world.dealt_factor[slot] *= dict(buff.dealt_fraction).get("Ranged", 1.0)
     response = buff.response
-    if response is not None and response.on == "defender" and not response.limit:
+    if response is not None and response.from_air:
+        world.air_taken_factor[slot] *= response.factor
+    elif response is not None and response.on == "defender" and not response.limit:
         world.ranged_add[slot] += response.add * ("ranged" not in response.not_kinds)
         world.melee_add[slot] += response.add * ("melee" not in response.not_kinds)
         world.taken_factor[slot] *= response.factor

@@ -20,6 +20,7 @@ from simulator import geometry
 from simulator.buffs import Buffs
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
+from simulator.creep import Creep
 from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
@@ -123,7 +124,7 @@ class World(UnitColumns):
         self.harvesting = False  # whether anybody harvests
         self.mortal = False  # whether anybody's life is timed
         self.hiding = False  # whether anybody is cloaked or burrowed
-        self.creep_counts = bool(game_map.terrain.creep.any())
+        self.growth = Creep(game_map.terrain, self.catalog.version)
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
         self.stirred = True  # somebody walked in the last loop
         self.scan_now = True  # somebody lost a target or got an order since the last scan
@@ -172,7 +173,6 @@ class World(UnitColumns):
         self.buffs.forget(slot)
         self.timers.pop(slot, None)
         self.autocast.pop(slot, None)
-        self.channelling.pop(slot, None)
         self.hurt = [pair for pair in self.hurt if slot not in pair]
         self.missiles.forget(slot)
         self.pending.forget(slot)
@@ -304,6 +304,18 @@ class World(UnitColumns):
         end, begun = float(self.cast_at[slot]), float(self.cast_begun[slot])
         return min(max((self.loop - begun) / (end - begun), 0.0), 1.0) if end > begun >= 0.0 else 0.0
 
+    # ground -------------------------------------------------------------------------------------------------------
+
+    @property
+    def creep(self) -> Bools:
+        """(h, w) where there is creep now; a new array whenever that changes."""
+        return self.growth.covered
+
+    def on_creep(self, slot: int) -> bool:
+        """Whether the middle of a unit is on creep."""
+        x, y = self.pos[slot].tolist()
+        return self.growth.covers(x, y)
+
     # sight --------------------------------------------------------------------------------------------------------
 
     def is_visible(self, player: int) -> Bools:
@@ -337,6 +349,9 @@ class World(UnitColumns):
         sha.update(repr(self.script.content()).encode())
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
         sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
+        channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
+        sha.update(repr(channels).encode())
+        sha.update(self.growth.content())
         sha.update(self.visibility.tobytes())
         sha.update(repr([list(memory.of_unit.values()) for memory in self.memories]).encode())
         return sha.hexdigest()

@@ -179,6 +179,7 @@ class _Image:
         self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
         self._camera: tuple[float, float] | None = None
         self._walk: Bools | None = None
+        self._creep: Bools | None = None
         self._terrain: list[Part] = []
         self._visibility: list[Part] = []
 
@@ -193,14 +194,15 @@ class _Image:
     def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
         """Terrain and visibility; drawn again only when the camera moved, the ground changed, or fog may have."""
         world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
-        moved = self._camera != frame.camera or self._walk is not world.ground.walk
+        changed = self._walk is not world.ground.walk or self._creep is not world.creep
+        moved = changed or self._camera != frame.camera
         if moved or world.fog:
             x, y = axes()
             self._visibility = layers["visibility_map"].encode(sample(world.visibility[frame.player], x, y))
             if moved:
-                self._camera, self._walk = frame.camera, world.ground.walk
+                self._camera, self._walk, self._creep = frame.camera, world.ground.walk, world.creep
                 grids = {"height_map": terrain.height, "pathable": world.ground.walk, "buildable": terrain.build,
-                         "creep": terrain.creep}  # fmt: skip
+                         "creep": world.creep}  # fmt: skip
                 self._terrain = [
                     part for name, grid in grids.items() for part in layers[name].encode(sample(grid, x, y))
                 ]

@@ -124,7 +124,7 @@ def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: 
     camera.z = seat.camera_z
     raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
     Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight)).write(raw)
-    visibility, creep = world.visibility[seat.player], terrain.creep
+    visibility, creep = world.visibility[seat.player], world.creep
     if seat.options.raw_crop_to_playable_area:
         x0, y0, x1, y1 = terrain.playable
         visibility, creep = visibility[y0:y1, x0:x1], creep[y0:y1, x0:x1]

@@ -5,6 +5,7 @@ One module per group of units. Each offers some of these tables, and here they a
 * ``SKILLS``: an ability's ``does`` → ``Skill``
 * ``FIELDS``: a field's ``does`` → what it does at each period
 * ``TICKS`` and ``ENDS``: a buff's name → what it does at each of its periods, and when it has run out
+* ``FINALS``: a buff's name → what it does when its bearer dies, called with the slot while it is still there
 * ``PASSIVES``: a unit type's name → what units of it do in every loop without being told
 * ``DEATHS``: a unit type's name → what happens when one dies, called with the slot while it is still there
 
@@ -27,5 +28,6 @@ SKILLS: Final[dict[str, Skill]] = {**basics.SKILLS, **harvest.SKILLS}
 FIELDS: Final[dict[str, FieldRule]] = {}
 TICKS: Final[dict[str, BuffRule]] = {}
 ENDS: Final[dict[str, BuffRule]] = {}
+FINALS: Final[dict[str, BuffRule]] = {}
 PASSIVES: Final[dict[str, UnitRule]] = {}
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}

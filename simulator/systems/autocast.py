@@ -56,21 +56,24 @@ def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
         return None
     pick = casting.skill_of(ability).pick or nearest
     target = pick(world, slot, ability)
+    if Aim.UNIT not in ability.aim and ability.autocast_range and not _tempted(world, slot, ability):
+        return None
     cast = Cast(slot, ability, target, begun=world.loop)
     aimless = target == NOBODY and ability.requires_point
     return None if aimless or casting.aim_refusal(world, cast) is not Refusal.SUCCESS else cast
+
+
+def _tempted(world: World, slot: int, ability: Ability) -> bool:
+    """Whether somebody is near who makes a unit use what is aimed at nobody, as when it comes out of the ground."""
+    filters = ability.autocast_filters
+    return any(casting.fits(world, slot, other, filters) is Refusal.SUCCESS for other in _near(world, slot, ability))
 
 
 def nearest(world: World, slot: int, ability: Ability) -> int:
     """The nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
     if Aim.UNIT not in ability.aim:
         return NOBODY
-    slots = world.live
-    offset = world.pos[slots] - world.pos[slot]
-    gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[slots] - world.radius[slot]
-    reach = ability.autocast_range or ability.range
-    near = slots[gap <= reach]
-    for other in near[np.argsort(gap[gap <= reach], kind="stable")].tolist():
+    for other in _near(world, slot, ability):
         if (
             other != slot
             and casting.fits(world, slot, other, ability.autocast_filters) is Refusal.SUCCESS
@@ -78,3 +81,13 @@ def nearest(world: World, slot: int, ability: Ability) -> int:
         ):
             return int(other)
     return NOBODY
+
+
+def _near(world: World, slot: int, ability: Ability) -> list[int]:
+    """The units that autocast looks at, the nearest first."""
+    slots = world.live
+    offset = world.pos[slots] - world.pos[slot]
+    gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[slots] - world.radius[slot]
+    reach = ability.autocast_range or ability.range
+    near: list[int] = slots[gap <= reach][np.argsort(gap[gap <= reach], kind="stable")].tolist()
+    return near

@@ -37,7 +37,7 @@ def current(world: World, slot: int) -> Cast:
     ability = world.catalog.ability(int(world.order_ability[slot]))
     x, y = world.order_point[slot].tolist()
     point = (x, y) if world.order_aimed[slot] else None
-    return Cast(slot, ability, int(world.order_target[slot]), point, world.loop)
+    return Cast(slot, ability, int(world.order_target[slot]), point, world.loop, int(world.type[slot]))
 
 
 def _advance(world: World, slot: int) -> None:
@@ -67,10 +67,11 @@ def _begin(world: World, cast: Cast) -> None:
         return
     _face(world, cast)
     world.cast_begun[slot] = world.loop
-    world.cast_at[slot] = world.loop + casting.prep_loops(world, cast.ability)
-    prepare = casting.skill_of(cast.ability).prepare
-    if prepare is not None:
-        prepare(world, cast)
+    world.cast_at[slot] = world.loop + casting.prep_loops(world, slot, cast.ability)
+    skill = casting.skill_of(cast.ability)
+    world.firm[slot] = skill.firm
+    if skill.prepare is not None:
+        skill.prepare(world, cast)
 
 
 def _take_effect(world: World, cast: Cast) -> None:

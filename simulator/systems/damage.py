@@ -97,6 +97,8 @@ def wound(
     if answer is not None and answer[victim]:
         amount = max(amount + float(answer[victim]), MECHANICS.damage_min)
     amount *= float(world.taken_factor[victim])
+    if source != NOBODY and kind != "spell" and world.plane_bits[source] & AIR_PLANE:
+        amount *= float(world.air_taken_factor[victim])
     if world.barrier[victim] > 0.0:
         held = min(float(world.barrier[victim]), amount)
         world.barrier[victim] -= held

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from simulator.arrays import some
 from simulator.columns import NOBODY
-from simulator.skills import DEATHS
+from simulator.skills import DEATHS, FINALS
 from simulator.world import Death
 
 if TYPE_CHECKING:
@@ -29,12 +29,22 @@ def bury(world: World) -> None:
         name = world.unit_type(slot).name
         if name in DEATHS:
             DEATHS[name](world, slot)
+        if len(world.buffs):
+            _last_of_buffs(world, slot)
         _note(world, slot, killer)
         for passenger in world.passengers(slot):
             world.life[passenger] = 0.0
             _note(world, passenger, killer)
             world.remove(passenger)
         world.remove(slot)
+
+
+def _last_of_buffs(world: World, slot: int) -> None:
+    """Let what lies on a dying unit have its last effect."""
+    for row in world.buffs.of(slot):
+        rule = FINALS.get(world.catalog.buffs[int(row["buff"])].name)
+        if rule is not None:
+            rule(world, slot, row)
 
 
 def _note(world: World, slot: int, killer: int) -> None:

@@ -152,9 +152,9 @@ def _turn(world: World, walkers: Ints, wanted: Floats, step: Floats, left: Float
 
 def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
     speed = world.step_max.take(walkers)
-    if world.creep_counts:
+    if world.growth.anywhere:
         width, height = world.map.terrain.size
         x = np.clip(pos[:, 0].astype(np.int64), 0, width - 1)
         y = np.clip(pos[:, 1].astype(np.int64), 0, height - 1)
-        speed = np.where(world.map.terrain.creep[y, x], speed * world.creep_factor.take(walkers), speed)
+        speed = np.where(world.creep[y, x], speed * world.creep_factor.take(walkers), speed)
     return speed

@@ -178,19 +178,19 @@ class Ground:
     def paint(self, world: World, player: int, view: Rect, *, fog: bool) -> Image:
         """A fresh image of this part of the map; with `fog` dark where the player does not see."""
         terrain = world.map.terrain
-        if view != self._view or terrain.creep is not self._creep:
-            self._view, self._creep = view, terrain.creep
-            self._image = self._bare(terrain, view)
+        if view != self._view or world.creep is not self._creep:
+            self._view, self._creep = view, world.creep
+            self._image = self._bare(terrain, world.creep, view)
         if not fog:
             return self._image.copy()
         light = cut(_LIGHT[world.visibility[player, ::-1]], terrain.size, view, self._size)
         return np.asarray(cv2.multiply(self._image, cv2.cvtColor(light, cv2.COLOR_GRAY2RGB), scale=1 / 255), np.uint8)
 
-    def _bare(self, terrain: Terrain, view: Rect) -> Image:
+    def _bare(self, terrain: Terrain, creep: Mask, view: Rect) -> Image:
         map_image = paint_ground(terrain, density_for(terrain, self._per_cell))
         image = cut(map_image, terrain.size, view, self._size).astype(np.float32)
-        if terrain.creep.any():
-            mask = cut(terrain.creep[::-1].astype(np.uint8) * 255, terrain.size, view, self._size)
+        if creep.any():
+            mask = cut(creep[::-1].astype(np.uint8) * 255, terrain.size, view, self._size)
             _blend(image, palette.CREEP, CREEP_OPACITY * (mask > 127))
         if self._grid:
             _blend(image, palette.GRID, GRID_OPACITY * (_lines(view, self._size) & (image.max(axis=2) > DARK)))
