@@ -81,7 +81,7 @@ class UnitColumns:
     cast_at: Floats = state(float, -1)  # loop at which the ability it uses takes effect, -1 before it begins
     cast_begun: Floats = state(float, -1)  # loop at which it began to prepare that
     channels: Bools = state(bool)  # that effect has come and goes on
-    firm: Bools = state(bool)  # what it does can't be broken off: other orders wait behind it
+    bound: Bools = state(bool)  # what it does can't be broken off: other orders wait behind it
     target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
     attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
     scan_loop: Ints = state(int)  # loop from which it looks for a target again

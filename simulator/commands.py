@@ -92,7 +92,7 @@ def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
     if not queue:
         for slot in taken:
             world.queue[slot] = []
-            if not world.firm[slot]:
+            if not world.bound[slot]:
                 begin(world, slot, None)
     return taken
 
@@ -236,7 +236,7 @@ def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[i
             if len(world.queue[slot]) >= QUEUE_LIMIT:
                 continue
             world.queue[slot].append(order)
-        elif world.firm[slot]:
+        elif world.bound[slot]:
             world.queue[slot] = [order]
         else:
             world.queue[slot] = []
@@ -283,7 +283,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.needs_target[slot] = order.kind in NEEDS_TARGET or (order.kind is OrderKind.CAST and target != NOBODY)
     world.casts[slot] = order.kind is OrderKind.CAST
     world.cast_at[slot] = -1.0
-    world.channels[slot] = world.firm[slot] = False
+    world.channels[slot] = world.bound[slot] = False
     world.scan_now = world.orders_changed = True
     world.guard[slot] = world.pos[slot]
     world.backswing[slot] = 0.0

@@ -57,5 +57,5 @@ def _can_morph(world: World, cast: Cast) -> Refusal:
 
 
 SKILLS: Final = {
-    "morph": Skill(_morph, refuse=_can_morph, firm=True),
+    "morph": Skill(_morph, refuse=_can_morph, binds=True),
 }

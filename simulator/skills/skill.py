@@ -53,7 +53,7 @@ class Skill:
         end: Called when a channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused).
         pick: The target (slot) that a unit with autocast chooses, NOBODY for none; the nearest allowed one without.
         prepare: Called when the caster begins to prepare (``prep_loops``).
-        firm: Once it has begun, other orders wait until it is over.
+        binds: Once it has begun, other orders wait until it is over.
         estimates: What of it is no fact of the sources, a sentence each.
     """
 
@@ -64,7 +64,7 @@ class Skill:
     end: Effect | None = None
     pick: Callable[[World, int, Ability], int] | None = None
     prepare: Effect | None = None
-    firm: bool = False
+    binds: bool = False
     estimates: tuple[str, ...] = ()
 
 

@@ -69,7 +69,7 @@ def _begin(world: World, cast: Cast) -> None:
     world.cast_begun[slot] = world.loop
     world.cast_at[slot] = world.loop + casting.prep_loops(world, slot, cast.ability)
     skill = casting.skill_of(cast.ability)
-    world.firm[slot] = skill.firm
+    world.bound[slot] = skill.binds
     if skill.prepare is not None:
         skill.prepare(world, cast)
 
