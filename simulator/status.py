@@ -48,7 +48,7 @@ LEGAL: dict[Status, frozenset[str]] = {
     Status.init_game: _LOBBY | {"join_game"},
     Status.in_game: _PLAY,
     Status.in_replay: _WATCH | {"step", "obs_action", "query"},
-    Status.ended: _WATCH | {"save_replay", "restart_game", "leave_game"},
+    Status.ended: _WATCH | {"save_replay", "restart_game", "leave_game", "quick_load"},
     Status.quit: frozenset(),
 }
 
@@ -57,6 +57,7 @@ AFTER: dict[str, Status] = {
     "join_game": Status.in_game,
     "join_lan": Status.in_game,
     "restart_game": Status.in_game,
+    "quick_load": Status.in_game,
     "start_replay": Status.in_replay,
     "leave_game": Status.launched,
     "quit": Status.quit,

@@ -30,7 +30,11 @@ class Clock:
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
         self._game, self._now, self._sleep = game, now, sleep
-        self._start_s = now() - game.world.loop / LOOPS_PER_SECOND
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Lets the time go on from where the game is now."""
+        self._start_s = self._now() - self._game.world.loop / LOOPS_PER_SECOND
 
     @property
     def due(self) -> int:

@@ -127,7 +127,14 @@ class Game:
                 seat.follow_script()
                 if seat.unread:
                     seat.hands.forget()
+        if self.world.loop == self.end_loop:
+            self._take_effect()  # what ended the game that was recorded
         return self.world.loop
+
+    @property
+    def past(self) -> tuple[Entry, ...]:
+        """The part of the log that has taken effect."""
+        return tuple(self.log[: self._done])
 
     def results(self) -> list[sc.PlayerResult]:
         """The result of every player, once the game is over."""

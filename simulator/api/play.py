@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from s2clientprotocol import error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api import data, query, replay
+from simulator.api import bookmark, data, query, replay
 from simulator.api.lan import CHUNK_LOOPS
 from simulator.api.observation import observe
 from simulator.api.viewer import Viewer
@@ -20,7 +20,7 @@ from simulator.status import UsageError
 
 if TYPE_CHECKING:
     from simulator.api.game import Game
-    from simulator.api.process import Process
+    from simulator.api.process import Playing, Process
     from simulator.api.wire import Part
 
 
@@ -109,11 +109,22 @@ def save_replay(process: Process, _: sc.RequestSaveReplay) -> sc.ResponseSaveRep
     return sc.ResponseSaveReplay(data=replay.record(table.game).encode())
 
 
-def quick_save(_: Process, __: sc.RequestQuickSave) -> sc.ResponseQuickSave:
-    """Not there: python-sc2 names it, nobody sends it."""
-    raise UsageError("quick_save is not supported by the simulator")
+def quick_save(process: Process, _: sc.RequestQuickSave) -> sc.ResponseQuickSave:
+    """Keeps the game as it is now, in memory."""
+    bookmark.keep(_alone(process, "quick_save"))
+    return sc.ResponseQuickSave()
 
 
-def quick_load(_: Process, __: sc.RequestQuickLoad) -> sc.ResponseQuickLoad:
-    """Not there: python-sc2 names it, nobody sends it."""
-    raise UsageError("quick_load is not supported by the simulator")
+def quick_load(process: Process, _: sc.RequestQuickLoad) -> sc.ResponseQuickLoad:
+    """Goes back to the last quick save of this game."""
+    kept = bookmark.reopen(_alone(process, "quick_load"))
+    if kept is None:
+        raise UsageError("quick_load needs a quick_save of the same game")
+    process.play(kept)
+    return sc.ResponseQuickLoad()
+
+
+def _alone(process: Process, kind: str) -> Playing:
+    if process.table.peers is not None:
+        raise UsageError(f"{kind} is not possible in a game of several processes")
+    return process.table

@@ -57,6 +57,7 @@ class Playing:
     party: Party | None = None  # with which the game began, if it is no replay
     peers: Peers | None = None  # the other processes of the game
     episode: int = 0  # restarts of the same game before this one
+    bookmark: Playing | None = None  # the game as it was at the last quick save
 
 
 class Process:

@@ -128,7 +128,7 @@ def record(game: Game) -> Replay:
         interfaces={player: seat.options for player, seat in game.seats.items()},
         loops=game.world.loop,
         results={player: int(game.world.players[player].result) for player in players},
-        log=tuple(entry for entry in game.log if entry.loop < game.world.loop),
+        log=game.past,
     )
 
 
@@ -137,4 +137,5 @@ def rerun(replay: Replay, version: str) -> Game:
     game = Game(replay.setup, version, log=replay.log, end_loop=replay.loops)
     for number, recorded in replay.interfaces.items():
         game.sit(number, recorded)
+    game.step(0)  # it may have ended before its first loop
     return game

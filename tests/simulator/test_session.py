@@ -1,16 +1,15 @@
 """Bytes in, bytes out: the envelope, the walk through the states, and the sentences for what is wrong."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from s2clientprotocol import common_pb2, query_pb2
+from s2clientprotocol import common_pb2, debug_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, ResponseError, interface
+from simulator.client import Client, ResponseError, command, interface
 from simulator.install import install
 from simulator.session import Session
 from simulator.status import Status
@@ -331,11 +330,51 @@ def test_without_a_seed_games_differ() -> None:
 # bits and pieces ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["quick_save", "quick_load"])
-def test_what_is_not_there_says_so(playing: Client, kind: str) -> None:
-    message = getattr(sc, f"Request{''.join(part.title() for part in kind.split('_'))}")()
-    with pytest.raises(ResponseError, match=f"^{kind} is not supported by the simulator$"):
-        playing.ask(**{kind: message})
+def quick(client: Client, kind: str) -> sc.Response:
+    return client.ask(**{kind: getattr(sc, f"RequestQuick{kind.removeprefix('quick_').title()}")()})
+
+
+def digest(client: Client) -> str:
+    return client.session._process.table.game.world.digest()
+
+
+def test_a_quick_load_goes_back_to_the_quick_save_any_number_of_times(playing: Client) -> None:
+    def fight() -> list[sc.ResponseObservation]:
+        units = playing.observe().observation.raw_data.units
+        playing.act(command(23, [unit.tag for unit in units if unit.alliance == 1], point=(16, 16)))
+        return [playing.step(16) for _ in range(10)]
+
+    playing.step(40)
+    saved = digest(playing)
+    quick(playing, "quick_save")
+    first = fight()
+    assert digest(playing) != saved
+    for _ in range(2):
+        assert quick(playing, "quick_load").status == sc.in_game
+        assert digest(playing) == saved
+        assert fight() == first
+
+
+def test_a_game_that_is_over_can_be_loaded_again_and_leaves_a_right_replay(playing: Client) -> None:
+    playing.step(8)
+    quick(playing, "quick_save")
+    playing.step(10_000)
+    assert quick(playing, "quick_load").status == sc.in_game
+    playing.debug(debug_pb2.DebugCommand(end_game=debug_pb2.DebugEndGame(end_result=debug_pb2.DebugEndGame.Surrender)))
+    results = playing.step(8).player_result
+    assert [result.result for result in results] == [sc.Defeat, sc.Victory]
+    data = playing.ask(save_replay=sc.RequestSaveReplay()).save_replay.data
+    playing.ask(start_replay=sc.RequestStartReplay(replay_data=data, observed_player_id=1, options=interface(screen=0)))
+    assert playing.step(100).player_result == results
+
+
+def test_what_was_not_saved_is_not_loaded(playing: Client) -> None:
+    with pytest.raises(ResponseError, match=r"^quick_load needs a quick_save of the same game$"):
+        quick(playing, "quick_load")
+    quick(playing, "quick_save")
+    playing.play(options=interface(screen=0))
+    with pytest.raises(ResponseError, match=r"^quick_load needs a quick_save of the same game$"):
+        quick(playing, "quick_load")
 
 
 def test_a_fault_of_ours_is_told_and_does_not_end_the_process(
@@ -359,15 +398,21 @@ def test_a_path_that_cannot_be_one_is_an_invalid_path(client: Client, path: str)
 
 def test_a_map_is_found_in_the_install_by_path_and_by_name(tmp_path: Path) -> None:
     root = install(tmp_path)
-    scenario = (files("simulator.data") / "maps/llm_smac/3s_vs_4z.yaml").read_bytes()
-    (root / "Maps/Melee/Own.SC2Map").write_bytes(b"# A map of Khala's simulator\n" + scenario)
+    (root / "Maps/Melee/Own.SC2Map").write_bytes(HEAD + DUEL + SPAWN % b"Zealot")
     for path in ("Melee/Own.SC2Map", "Own.SC2Map", str(root / "Maps/Melee/Own.SC2Map")):
         client = Client(Session(root))
         client.play(path, interface(screen=0))
-        assert len(client.observe().observation.raw_data.units) == 7
+        assert [unit.unit_type for unit in client.observe().observation.raw_data.units] == [73]
 
 
 HEAD = b"# A map of Khala's simulator\n"
+SPAWN = b"triggers: [{name: a, when: [start], do: [{create: {player: 1, unit: %s, at: [9, 9]}}]}]\n"
+DUEL = b"""name: x
+family: y
+title: z
+terrain: agria_open
+players: {1: {race: protoss, control: agent}, 2: {race: protoss, control: computer}}
+"""
 WHOLE = b"name: x\nfamily: y\ntitle: z\nterrain: %s\nplayers: {1: {race: zerg, control: agent}}\n"
 
 
@@ -390,15 +435,11 @@ def test_a_map_of_a_user_with_a_mistake_says_where(client: Client, text: bytes, 
     assert create.error_details.startswith(details)
 
 
-def test_a_map_with_a_unit_that_is_not_there_cannot_be_joined(client: Client) -> None:
-    trigger = b"triggers: [{name: a, when: [start], do: [{create: {player: 1, unit: Foo, at: [9, 9]}}]}]\n"
-    request = sc.RequestCreateGame(
-        local_map=at("own.SC2Map", HEAD + WHOLE % b"agria_open" + trigger), player_setup=[PARTICIPANT]
-    )
-    client.ask(create_game=request)
-    joined = client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Zerg, options=interface(screen=0))).join_game
-    assert joined.error == JoinError.CannotOpenMap
-    assert joined.error_details == "own.SC2Map: no unit type 'Foo' in the tables of version 4.10"
+def test_a_map_with_a_unit_that_is_not_there_says_so(client: Client) -> None:
+    game_map = at("own.SC2Map", HEAD + WHOLE % b"agria_open" + SPAWN % b"Foo")
+    create = client.ask(create_game=sc.RequestCreateGame(local_map=game_map, player_setup=[PARTICIPANT])).create_game
+    assert create.error == CreateError.InvalidMapData
+    assert "Foo" in create.error_details
 
 
 def test_an_archive_of_the_game_is_known_by_its_name(client: Client) -> None:
