@@ -68,7 +68,8 @@ class Ability:
     """One specific ability; distances are world units, ``range`` from edge to edge, 500 is the whole map.
 
     ``general`` is the id under which clients may also ask for it, ``solo`` says that of several units told to use it
-    only one does, ``transient`` that it leaves the unit's orders alone. ``numbers`` are the skill's own figures.
+    only one does, ``transient`` that it leaves the unit's orders alone. ``count`` is how many it makes, ``supply`` what
+    they use in all. ``numbers`` are the skill's own figures.
     """
 
     id: int
@@ -106,6 +107,8 @@ class Ability:
     upgrade: str = ""
     loops: float = 0.0
     random_loops: float = 0.0
+    count: int = 1
+    supply: float = 0.0
     building: bool = False
     requires: Need | None = None
     shown_if: Need | None = None

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands
+from simulator import commands, prices, supply
 from simulator.casts import Cast
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
@@ -83,6 +83,9 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
         return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
         return Refusal.TECH_REQUIREMENTS_NOT_MET
+    why = Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
+    if why is not Refusal.SUCCESS:
+        return why
     return Refusal.SUCCESS if free else _unaffordable(world, slot, ability)
 
 
@@ -93,6 +96,9 @@ def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
             return Refusal.NOT_ENOUGH_MINERALS
         if player.vespene < ability.vespene:
             return Refusal.NOT_ENOUGH_VESPENE
+    if not supply.has_room(world, player.id, ability.supply):
+        return Refusal.NOT_ENOUGH_FOOD
+    if "free" not in player.cheats:
         if world.energy[slot] < ability.energy:
             return Refusal.NOT_ENOUGH_ENERGY
         if ability.life and world.life[slot] <= ability.life:
@@ -115,7 +121,9 @@ def aim_refusal(world: World, cast: Cast) -> Refusal:
         wrong = fits(world, slot, target, ability.filters)
         if wrong is not Refusal.SUCCESS:
             return wrong
-    far = ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
+    far = (
+        SKILLS[ability.does].give is None and ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
+    )
     if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
         return Refusal.TARGET_IS_OUT_OF_RANGE
     return SKILLS[ability.does].refuse(world, cast)
@@ -260,9 +268,8 @@ def perform(world: World, cast: Cast) -> None:
     """Take the cost, begin the cooldown and let the ability take effect."""
     slot, ability = cast.slot, cast.ability
     player = world.players[int(world.owner[slot])]
+    prices.charge(world, player.id, prices.cost_of(ability))
     if "free" not in player.cheats:
-        player.minerals -= ability.minerals
-        player.vespene -= ability.vespene
         world.energy[slot] = max(0.0, float(world.energy[slot]) - ability.energy)
         world.life[slot] -= ability.life
     start_cooldown(world, slot, ability)

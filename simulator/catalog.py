@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from simulator.abilities import Ability, ability_from
 from simulator.buffs import Buff, buff_from
+from simulator.prices import priced
 from simulator.records import (
     Affects,
     Area,
@@ -124,7 +125,9 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
     weapon_of_id = {w.id: w for w in weapons}
     units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(_rows(name, "units"))))
-    abilities = tuple(ability_from(raw) for raw in _rows(name, "abilities"))
+    upgrades = tuple(_upgrade(raw) for raw in _rows(name, "upgrades"))
+    unpriced = (ability_from(raw) for raw in _rows(name, "abilities"))
+    abilities = priced(unpriced, {u.name: u for u in units}, {u.name: u for u in upgrades})
     cards = _cards(units, abilities)
     buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
     return Catalog(
@@ -132,7 +135,7 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
         build=next(b for b, v in VERSION_OF_BUILD.items() if v == name),
         units=units,
         weapons=weapons,
-        upgrades=tuple(_upgrade(raw) for raw in _rows(name, "upgrades")),
+        upgrades=upgrades,
         footprints={raw["id"]: _footprint(raw) for raw in _rows(name, "footprints")},
         row_of_id={u.id: u.row for u in units},
         row_of_name={u.name: u.row for u in units},

@@ -27,6 +27,7 @@ from simulator.systems import (
     navigation,
     orders,
     passives,
+    production,
     regeneration,
     sweeps,
     triggers,
@@ -48,6 +49,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     autocast.look_out,  # what to use, without being told
     engagement.measure,  # who is in reach of his target, who wants to walk where
     casts.carry_on,  # abilities are prepared, take effect, go on
+    production.run,  # queues of structures and eggs
     harvest.run,  # workers take, carry home and come again
     passives.run,  # what units do by their nature
     weapons.fire,  # attacks start, take effect, cool down

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from simulator.contacts import Bodies
     from simulator.fields import Field
     from simulator.maps import GameMap
+    from simulator.production import Job
     from simulator.refusal import Refusal
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
@@ -69,6 +70,23 @@ class Mishap:
     tag: int
     ability: int
     refusal: Refusal
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """Something that a player is told of: at which loop, whom, and the API's name of it."""
+
+    loop: int
+    player: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rally:
+    """Where new units are sent: to a unit (tag), or to a point."""
+
+    point: tuple[float, float]
+    target: int = NO_TAG
 
 
 class World(UnitColumns):
@@ -110,6 +128,9 @@ class World(UnitColumns):
         self.natured_at = -1  # the population that this was written for
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
+        self.alerts: list[Alert] = []
+        self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
+        self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []
         self.deaths_seen = 0  # how many of the deaths the triggers have been told about
         self.script = ScriptMemory()
@@ -171,6 +192,9 @@ class World(UnitColumns):
         for column in (self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home):
             column[column == slot] = NOBODY
         self.buffs.forget(slot)
+        for job in self.jobs.pop(slot, ()):
+            self.players[job.owner].underway.remove(job.makes)
+        self.rallies.pop(slot, None)
         self.timers.pop(slot, None)
         self.autocast.pop(slot, None)
         self.hurt = [pair for pair in self.hurt if slot not in pair]
@@ -234,6 +258,10 @@ class World(UnitColumns):
         self.ground.block(slot, self.footprint_cells(slot))
         self._population_changed()
 
+    def alert(self, player: int, name: str) -> None:
+        """Tell a player something, by the API's name of the alert."""
+        self.alerts.append(Alert(self.loop, player, name))
+
     def passengers(self, carrier: int) -> list[int]:
         """Slots of the units inside a carrier, ascending."""
         inside: list[int] = np.flatnonzero(self.alive & (self.carrier == carrier)).tolist()
@@ -284,6 +312,8 @@ class World(UnitColumns):
         An idle unit that fights by itself shows the attack it makes, as the game does.
         """
         kind = OrderKind(int(self.order_kind[slot]))
+        if slot in self.jobs and kind is OrderKind.IDLE:
+            return [Order(OrderKind.CAST, job.ability, progress=job.progress) for job in self.jobs[slot]]
         if kind is OrderKind.IDLE:
             fights = self.target[slot] != NOBODY
             return [Order(OrderKind.ATTACK_UNIT, ATTACK, self.tag_of(int(self.target[slot])))] if fights else []
@@ -348,6 +378,7 @@ class World(UnitColumns):
         sha.update(repr([player.counters() for player in self.players]).encode())
         sha.update(repr(self.script.content()).encode())
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
+        sha.update(repr((self.jobs, self.rallies)).encode())
         sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
         channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
         sha.update(repr(channels).encode())

@@ -49,6 +49,8 @@ class Skill:
             the units that may, the ability, the target (tag), the point and whether to queue it; returns those that
             took it. It charges what it costs.
         refuse: Reasons of its own against the cast, ``Refusal.SUCCESS`` for none.
+        ready: Reasons of its own against using it now, whatever it is aimed at.
+        anytime: A unit that can't act may use it too, such as a structure that is to be cancelled.
         hold: Makes it a channel: called in every later loop, False when it is over.
         end: Called when a channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused).
         pick: The target (slot) that a unit with autocast chooses, NOBODY for none; the nearest allowed one without.
@@ -60,6 +62,8 @@ class Skill:
     effect: Effect = no_effect
     give: Give | None = None
     refuse: Callable[[World, Cast], Refusal] = nothing_against_it
+    ready: Callable[[World, int, Ability], Refusal] | None = None
+    anytime: bool = False
     hold: Callable[[World, Cast], bool] | None = None
     end: Effect | None = None
     pick: Callable[[World, int, Ability], int] | None = None

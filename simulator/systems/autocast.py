@@ -41,6 +41,9 @@ def _try(world: World, slot: int, ability: Ability) -> bool:
     cast = _choose(world, slot, ability) if ability.transient or order in FREE else None
     if cast is None or (order is OrderKind.HOLD and not casting.in_range(world, cast)):
         return False
+    give = casting.skill_of(ability).give
+    if give is not None:
+        return bool(give(world, [slot], ability, world.tag_of(cast.target), None, False))
     if ability.transient:
         casting.perform(world, cast)
         return True

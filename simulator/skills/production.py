@@ -1,0 +1,143 @@
+"""Skills of structures and eggs: training, changing kind, rally points, and calling off what is in a queue.
+
+They take effect at once and leave orders alone; the work is ``systems.production``'s. Of several units told to train
+only one does: the one with the shortest queue (with a reactor it counts half), the nearest to idle first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import production
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill
+from simulator.world import NO_TAG, NOBODY, Rally
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.casts import Cast, Point
+    from simulator.world import World
+
+COCOONS: Final = {"Larva": "Egg"}
+"""What a unit that becomes another one is while it does."""
+MORPHS: Final = frozenset({"structure_morph", "addon", "grow"})
+WORKERS: Final = 3690  # the general ability that sets a rally point for workers
+
+
+# training -------------------------------------------------------------------------------------------------------------
+
+
+def _train(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
+    """Put a unit into the queue of a structure, or into an egg."""
+    slot = min(slots, key=lambda s: (_length(world, s), s))
+    if world.unit_type(slot).name in COCOONS:
+        world.become(slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
+        world.life[slot] = world.life_max[slot]
+    production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
+    return [slot]
+
+
+def _length(world: World, slot: int) -> float:
+    return len(world.jobs.get(slot, ())) / production.parallel(world, slot)
+
+
+def has_place(world: World, slot: int, ability: Ability) -> Refusal:
+    """Whether a queue takes one more job of this kind."""
+    if ability.unit and ability.unit not in world.catalog.row_of_name:
+        return Refusal.NOT_SUPPORTED
+    jobs = world.jobs.get(slot, [])
+    if any(job.kind in MORPHS for job in jobs) or world.casts[slot]:
+        return Refusal.CANT_QUEUE_THAT_ORDER
+    if not world.powered[slot]:
+        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
+    return Refusal.SUCCESS if production.room(world, slot) else Refusal.QUEUE_IS_FULL
+
+
+def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
+    """Have a structure become one of another kind; it makes nothing else meanwhile."""
+    for slot in slots:
+        production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
+    return slots
+
+
+def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
+    if slot in world.jobs:
+        return Refusal.CANT_QUEUE_THAT_ORDER
+    return has_place(world, slot, ability)
+
+
+# calling off ----------------------------------------------------------------------------------------------------------
+
+
+def cancel_last(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
+    """Call off the last job of a queue; an egg becomes a larva again."""
+    taken = [slot for slot in slots if production.call_off(world, slot)]
+    for slot in taken:
+        _hatch_back(world, slot)
+    return taken
+
+
+def cancel_at(world: World, slot: int, index: int) -> bool:
+    """Call off the job at a place of a queue, as a click on the panel does."""
+    if index < 0 or not production.call_off(world, slot, index):
+        return False
+    _hatch_back(world, slot)
+    return True
+
+
+def _hatch_back(world: World, slot: int) -> None:
+    if world.unit_type(slot).name in COCOONS.values() and slot not in world.jobs:
+        world.become(slot, world.catalog.unit("Larva"))
+        world.life[slot] = world.life_max[slot]
+
+
+def has_job(world: World, slot: int, _: Ability) -> Refusal:
+    """Whether there is anything to call off."""
+    return Refusal.SUCCESS if slot in world.jobs else Refusal.CANT_FIND_CANCEL_ORDER
+
+
+# rally points ---------------------------------------------------------------------------------------------------------
+
+
+def _rally(world: World, slots: list[int], ability: Ability, target: int, point: Point | None, _: bool) -> list[int]:
+    """Say where new units are sent; at itself it is forgotten."""
+    kind = "workers" if ability.general == WORKERS else "units"
+    for slot in slots:
+        set_rally(world, slot, kind, target, point)
+    return slots
+
+
+def set_rally(world: World, slot: int, kind: str, target: int, point: Point | None) -> None:
+    """Send a structure's new ``units`` or ``workers`` to a unit (tag) or a point from now on."""
+    victim = world.slot_of(target)
+    if victim == slot:
+        world.rallies.get(slot, {}).pop(kind, None)
+        return
+    if victim != NOBODY:
+        x, y = world.pos[victim].tolist()
+        world.rallies.setdefault(slot, {})[kind] = Rally((x, y), target)
+    elif point is not None:
+        world.rallies.setdefault(slot, {})[kind] = Rally(point, NO_TAG)
+
+
+def _can_rally(_: World, cast: Cast) -> Refusal:
+    aimed = cast.target != NOBODY or cast.point is not None
+    return Refusal.SUCCESS if aimed else Refusal.MUST_TARGET_VISIBLE_LOCATION
+
+
+SKILLS: Final = {
+    "train": Skill(
+        give=_train,
+        ready=has_place,
+        estimates=(
+            "Of several structures the one with the shortest queue trains.",
+            "What a structure was making and had queued is lost with it, without a refund.",
+        ),
+    ),
+    "structure_morph": Skill(
+        give=_change, ready=_can_change, estimates=("A structure changes its kind only with an empty queue.",)
+    ),
+    "cancel_job": Skill(give=cancel_last, ready=has_job, anytime=True),
+    "cancel_slot": Skill(give=cancel_last, ready=has_job, anytime=True),
+    "rally": Skill(give=_rally, refuse=_can_rally, anytime=True),
+}
