@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -64,6 +65,9 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
     world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
     world.acquires[slot] = bool(weapons) and not (unit.defensive or unit.passive or unit.uncommandable) and owner != 0
+    planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
+    world.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
+    world.defensive[slot], world.flees[slot] = unit.defensive, unit.flees and not unit.passive
     world.guns_walking[slot] = any(w.fires_moving and w.moves == "moving" for w in weapons)
     world.spares_structures[slot] = bool(weapons) and all(
         w.acquires == "unit" or w.excluding == "structure" for w in weapons

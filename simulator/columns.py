@@ -87,6 +87,8 @@ class UnitColumns:
     scan_loop: Ints = state(int)  # loop from which it looks for a target again
     guard: Floats = state(float, width=2)  # where an idle unit stood when it engaged somebody by itself
     returning: Bools = state(bool)  # an idle unit that will go back there after the fight
+    leashed: Bools = state(bool)  # it gave up a chase and looks at nobody until it is nearly back
+    rank: Floats = state(float)  # of the target it has chosen by itself; see acquire
     weapon: Ints = state(int, -1)  # row of the weapon for that target, or -1
     reach: Floats = state(float)  # its range, edge to edge
     reach_min: Floats = state(float)  # and the range below which it can't fire, -inf without one
@@ -152,6 +154,9 @@ class UnitColumns:
     ground_scan: Floats = trait(float)  # how far it looks for ground targets, edge to edge, -1 without a weapon
     air_scan: Floats = trait(float)
     acquires: Bools = trait(bool)  # it picks fights by itself
+    threat_bits: Ints = trait(int)  # planes on which units fear it
+    defensive: Bools = trait(bool)  # nobody fears it while it does not fight
+    flees: Bools = trait(bool)  # attacked while idle it runs
     targetable: Bools = trait(bool)  # it may be a target at all
     cloaked: Bools = trait(bool)  # seen by detectors only
     sight: Floats = trait(float)  # world units

@@ -34,6 +34,9 @@ class Mechanics:
     help_radius: float
     help_period: int
     scan_period: int
+    leash_reset: float
+    look_up_period: int
+    flee_distance: float
     switch_gain: float
     guard_slack: float
     arrival_radius: float

@@ -1,8 +1,11 @@
 """Acquiring: whom a unit fights without being told, and when it gives up.
 
 Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk look at nobody. The
-best target is the one with the highest attack priority, then the nearest. An idle unit remembers where it stood and
-goes back there; one that is attacked from farther than it looks turns on the attacker, and so do its idle friends.
+best target is the one with the highest attack priority, then one that threatens the unit before one that is harmless to
+it, then the nearest. Who fires at something of a lower rank looks up now and then for something better. An idle unit
+remembers where it stood and goes back there; at the end of its leash it gives up and looks at nobody until it is nearly
+back. One that is attacked from farther than it looks turns on the attacker, and so do its idle friends; a type that
+does not fight back runs.
 """
 
 from __future__ import annotations
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
 
 IDLE = int(OrderKind.IDLE)
 PRIORITY_WEIGHT = 1000.0
+THREAT_WEIGHT = 500.0
+TOP_RANK = 20 * PRIORITY_WEIGHT + THREAT_WEIGHT  # an army unit that threatens: nothing is better
+RANK_STEP = 250.0  # less than any difference in rank, more than any distance
 OUT_OF_SIGHT = -1e9
 
 
@@ -39,9 +45,15 @@ def choose_targets(world: World) -> None:
     n = world.top
     due = world.looks_around[:n] | (world.guns_walking[:n] & world.walks[:n])
     due &= world.acquires[:n]
-    due &= ~world.in_reach[:n]
     due &= world.scan_loop[:n] <= world.loop
     due &= world.windup[:n] < 0.0
+    content = world.in_reach[:n]
+    if world.loop % MECHANICS.look_up_period == 0:
+        content = content & (world.rank[:n] >= TOP_RANK)
+    due &= ~content
+    if some(world.leashed[:n]):
+        _slip_leash(world)
+        due &= ~world.leashed[:n]
     seekers = which(due)
     if not seekers.size:
         return
@@ -62,9 +74,18 @@ def _give_up(world: World, seekers: Ints) -> None:
     offset = world.pos[chasing] - world.guard[chasing]
     idle = world.order_kind[chasing] == IDLE
     too_far = idle & (offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_radius**2)
-    lost = too_far | _stays(world, chasing) | ~_seen(world, chasing)
+    world.leashed[chasing] = too_far
+    lost = too_far | (_stays(world, chasing) & ~world.in_reach.take(chasing)) | ~_seen(world, chasing)
     for slot in chasing[lost].tolist():
         disengage(world, slot)
+
+
+def _slip_leash(world: World) -> None:
+    """Let units that gave a chase up look around again when they are nearly back, or were told something else."""
+    slots = which(world.leashed[: world.top])
+    offset = world.guard.take(slots, 0) - world.pos.take(slots, 0)
+    away = offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_reset**2
+    world.leashed[slots] = away & (world.order_kind.take(slots) == IDLE) & world.returning.take(slots)
 
 
 def _stays(world: World, slots: Ints) -> Bools:
@@ -90,13 +111,31 @@ def _seek(world: World, player: int, seekers: Ints) -> None:
     gap, worth = _worth(world, seekers, foes)
     best = np.argmax(worth, axis=1)
     rows = np.arange(len(seekers))
-    found = worth[rows, best] > OUT_OF_SIGHT
-    now = world.target[seekers]
-    closer = world.gap[seekers] - gap[rows, best]
-    hand = _reaches(world, seekers, foes[best], gap[rows, best])
-    better = found & ((now == NOBODY) | hand | (closer > MECHANICS.switch_gain)) & (foes[best] != now)
+    worth, gap, best = worth[rows, best], gap[rows, best], foes[best]
+    now = world.target.take(seekers)
+    world.rank[seekers] = rank_now = np.where(now == NOBODY, OUT_OF_SIGHT, _rank(world, seekers, now))
+    rise = worth + gap - rank_now
+    handy = _reaches(world, seekers, best, gap) | (world.gap.take(seekers) - gap > MECHANICS.switch_gain)
+    handy &= ~world.in_reach.take(seekers)
+    better = (rise > RANK_STEP) | (handy & (rise > -RANK_STEP))
+    better &= (worth > OUT_OF_SIGHT) & (best != now)
     for i in which(better).tolist():
-        _take(world, int(seekers[i]), int(foes[best[i]]))
+        _take(world, int(seekers[i]), int(best[i]))
+        world.rank[seekers[i]] = worth[i] + gap[i]
+
+
+def _rank(world: World, seekers: Ints, foes: Ints) -> Floats:
+    """What comes before the distance: each foe's priority, and whether it threatens the seeker beside it."""
+    rank: Floats = world.priority.take(foes) * PRIORITY_WEIGHT
+    rank += THREAT_WEIGHT * ((_threatened_planes(world, foes) & world.plane_bits.take(seekers)) != 0)
+    return rank
+
+
+def _threatened_planes(world: World, foes: Ints) -> Ints:
+    """The planes each foe threatens; workers threaten nobody as long as they do not fight."""
+    calm = world.defensive.take(foes) & (world.target.take(foes) == NOBODY)
+    planes: Ints = np.where(calm, 0, world.threat_bits.take(foes))
+    return planes
 
 
 def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
@@ -120,7 +159,9 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     sparing = world.spares_structures.take(seekers)
     if some(sparing):
         wanted &= ~(sparing[:, None] & world.walled.take(foes))
-    worth = np.where(wanted, world.priority[foes] * PRIORITY_WEIGHT - gap, OUT_OF_SIGHT)
+    rank = world.priority[foes] * PRIORITY_WEIGHT
+    threat = (_threatened_planes(world, foes) & world.plane_bits[seekers, None]) != 0
+    worth = np.where(wanted, rank + THREAT_WEIGHT * threat - gap, OUT_OF_SIGHT)
     return gap, worth
 
 
@@ -149,6 +190,7 @@ def _take(world: World, slot: int, target: int) -> None:
     if world.order_kind[slot] == IDLE and world.target[slot] == NOBODY and not world.returning[slot]:
         world.guard[slot] = world.pos[slot]
         world.returning[slot] = True
+    world.rank[slot] = OUT_OF_SIGHT  # a scan that found it says better
     engage(world, slot, target)
 
 
@@ -165,6 +207,18 @@ def _answer(world: World) -> None:
         for slot in helpers:
             if _free_to_answer(world, slot) and world.visible[world.owner[slot], attacker]:
                 _take(world, slot, attacker)
+        if world.flees[victim] and world.order_kind[victim] == IDLE and not world.returning[victim]:
+            _flee(world, victim, attacker)
+
+
+def _flee(world: World, victim: int, attacker: int) -> None:
+    """Let an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
+    x0, y0, x1, y1 = world.map.terrain.playable
+    offset = world.pos[victim] - world.pos[attacker]
+    away = offset / max(float(np.sqrt(offset[0] ** 2 + offset[1] ** 2)), 1e-9)
+    world.guard[victim] = np.clip(world.pos[victim] + away * MECHANICS.flee_distance, (x0, y0), (x1, y1))
+    world.returning[victim] = True
+    world.nav_loop[victim] = 0
 
 
 def _friends_near(world: World, victim: int) -> list[int]:
@@ -176,5 +230,5 @@ def _friends_near(world: World, victim: int) -> list[int]:
 
 
 def _free_to_answer(world: World, slot: int) -> bool:
-    roams = world.looks_around[slot] and not world.holds[slot] and world.step_max[slot] > 0.0
+    roams = world.looks_around[slot] and not (world.holds[slot] or world.leashed[slot]) and world.step_max[slot] > 0.0
     return bool(roams and world.acquires[slot] and world.target[slot] == NOBODY)

@@ -37,12 +37,12 @@ def fire(world: World) -> None:
     cooldown, windup, backswing = world.cooldown[:n], world.windup[:n], world.backswing[:n]
     cooldown -= cooldown > 0.0
     backswing -= backswing > 0.0
+    started = windup >= 0.0
+    if some(started):
+        windup -= started
+        _drop_lost(world, which(started & ~world.in_reach[:n]))
     fighters = world.fighters
     if fighters.size:
-        started = windup >= 0.0
-        if some(started):
-            windup -= started
-            _drop_lost(world, which(started & ~world.in_reach[:n]))
         turreted = fighters[world.turreted.take(fighters)]
         if turreted.size:
             _turn_turrets(world, turreted)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from simulator import commands
+from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 
 
@@ -204,3 +205,86 @@ def test_a_cloaked_enemy_is_not_engaged(field: Any) -> None:
     world.acquires[templar] = False
     field.play(12)
     assert world.target[zealot] == -1
+
+
+def test_one_that_can_hit_back_comes_before_a_nearer_harmless_one(field: Any) -> None:
+    world = field.world
+    marine = field.put("Marine", 1, 10, 16)
+    observer, probe = field.put("WarpPrism", 2, 12, 16), field.put("Probe", 2, 12, 17)
+    zealot, templar = field.put("Zealot", 2, 15, 16), field.put("HighTemplar", 2, 14, 14)
+    for slot in (observer, probe, zealot, templar, marine):
+        world.step_max[slot] = 0.0
+    world.acquires[[probe, zealot, templar]] = False
+    field.play(1)
+    assert world.target[marine] == templar  # always a threat, and nearer than the Zealot
+    commands.debug_kill(world, [world.tag_of(templar)])
+    field.play(5)
+    assert world.target[marine] == zealot
+    commands.debug_kill(world, [world.tag_of(zealot)])
+    field.play(5)
+    assert world.target[marine] in (observer, probe)
+
+
+def test_a_worker_that_fights_is_a_threat(field: Any) -> None:
+    world = field.world
+    marine = field.put("Marine", 1, 10, 16)
+    calm, fighting = field.put("Probe", 2, 12, 16), field.put("Probe", 2, 13, 16)
+    world.step_max[[calm, fighting, marine]] = 0.0
+    commands.attack_unit(world, [fighting], world.tag_of(marine))
+    field.play(1)
+    assert world.target[marine] == fighting
+
+
+def test_a_unit_that_fires_at_a_structure_looks_up_when_an_army_comes(field: Any) -> None:
+    world = field.world
+    stalker, pylon = field.put("Stalker", 1, 10, 16), field.put("Pylon", 2, 15, 16)
+    commands.attack_move(world, [stalker], (24, 16))
+    field.play(60)
+    assert world.target[stalker] == pylon
+    assert world.shields[pylon] < 200
+    zealot = field.put("Zealot", 2, 14, 13)
+    world.acquires[zealot] = False
+    field.play(MECHANICS.look_up_period + 4)
+    assert world.target[stalker] == zealot
+
+
+def test_a_unit_keeps_its_target_while_nothing_of_a_higher_rank_comes(field: Any) -> None:
+    world = field.world
+    stalker, far = field.put("Stalker", 1, 10, 16), field.put("Zealot", 2, 15, 16)
+    world.step_max[far] = 0.0
+    world.life[far] = 1e5
+    world.acquires[far] = False
+    field.play(30)
+    near = field.put("Zealot", 2, 12, 16)
+    world.step_max[near] = 0.0
+    field.play(60)
+    assert world.target[stalker] == far
+
+
+def test_one_that_gave_up_looks_at_nobody_until_it_is_nearly_back(field: Any) -> None:
+    world = field.world
+    zealot, bait = field.put("Zealot", 1, 4, 16), field.put("Overlord", 2, 26, 25)
+    world.guard[zealot] = (4.0, 16.0)
+    world.pos[zealot] = (26.0, 16.0)
+    world.returning[zealot] = world.leashed[zealot] = True
+    runner = field.put("Marine", 2, 24, 16)
+    world.acquires[runner] = False
+    del bait
+    while world.pos[zealot, 0] > 4 + MECHANICS.leash_reset:
+        field.play(1)
+        assert world.target[zealot] == -1
+        world.pos[runner] = world.pos[zealot] + (1.5, 0.0)
+        assert world.loop < 400
+    field.play(8)
+    assert world.target[zealot] == runner
+
+
+@pytest.mark.parametrize("name", ["Probe", "Overlord"])
+def test_an_idle_unit_that_does_not_fight_back_runs_from_its_attacker(field: Any, name: str) -> None:
+    world = field.world
+    runner, marine = field.put(name, 1, 14, 16), field.put("Marine", 2, 10, 16)
+    world.step_max[marine] = 0.0
+    field.play(120)
+    assert world.alive[runner]
+    assert world.pos[runner, 0] > 15.5
+    assert world.order_kind[runner] == 0

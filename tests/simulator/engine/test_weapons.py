@@ -195,3 +195,16 @@ def test_a_melee_unit_keeps_its_target_within_the_slop_of_its_range(field: Any) 
     before = field.vitals(t)
     field.play(3)
     assert field.vitals(t) < before
+
+
+def test_a_unit_whose_only_enemy_died_while_it_aimed_fights_the_next_one(field: Any) -> None:
+    world = field.world
+    a, t = duel(field, "Ultralisk", "Zealot", 2.0)
+    while world.windup[a] < 0:
+        field.play(1)
+    commands.debug_kill(world, [world.tag_of(t)])
+    field.play(2)
+    after = field.put("Zealot", 2, 12, 16)
+    world.acquires[after] = False
+    field.play(20)
+    assert world.target[a] == after
