@@ -79,7 +79,8 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
         return Refusal.NOT_SUPPORTED
     if ability.does in ORDINARY:
         return Refusal.SUCCESS if world.build_progress[slot] >= 1.0 else Refusal.BUILDING_IS_UNDER_CONSTRUCTION
-    if not world.can_cast[slot] or world.hallucination[slot]:
+    skill = SKILLS[ability.does]
+    if not (world.can_cast[slot] or skill.anytime) or world.hallucination[slot]:
         return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
         return Refusal.TECH_REQUIREMENTS_NOT_MET
