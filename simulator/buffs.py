@@ -25,7 +25,7 @@ FOREVER: Final = 1 << 40  # end of a buff that does not run out
 FLAGS: Final = (
     "stunned", "disarmed", "rooted", "unturning", "silenced", "invulnerable", "cloak", "uncloaked", "revealed",
     "detected", "blind", "detector", "stasis", "passive", "benign", "bodiless", "uncommandable", "no_passenger",
-    "no_life_regen", "no_shield_regen", "no_energy_regen", "spares_frenzied",
+    "no_life_regen", "no_shield_regen", "no_energy_regen", "spares_frenzied", "lifted",
 )  # fmt: skip
 
 

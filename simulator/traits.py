@@ -10,7 +10,7 @@ from simulator.armament import weapon_traits
 from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.mechanics import MECHANICS
-from simulator.stats import INSTANT_ACCELERATION_N
+from simulator.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
 from simulator.targets import measure_reach
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def body_traits(world: World, slot: int) -> None:
     world.creep_factor[slot] = unit.creep_factor
     world.walled[slot] = len(world.footprint_cells(slot)) > 0
     world.priority[slot] = unit.priority
-    world.targetable[slot] = not (unit.untargetable or unit.invulnerable)
+    world.targetable[slot] = not (unit.invulnerable or (unit.untargetable and not unit.weapons))
     world.cloaked[slot] = unit.cloaked
     world.sight[slot] = world.stats.sight[at]
     world.detects[slot] = unit.detect
@@ -103,8 +103,11 @@ def _plain(world: World, slot: int) -> None:
         column[slot] = 0.0
     world.work_rate[slot] = 1.0
     world.can_act[slot] = world.can_attack[slot] = world.can_cast[slot] = True
+    world.bonus_bits[slot], world.bonus_add[slot] = 0, 0.0
     if world.hallucination[slot]:
+        at = (int(world.owner[slot]), int(world.type[slot]))
         world.dealt_factor[slot] = 0.0
+        world.armor_add[slot], world.shield_armor_add[slot] = -world.stats.armor[at], -world.stats.shield_armor[at]
 
 
 def _change(world: World, slot: int, buff: Buff) -> None:
@@ -125,6 +128,9 @@ def _change(world: World, slot: int, buff: Buff) -> None:
     world.life_regen[slot] += buff.life_regen_n / second
     world.shield_regen[slot] += buff.shields_regen_n / second
     world.energy_regen[slot] += buff.energy_regen_n / second
+    for name, amount in buff.bonus:
+        world.bonus_bits[slot] |= bit_set((name,), ATTRIBUTES)
+        world.bonus_add[slot] = amount
     if buff.dealt_fraction:
         world.dealt_factor[slot] *= dict(buff.dealt_fraction).get("Ranged", 1.0)
     response = buff.response
@@ -152,11 +158,13 @@ def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
         world.turn_still_cos[slot], world.turn_still_sin[slot] = 1.0, 0.0
     if flags & {"invulnerable", "stasis"}:
         world.targetable[slot] = False
-    world.cloaked[slot] = (world.cloaked[slot] or "cloak" in flags) and "uncloaked" not in flags
+    world.cloaked[slot] = (world.cloaked[slot] or "cloak" in flags) and not (unfinished or "uncloaked" in flags)
     if "blind" in flags or unfinished:
         world.detects[slot] = 0.0
     if "bodiless" in flags:
         world.layer_bits[slot] = 0
+    if "lifted" in flags:
+        world.plane_bits[slot] = AIR_PLANE
     for name, column in (
         ("no_life_regen", world.life_regen),
         ("no_shield_regen", world.shield_regen),

@@ -16,7 +16,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.skills import basics, harvest, production, research
+from simulator.skills import (
+    basics,
+    battery,
+    gateway,
+    harvest,
+    mothership,
+    production,
+    research,
+    robotics,
+    sentry,
+    stargate,
+    templar,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,10 +36,41 @@ if TYPE_CHECKING:
     from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
     from simulator.world import World
 
-SKILLS: Final[dict[str, Skill]] = {**basics.SKILLS, **harvest.SKILLS, **production.SKILLS, **research.SKILLS}
-FIELDS: Final[dict[str, FieldRule]] = {}
-TICKS: Final[dict[str, BuffRule]] = {}
-ENDS: Final[dict[str, BuffRule]] = {}
+SKILLS: Final[dict[str, Skill]] = {
+    **basics.SKILLS,
+    **harvest.SKILLS,
+    **production.SKILLS,
+    **research.SKILLS,
+    **sentry.SKILLS,
+    **templar.SKILLS,
+    **gateway.SKILLS,
+    **robotics.SKILLS,
+    **stargate.SKILLS,
+    **mothership.SKILLS,
+    **battery.SKILLS,
+}
+FIELDS: Final[dict[str, FieldRule]] = {
+    **sentry.FIELDS,
+    **templar.FIELDS,
+    **gateway.FIELDS,
+    **robotics.FIELDS,
+    **stargate.FIELDS,
+    **mothership.FIELDS,
+}
+TICKS: Final[dict[str, BuffRule]] = {
+    **templar.TICKS,
+    **mothership.TICKS,
+}
+ENDS: Final[dict[str, BuffRule]] = {
+    **robotics.ENDS,
+    **stargate.ENDS,
+}
 FINALS: Final[dict[str, BuffRule]] = {}
-PASSIVES: Final[dict[str, UnitRule]] = {}
+PASSIVES: Final[dict[str, UnitRule]] = {
+    **sentry.PASSIVES,
+    **gateway.PASSIVES,
+    **robotics.PASSIVES,
+    **stargate.PASSIVES,
+    **mothership.PASSIVES,
+}
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}

@@ -57,12 +57,12 @@ def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
     """The cast that a unit would make of an ability now, or None."""
     if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
         return None
-    pick = casting.skill_of(ability).pick or nearest
-    target = pick(world, slot, ability)
-    if Aim.UNIT not in ability.aim and ability.autocast_range and not _tempted(world, slot, ability):
+    pick = casting.skill_of(ability).pick
+    target = (pick or nearest)(world, slot, ability)
+    if Aim.UNIT not in ability.aim and ability.autocast_range and pick is None and not _tempted(world, slot, ability):
         return None
     cast = Cast(slot, ability, target, begun=world.loop)
-    aimless = target == NOBODY and ability.requires_point
+    aimless = target == NOBODY and (ability.requires_point or pick is not None)
     return None if aimless or casting.aim_refusal(world, cast) is not Refusal.SUCCESS else cast
 
 

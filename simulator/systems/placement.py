@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator.columns import NOBODY
 from simulator.stats import LAYERS, bit_set
 from simulator.traits import Layer, layer_of
 
@@ -45,13 +46,8 @@ def free_places(world: World, unit: UnitType, point: tuple[float, float], count:
 def _places_within(
     world: World, unit: UnitType, point: tuple[float, float], count: int, radius: float
 ) -> list[tuple[float, float]]:
-    at = np.array(point) + _offsets(radius)
-    at = at[_on_surface(world, unit, at)]
+    at = candidates(world, unit, point, radius)
     bits = bit_set(unit.collide, LAYERS)
-    bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
-    apart = world.separation[bodies] + unit.separation + BODY_GAP
-    offset = at[:, None, :] - world.pos[bodies]
-    at = at[(offset[..., 0] ** 2 + offset[..., 1] ** 2 >= apart**2).all(axis=1)]
     places: list[tuple[float, float]] = []
     own = (2.0 * unit.separation + BODY_GAP) ** 2
     while len(at) and len(places) < count:
@@ -59,6 +55,24 @@ def _places_within(
         places.append((x, y))
         at = at[1:] if bits == 0 else at[(at[:, 0] - x) ** 2 + (at[:, 1] - y) ** 2 >= own]
     return places
+
+
+def candidates(
+    world: World, unit: UnitType, point: tuple[float, float], radius: float, *, ignoring: int = NOBODY
+) -> Floats:
+    """(k, 2) places within ``radius`` of a point where one more unit touches no body and no wall, nearest first.
+
+    The body of the unit in the slot ``ignoring`` is in nobody's way.
+    """
+    at = np.array(point) + _offsets(radius)
+    at = at[_on_surface(world, unit, at)]
+    bits = bit_set(unit.collide, LAYERS)
+    bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
+    bodies = bodies[bodies != ignoring]
+    apart = world.separation[bodies] + unit.separation + BODY_GAP
+    offset = at[:, None, :] - world.pos[bodies]
+    free: Floats = at[(offset[..., 0] ** 2 + offset[..., 1] ** 2 >= apart**2).all(axis=1)]
+    return free
 
 
 def snapped(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
@@ -77,7 +91,7 @@ def _on_surface(world: World, unit: UnitType, at: Floats) -> Bools:
     return inside & surface.flat[surface.cell(at)]
 
 
-@lru_cache(maxsize=len(SEARCH_RADII))
+@lru_cache(maxsize=16)
 def _offsets(radius: float) -> Floats:
     """Candidate offsets, nearest first; equally near ones from the east counter-clockwise."""
     side = np.arange(-radius, radius + CANDIDATE_STEP / 2.0, CANDIDATE_STEP)

@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from simulator import casting, commands
+from simulator.casts import Cast
+from simulator.catalog import DEFAULT_VERSION, load_catalog
+from simulator.columns import NOBODY
 from simulator.maps import GameMap, map_from
 from simulator.players import PlayerSetup
+from simulator.refusal import Refusal
 from simulator.scenariofile import parse_scenario
 from simulator.tick import advance
 from simulator.world import World
@@ -37,11 +42,33 @@ def bare_map(terrain: str = "agria_open", *, fog: bool = False) -> GameMap:
 class Field:
     """A world with short names for what tests do to it."""
 
-    def __init__(self, terrain: str = "agria_open", *, seed: int = 0, fog: bool = False) -> None:
-        self.world = World(bare_map(terrain, fog=fog), PLAYERS, seed=seed)
+    def __init__(
+        self, terrain: str = "agria_open", *, seed: int = 0, fog: bool = False, version: str = DEFAULT_VERSION
+    ) -> None:
+        self.world = World(bare_map(terrain, fog=fog), PLAYERS, seed=seed, catalog=load_catalog(version))
 
     def put(self, name: str, owner: int, x: float, y: float, facing: float = 0.0) -> int:
         return self.world.spawn(self.world.catalog.unit(name), owner, (x, y), facing)
+
+    def order(
+        self, slot: int, ability: int, target: int | None = None, point: tuple[float, float] | None = None
+    ) -> bool:
+        """Tell a unit (slot) to use an ability (id); whether it will."""
+        tag = 0 if target is None else self.world.tag_of(target)
+        number = self.world.catalog.ability(ability)
+        return casting.use(self.world, [slot], number, target=tag, point=point) == [slot]
+
+    def why_not(
+        self, slot: int, ability: int, target: int = NOBODY, point: tuple[float, float] | None = None
+    ) -> Refusal:
+        """Why a unit can't use an ability like this now."""
+        number = self.world.catalog.ability(ability)
+        why = casting.refusal(self.world, slot, number)
+        return casting.aim_refusal(self.world, Cast(slot, number, target, point)) if why is Refusal.SUCCESS else why
+
+    def research(self, player: int, *names: str) -> None:
+        for name in names:
+            commands.grant_upgrade(self.world, player, self.world.catalog.upgrade(name).id)
 
     def play(self, loops: int) -> World:
         advance(self.world, loops)

@@ -1,0 +1,100 @@
+"""The Shield Battery: it fills the shields of what is near it with its energy; a Nexus can overcharge one (5.0.13)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from simulator import buffs, commands
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill, gap, number
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+OVERCHARGE = "BatteryOvercharge"
+
+
+def _begin(world: World, cast: Cast) -> None:
+    """Nothing yet: the shields come loop by loop."""
+
+
+def _recharge(world: World, cast: Cast) -> bool:
+    """Give one loop's shields; over when they are full, the energy is used up, or the unit has gone too far away."""
+    slot, target = cast.slot, int(world.order_target[cast.slot])
+    if target == NOBODY or not (world.can_cast[slot] and world.targetable[target]):
+        return False
+    if gap(world, slot, target) > cast.ability.range + cast.ability.slop + 1e-6:
+        return False
+    boost = _boost(world, slot)
+    missing = float(world.shields_max[target] - world.shields[target])
+    given = min(number(cast, "shields_per_n") / LOOPS_PER_NORMAL_SECOND * boost, missing)
+    price = 0.0 if boost > 1.0 else number(cast, "energy_per_shield")
+    if price:
+        given = min(given, float(world.energy[slot]) / price)
+    world.shields[target] += given
+    world.energy[slot] -= given * price
+    world.players[int(world.owner[target])].score.healed.shields += given
+    return given > 0.0 and world.shields[target] < world.shields_max[target]
+
+
+def _boost(world: World, slot: int) -> float:
+    """How much faster than ordinarily a battery works; an overcharged one spends no energy."""
+    if OVERCHARGE not in world.catalog.buff_of_name or not buffs.has(world, slot, OVERCHARGE):
+        return 1.0
+    return number(world.catalog.ability(OVERCHARGE_ABILITY), "rate")
+
+
+OVERCHARGE_ABILITY = 4107
+
+
+def _cant_recharge(world: World, cast: Cast) -> Refusal:
+    target = cast.target
+    if target == NOBODY or world.shields[target] >= world.shields_max[target]:
+        return Refusal.CANT_TARGET_THAT_UNIT
+    if world.unit_type(target).name == "Interceptor":
+        return Refusal.CANT_TARGET_THAT_UNIT
+    enough = number(cast, "least_energy") if _boost(world, cast.slot) <= 1.0 else 0.0
+    at_work = bool(world.channels[cast.slot])
+    if not at_work and (world.energy[cast.slot] < enough or world.energy[cast.slot] <= 0.0):
+        return Refusal.NOT_ENOUGH_ENERGY
+    return Refusal.SUCCESS
+
+
+def _stop(world: World, cast: Cast) -> None:
+    commands.begin_next(world, cast.slot)
+
+
+def _cant_stop(world: World, cast: Cast) -> Refusal:
+    return Refusal.SUCCESS if cast.slot in world.channelling else Refusal.CANT_FIND_CANCEL_ORDER
+
+
+def _overcharge(world: World, cast: Cast) -> None:
+    buffs.apply(world, cast.target, OVERCHARGE, source=cast.slot, loops=number(cast, "duration_loops"))
+
+
+def _cant_overcharge(world: World, cast: Cast) -> Refusal:
+    target = cast.target
+    if target == NOBODY or world.unit_type(target).name != "ShieldBattery" or buffs.has(world, target, OVERCHARGE):
+        return Refusal.CANT_TARGET_THAT_UNIT
+    if world.build_progress[target] < 1.0:
+        return Refusal.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
+    mine = world.units_of(int(world.owner[cast.slot]))
+    nexus = mine[(world.type[mine] == world.catalog.unit("Nexus").row) & (world.build_progress[mine] >= 1.0)]
+    offset = world.pos[nexus] - world.pos[target]
+    away = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[nexus]
+    near = bool((away <= number(cast, "nexus_range")).any())
+    return Refusal.SUCCESS if near else Refusal.TARGET_IS_OUT_OF_RANGE
+
+
+SKILLS: Final = {
+    "recharge_shields": Skill(_begin, refuse=_cant_recharge, hold=_recharge),
+    "stop_recharging": Skill(_stop, refuse=_cant_stop),
+    "battery_overcharge": Skill(
+        _overcharge, refuse=_cant_overcharge, estimates=("An overcharged battery spends no energy.",)
+    ),
+}

@@ -1,0 +1,159 @@
+"""The Templars' skills: Psi Storm, Feedback and the merging of two into an Archon.
+
+A storm searches its circle again and again and lays a buff on whom it finds; the buff does the damage. It lies once on
+a unit, so that storms do not add up, and goes on for a moment after the unit has left.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from simulator import buffs, commands
+from simulator.arrays import which
+from simulator.columns import NOBODY
+from simulator.fields import Field, source_slot
+from simulator.orders import Order, OrderKind
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill, around, number, place_of
+from simulator.systems.damage import wound
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.skills.skill import BuffRule
+    from simulator.world import World
+
+STORM_EFFECT = 1
+STORM_BUFF = "PsiStorm"
+STORM_ABILITY = 1036
+ROUNDING = 1e-6  # of the periods, added up
+MERGE_TARGET = 1767
+TEMPLARS: Final = ("HighTemplar", "DarkTemplar")
+SPARED_BY_FEEDBACK: Final = frozenset({"OrbitalCommand", "OrbitalCommandFlying", "Nexus", "ShieldBattery"})
+
+
+# Psi Storm ------------------------------------------------------------------------------------------------------------
+
+
+def _psi_storm(world: World, cast: Cast) -> None:
+    period = number(cast, "search_period_loops")
+    world.fields.append(
+        Field(
+            does="psi_storm",
+            owner=int(world.owner[cast.slot]),
+            points=[place_of(world, cast)],
+            radius=number(cast, "radius"),
+            begun=world.loop,
+            end=world.loop + period * (number(cast, "searches") - 1) + ROUNDING,
+            effect=STORM_EFFECT,
+            due=world.loop,
+            period=period,
+            ability=cast.ability.id,
+            source=world.tag_of(cast.slot),
+        )
+    )
+
+
+def _search(world: World, field: Field) -> None:
+    """Find whom the storm touches, friends too: who is new to it takes damage at once."""
+    source = source_slot(world, field)
+    for slot in around(world, field.at, field.radius, structures=False):
+        fresh = not buffs.has(world, slot, STORM_BUFF)
+        buffs.apply(world, slot, STORM_BUFF, source=source, owner=field.owner)
+        if fresh:
+            _hurt(world, slot, source, field.owner)
+
+
+def _storm_tick(world: World, slot: int, row: np.void) -> None:
+    _hurt(world, slot, int(row["source"]), int(row["owner"]))
+
+
+def _hurt(world: World, slot: int, source: int, owner: int) -> None:
+    wound(world, source, owner, slot, number(world.catalog.ability(STORM_ABILITY), "damage"))
+
+
+# Feedback -------------------------------------------------------------------------------------------------------------
+
+
+def _feedback(world: World, cast: Cast) -> None:
+    energy = float(world.energy[cast.target])
+    amount = energy * number(cast, "damage_per_energy")
+    world.energy[cast.target] = energy * (1.0 - number(cast, "energy_drained_fraction"))
+    wound(world, cast.slot, int(world.owner[cast.slot]), cast.target, amount)
+
+
+def _cant_feed_back(world: World, cast: Cast) -> Refusal:
+    spared = world.unit_type(cast.target).name in SPARED_BY_FEEDBACK
+    return Refusal.CANT_TARGET_THAT_UNIT if spared else Refusal.SUCCESS
+
+
+# Archons --------------------------------------------------------------------------------------------------------------
+
+
+def _merge(world: World, cast: Cast) -> None:
+    """Begin to walk to a partner; or, beside the partner that the order names, become an Archon in the making."""
+    if cast.target == NOBODY:
+        _pair(world, cast)
+    else:
+        _fuse(world, cast)
+
+
+def _pair(world: World, cast: Cast) -> None:
+    """Send the unit and the nearest other one that was told to merge to each other; without one nothing happens."""
+    slot = cast.slot
+    asked = which(world.casts[: world.top] & (world.order_ability[: world.top] == cast.ability.id))
+    asked = asked[(world.owner[asked] == world.owner[slot]) & (asked != slot)]
+    if not asked.size:
+        return
+    offset = world.pos[asked] - world.pos[slot]
+    partner = int(asked[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
+    for one, other in ((slot, partner), (partner, slot)):
+        commands.begin(world, one, Order(OrderKind.CAST, MERGE_TARGET, target=world.tag_of(other)))
+
+
+def _fuse(world: World, cast: Cast) -> None:
+    """Put an Archon between the two, which takes its time to form, and take the two out of the world."""
+    one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
+    x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
+    archon = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
+    world.remove(one)
+    world.remove(other)
+    world.build_progress[archon] = 0.0
+    world.refresh(archon)
+    end = world.loop + cast.ability.loops
+    world.fields.append(
+        Field("archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon))
+    )
+
+
+def _form(world: World, field: Field) -> None:
+    archon = source_slot(world, field)
+    if archon == NOBODY:
+        field.end = world.loop
+        return
+    world.build_progress[archon] = min((world.loop - field.begun) / (field.end - field.begun), 1.0)
+    if world.build_progress[archon] >= 1.0:
+        world.refresh(archon)
+        world.orders_changed = world.scan_now = True
+
+
+def _cant_merge(world: World, cast: Cast) -> Refusal:
+    fits = cast.target == NOBODY or world.unit_type(cast.target).name in TEMPLARS
+    return Refusal.SUCCESS if fits else Refusal.CANT_TARGET_THAT_UNIT
+
+
+SKILLS: Final = {
+    "psi_storm": Skill(_psi_storm),
+    "feedback": Skill(_feedback, refuse=_cant_feed_back),
+    "merge": Skill(
+        _merge,
+        refuse=_cant_merge,
+        estimates=(
+            "Of several Templars told to merge each takes the nearest other one as its partner.",
+            "An Archon in the making has full life and shields and can be attacked.",
+        ),
+    ),
+}
+FIELDS: Final = {"psi_storm": _search, "archon_merge": _form}
+TICKS: Final[dict[str, BuffRule]] = {STORM_BUFF: _storm_tick}
