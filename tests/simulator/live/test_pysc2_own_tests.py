@@ -1,66 +1,86 @@
-"""PySC2's own game tests, unmodified, as far as the simulator passes them.
+"""PySC2's own game tests, unmodified, on an install of the simulator.
 
-They ask for maps that are not shipped yet. Those here test the API and not the rules of a map, so they run on
-stand-ins: a scenario of a few units under the map's name, as a user would add one.
+All of them are listed: those that pass, in the order of the time they take, and those that do not yet, with the reason.
 """
 
+import pkgutil
 import unittest
+from collections.abc import Iterator
 from pathlib import Path
 
+import pysc2.tests
 import pytest
-
-from simulator.install import install
 
 pytestmark = pytest.mark.game
 
-STAND_IN = """# A map of Khala's simulator
-name: {name}
-family: stand_in
-title: A few units under the name of a map that is not shipped
-terrain: agria_open
-visibility: {{fog: false, black_mask: false}}
-players:
-  1: {{race: random, control: agent, start: [8, 16]}}
-  2: {{race: random, control: computer, start: [24, 16]}}
-triggers:
-  - name: spawn
-    when: [start]
-    do:
-      - create: {{player: 1, unit: Zealot, count: 5, at: [8, 16]}}
-      - create: {{player: 2, unit: Zealot, count: 5, at: [24, 16]}}
-"""
-MAPS = [f"Melee/{kind}{size}" for kind in ("Simple", "Flat") for size in (32, 48, 64, 96, 128)]
+PASSED = [
+    "ping_test.TestPing.test_ping",
+    "protocol_error_test.TestProtocolError.test_error",
+    "protocol_error_test.TestProtocolError.test_replay_a_replay",
+    "general_actions_test.TestGeneralActions.test_general_actions",
+    "debug_test.DebugTest.test_multi_player",
+    "versions_test.TestVersions.test_version_numbers",
+    "versions_test.TestVersions.test_versions_create_game",
+    "render_test.TestRender.test_render",
+    "step_mul_override_test.StepMulOverrideTest.test_returns_game_loop_zero_on_first_step_despite_override",
+    "step_mul_override_test.StepMulOverrideTest.test_respects_override",
+    "obs_test.ObsTest.test_camera_movement_delay",
+    "obs_test.ObsTest.test_action_delay",
+    "multi_player_test.TestMultiplayer.test_multi_player",
+    "obs_test.ObsTest.test_fog",
+    "obs_test.ObsTest.test_pos",
+    "obs_spec_test.TestObservationSpec.test_observation_matches_obs_spec",
+    "host_remote_agent_test.TestHostRemoteAgent.testVsBot",
+    "actions_test.ActionsTest.test_general_attack",
+    "random_agent_test.TestRandomAgent.test_random_agent_features",
+    "obs_spec_test.TestObservationSpec.test_heterogeneous_observations",
+    "host_remote_agent_test.TestHostRemoteAgent.testVsAgent",
+    "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_passthrough_and_features",
+]
+SLOW = [
+    "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_features_and_rgb",
+    "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_features",
+    "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_rgb",
+    "random_agent_test.TestRandomAgent.test_random_agent_rgb",
+    "random_agent_test.TestRandomAgent.test_random_agent_all",
+    "easy_scripted_test.TestEasy.test_move_to_beacon",
+    "easy_scripted_test.TestEasy.test_collect_mineral_shards",
+    "easy_scripted_test.TestEasy.test_collect_mineral_shards_raw",
+    "easy_scripted_test.TestEasy.test_defeat_roaches",
+    "easy_scripted_test.TestEasy.test_defeat_roaches_raw",
+]
+NOT_YET = {
+    "easy_scripted_test.TestEasy.test_collect_mineral_shards_feature_units": "clicks on shards do not collect them",
+    "obs_test.ObsTest.test_hide_cloaked": "needs the debug state god",
+    "obs_test.ObsTest.test_show_cloaked": "needs the debug state god",
+    "obs_test.ObsTest.test_hallucination": "needs hallucinations",
+    "obs_test.ObsTest.test_effects": "needs Guardian Shield and Graviton Beam",
+    "obs_test.ObsTest.test_active": "needs production",
+    "obs_test.ObsTest.test_disable_fog": "needs production",
+    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "needs a Terran economy",
+    "observer_test.TestObserver.test_observer": "needs a built-in AI that finishes games",
+}
+WITHOUT_A_GAME = {"dummy_observation_test"}
 
 
-@pytest.fixture(scope="module")
-def stand_ins(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = install(tmp_path_factory.mktemp("stand_ins"))
-    for path in (*MAPS, "mini_games/DefeatRoaches"):
-        file = root / "Maps" / f"{path}.SC2Map"
-        file.write_text(STAND_IN.format(name=file.stem))
-    return root
+def _all_tests() -> Iterator[str]:
+    for module in pkgutil.iter_modules(pysc2.tests.__path__):
+        if module.name.endswith("_test") and module.name not in WITHOUT_A_GAME:
+            for case in unittest.defaultTestLoader.loadTestsFromName(f"pysc2.tests.{module.name}"):
+                assert isinstance(case, unittest.TestSuite)
+                for test in case:
+                    assert isinstance(test, unittest.TestCase)
+                    yield test.id().removeprefix("pysc2.tests.")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "ping_test.TestPing.test_ping",
-        "versions_test.TestVersions.test_version_numbers",
-        "versions_test.TestVersions.test_versions_create_game",
-        "protocol_error_test.TestProtocolError.test_error",
-        "protocol_error_test.TestProtocolError.test_replay_a_replay",
-        "host_remote_agent_test.TestHostRemoteAgent.testVsBot",
-        "obs_spec_test.TestObservationSpec.test_observation_matches_obs_spec",
-        "random_agent_test.TestRandomAgent.test_random_agent_features",
-        "step_mul_override_test.StepMulOverrideTest.test_returns_game_loop_zero_on_first_step_despite_override",
-        "step_mul_override_test.StepMulOverrideTest.test_respects_override",
-        "general_actions_test.TestGeneralActions.test_general_actions",
-        "debug_test.DebugTest.test_multi_player",
-    ],
-)
 @pytest.mark.filterwarnings("ignore")  # of PySC2 and what it imports
-def test_pysc2_says_ok(name: str, stand_ins: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SC2PATH", str(stand_ins))
+def test_every_game_test_of_pysc2_is_listed_once() -> None:
+    assert sorted([*PASSED, *SLOW, *NOT_YET]) == sorted(_all_tests())
+
+
+@pytest.mark.parametrize("name", [*PASSED, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+@pytest.mark.filterwarnings("ignore")  # of PySC2 and what it imports
+def test_pysc2_says_ok(name: str, sc2: Path, no_process_left: None) -> None:
     suite = unittest.defaultTestLoader.loadTestsFromName(f"pysc2.tests.{name}")
     result = unittest.TestResult()
     suite.run(result)
