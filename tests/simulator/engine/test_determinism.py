@@ -56,6 +56,31 @@ def test_another_process_with_other_hashes_plays_the_same_game() -> None:
     assert digests == {played("3s5z", 7).digest() + "\n"}
 
 
+RANDOM_ORDERS = Path(__file__).parent / "random_orders.py"
+PLAYGROUNDS = ["pvz_task6_level1", "pvz_task8_level1", "MMM2", "2c_vs_64zg", "Simple64"]
+
+
+def by_lot(name: str, loops: int, hash_seed: str) -> str:
+    """Loop and digest at the end of a game with random orders of every kind, in a process of its own."""
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(RANDOM_ORDERS.parents[3])}
+    arguments = [sys.executable, str(RANDOM_ORDERS), name, "11", str(loops)]
+    done = subprocess.run(arguments, env=environment, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", PLAYGROUNDS)
+def test_random_orders_of_every_kind_break_nothing_and_end_the_same_in_two_processes(name: str) -> None:
+    assert by_lot(name, 300, "1") == by_lot(name, 300, "2")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", PLAYGROUNDS)
+def test_two_thousand_loops_of_random_orders_end_the_same_in_two_processes(name: str) -> None:
+    assert by_lot(name, 2000, "1") == by_lot(name, 2000, "2")
+
+
 def test_the_game_is_the_same_on_every_python_and_numpy() -> None:
     """Digests kept in a file; a change of the rules changes them, and then the file is to be written anew."""
     kept = json.loads((Path(__file__).parent / "golden_digests.json").read_text(encoding="utf-8"))

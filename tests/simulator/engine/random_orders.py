@@ -1,0 +1,84 @@
+"""Plays a map with orders drawn by lot, and prints the world's digest: run by tests, in processes of their own.
+
+    python random_orders.py MAP SEED LOOPS
+
+Every few loops some units of each player get something to do that they can do now, at whatever it may be aimed at.
+Fails when a unit leaves the map or a number stops being one.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simulator import casting
+from simulator.abilities import Aim
+from simulator.api import abilities
+from simulator.maps import load_map
+from simulator.tick import advance, new_game
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+EVERY = 8
+ORDERS = 6
+
+
+def give_orders(world: World, chance: random.Random) -> None:
+    """Some orders to some units of each player, as a client would give them."""
+    for player in range(1, len(world.players)):
+        mine = world.units_of(player).tolist()
+        for _ in range(min(ORDERS, len(mine))):
+            slot = chance.choice(mine)
+            usable = abilities.usable(world, slot)
+            if usable:
+                _give(world, player, slot, chance.choice(usable).id, chance)
+
+
+def _give(world: World, player: int, slot: int, ability: int, chance: random.Random) -> None:
+    aims = [aim for aim in Aim if aim & abilities.aims_of(world.catalog, ability)]
+    aim = chance.choice(aims)
+    target, point = 0, None
+    if aim is Aim.UNIT:
+        target = world.tag_of(chance.choice(world.live.tolist()))
+    elif aim is Aim.POINT:
+        x, y = world.pos[slot].tolist()
+        point = (x + chance.uniform(-9, 9), y + chance.uniform(-9, 9))
+    queue = chance.random() < 0.2
+    command = abilities.Command(ability, (world.tag_of(slot),), target, point, queue)
+    abilities.carry_out(world, player, command)
+
+
+def check(world: World) -> None:
+    """Nobody is off the map, and every number is one."""
+    width, height = world.map.terrain.size
+    pos = world.pos[world.live]
+    assert np.isfinite(pos).all()
+    assert (pos >= 0).all()
+    assert (pos <= (width, height)).all()
+    for column in (world.life, world.shields, world.energy, world.cooldown, world.step_max, world.speed):
+        assert np.isfinite(column[world.live]).all()
+    assert (world.life[world.live] > 0).all()
+    assert (world.energy[world.live] >= 0).all()
+
+
+def play(name: str, seed: int, loops: int) -> World:
+    """A game of at most ``loops`` loops, played by lot; every debug state that allows more is on."""
+    world, chance = new_game(load_map(name), seed=seed), random.Random(seed)
+    for player in world.players[1:]:
+        player.cheats += ["tech_tree", "cooldown"]
+        player.minerals = player.vespene = 5000.0
+    while world.loop < loops and not world.ended:
+        if world.loop % EVERY == 0:
+            give_orders(world, chance)
+        advance(world)
+        check(world)
+    return world
+
+
+if __name__ == "__main__":
+    played = play(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    sys.stdout.write(f"{played.loop} {played.digest()}\n")
