@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from simulator.install import BASE_BUILD, InstallError, install, is_installed
+from simulator.install import BASE_BUILD, InstallError, install, is_installed, link_maps
 
 app = typer.Typer(
     help="A headless StarCraft II that PySC2 and python-sc2 start and play as if it were the game.",
@@ -21,11 +21,15 @@ app = typer.Typer(
 )
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object instead of text.")]
+OwnMaps = Annotated[
+    Path | None,
+    typer.Option("--maps", help="Your own .SC2Map files: a directory of them, or a StarCraft II with a folder Maps."),
+]
 Directory = Annotated[Path, typer.Argument(help="Made if it is not there. Never one with a real StarCraft II.")]
 
 
 @app.command("install")
-def install_command(directory: Directory, as_json: Json = False) -> None:
+def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = False) -> None:
     """Lay out DIRECTORY like a StarCraft II install.
 
     Clients find it by the environment variable SC2PATH:
@@ -34,19 +38,28 @@ def install_command(directory: Directory, as_json: Json = False) -> None:
 
         export SC2PATH=~/khala-sc2
 
-    Doing it again repairs the install and updates its maps; what you added stays.
+    Doing it again repairs the install and updates its maps; what you added stays. Your own maps are linked: terrain and
+    what stands on them is read from the file, their scripts are not run.
     """
     try:
         root = install(directory)
+        own = [] if maps is None else link_maps(root, maps)
     except InstallError as error:
         typer.echo(f"Not installed: {error}.", err=True)
         raise typer.Exit(1) from error
     from simulator.maps import map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
+    linked = [entry.path for entry in own if not entry.trouble]
     if as_json:
-        typer.echo(json.dumps({"path": str(root), "maps": list(map_names())}))
-    else:
-        typer.echo(f"Installed {len(map_names())} maps. Now: export SC2PATH={root}")
+        left_out = {str(entry.source): entry.trouble for entry in own if entry.trouble}
+        facts = {"path": str(root), "maps": list(map_names()), "linked": linked, "left_out": left_out}
+        typer.echo(json.dumps(facts))
+        return
+    for entry in own:
+        if entry.trouble:
+            typer.echo(f"Left out {entry.source}: {entry.trouble}.", err=True)
+    and_yours = f" and {len(linked)} of yours" if maps is not None else ""
+    typer.echo(f"Installed {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
 
 
 @app.command()

@@ -2,7 +2,7 @@
 
 Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that turns into the
 process of `__main__.py`. Nothing of a real StarCraft II is ever replaced, and maps that a user puts beside ours
-stay.
+stay. A user's own maps are linked, not copied: they stay where they are.
 
 Above: `cli.py`. Below: the list of scenarios.
 """
@@ -12,11 +12,16 @@ from __future__ import annotations
 import errno
 import os
 import shlex
+import shutil
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 BASE_BUILD = 75689
 """Build of 4.10.0: the newest for Linux that both PySC2 and python-sc2 know."""
+
+OWN_FOLDER = "user"
+"""Folder below `Maps` of maps that lie in no folder of their own."""
 
 _EXECUTABLE = Path("Versions") / f"Base{BASE_BUILD}" / "SC2_x64"
 _MARK = "# The simulator of Khala stands in for the game here."
@@ -44,6 +49,37 @@ def install(directory: Path | str) -> Path:
     except OSError as error:
         raise InstallError(_explain(error, root)) from error
     return root
+
+
+@dataclass(frozen=True, slots=True)
+class OwnMap:
+    """A map of the user's: where it lies, its path below `Maps`, and why it can't be played, if so."""
+
+    source: Path
+    path: str
+    trouble: str = ""
+
+
+def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
+    """Links every .SC2Map file below a directory into an install, and says which ones can be played.
+
+    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. A map of the user's
+    takes the place of a shipped one of the same path; none takes the place of what the user put there himself.
+
+    Raises:
+        InstallError: there is no such directory, no map in it, or something cannot be written.
+    """
+    source = Path(directory).expanduser().absolute()
+    if not source.is_dir():
+        raise InstallError(f"{source} is no directory with maps")
+    top = source / "Maps" if (source / "Maps").is_dir() else source
+    files = sorted(path for path in top.rglob("*") if path.suffix.lower() == ".sc2map" and path.is_file())
+    if not files:
+        raise InstallError(f"{source} holds no .SC2Map file")
+    try:
+        return [_link(root / "Maps", top, file) for file in files]
+    except OSError as error:
+        raise InstallError(_explain(error, root)) from error
 
 
 def is_installed(directory: Path | str) -> bool:
@@ -95,6 +131,28 @@ def _write_maps(maps: Path) -> None:
         path = maps / relative
         if not path.exists() or is_placeholder(path.read_bytes()):
             path.write_bytes(data)
+
+
+def _link(maps: Path, top: Path, file: Path) -> OwnMap:
+    """Links one map; clients look for maps exactly one folder below `Maps`."""
+    from simulator.mapfile import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
+    folder = file.parent.name if file.parent != top else OWN_FOLDER
+    path = f"{folder}/{file.stem}.SC2Map"
+    target = maps / path
+    try:
+        read_map(file.read_bytes(), path)
+    except (MapDataError, OSError) as error:
+        return OwnMap(file, path, str(error))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.is_symlink() or (target.exists() and is_placeholder(target.read_bytes())):
+        target.unlink()
+    if not target.exists():
+        try:
+            target.symlink_to(file)
+        except OSError:  # not everybody may make links on Windows
+            shutil.copyfile(file, target)
+    return OwnMap(file, path)
 
 
 def _explain(error: OSError, root: Path) -> str:

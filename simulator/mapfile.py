@@ -2,9 +2,9 @@
 
 A map of ours is a text file: a first line that marks it, then the name of a shipped map, or a whole scenario in
 the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
-path. An archive of StarCraft II itself is recognised by its file name if that map is shipped here.
+path. An archive of StarCraft II itself is read by `archive.py`.
 
-Above: `install.py`, `api/lobby.py`. Below: `maps.py`.
+Above: `install.py`, `api/lobby.py`. Below: `maps.py`, `archive.py`.
 """
 
 from __future__ import annotations
@@ -48,16 +48,23 @@ def is_placeholder(data: bytes) -> bool:
     return data.startswith(_MARK) and b"\n" not in data[len(_MARK) :].strip()
 
 
+def is_archive(data: bytes) -> bool:
+    """Whether this is an archive of StarCraft II itself."""
+    return data.startswith(_ARCHIVE)
+
+
 def read_map(data: bytes, path: str) -> GameMap:
     """The map in the bytes of a file; its path tells which map an archive of StarCraft II holds.
 
     Raises:
         MapDataError: with a sentence for the client.
     """
-    if data.startswith(_ARCHIVE):
+    if is_archive(data):
+        from simulator.archive import ArchiveError, read_archive  # noqa: PLC0415  # its libraries, for few games only
+
         try:
-            return load_map(find_map(path if path.endswith(SUFFIX) else path + SUFFIX))
-        except MapError as error:
+            return read_archive(data, path)
+        except ArchiveError as error:
             raise MapDataError(f"{path or 'the map'} is an archive that the simulator cannot read: {error}") from error
     if not data.startswith(_MARK):
         raise MapDataError(f"{path or 'the map'} holds neither a map of the simulator nor a StarCraft II archive")

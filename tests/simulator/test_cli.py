@@ -22,7 +22,8 @@ def test_install_makes_an_install_and_says_what_to_do_next(tmp_path: Path) -> No
 
 def test_install_has_json(tmp_path: Path) -> None:
     result = run(app, ["install", str(tmp_path), "--json"])
-    assert json.loads(result.stdout) == {"path": str(tmp_path), "maps": list(map_names())}
+    expected = {"path": str(tmp_path), "maps": list(map_names()), "linked": [], "left_out": {}}
+    assert json.loads(result.stdout) == expected
 
 
 def test_an_install_that_fails_is_one_sentence_on_stderr(tmp_path: Path) -> None:
