@@ -41,6 +41,8 @@ SANS = cv2.FontFace("sans")
 LOOPS_PER_SECOND = 22.4
 REACH = 9.0
 """World units around own units within which somebody belongs to the fight."""
+DECISION = 8
+"""Loops from one decision to the next."""
 ATTACK, MOVE, STORM, FORCE_FIELD, GUARDIAN_SHIELD = 3674, 3794, 1036, 1526, 76
 """Abilities, by the API's numbers."""
 
@@ -56,6 +58,7 @@ class Stage:
         options.render.resolution.x = options.render.resolution.y = SCREEN
         options.render.minimap_resolution.x = options.render.minimap_resolution.y = MINIMAP
         self.seen = self._client.play(map_name, options, seed=seed)
+        self._targets: dict[int, int] = {}
 
     def step(self, loops: int) -> None:
         """Plays on."""
@@ -102,13 +105,16 @@ class Stage:
         return min(float(np.hypot(a.pos.x - b.pos.x, a.pos.y - b.pos.y)) for a in some for b in others)
 
     def attack(self, loops: int) -> None:
-        """Lets the own army attack the nearest enemies for so long."""
-        for _ in range(0, loops, 16):
-            army, enemies = [u for u in self.units("own") if self._fights(u)], self.units("enemy")
-            if army and enemies:
-                nearest = min(enemies, key=lambda unit: self.distance([unit], army))
-                self.order(ATTACK, army, (nearest.pos.x, nearest.pos.y))
-            self.step(16)
+        """Lets every own fighter attack the enemy nearest to it until that one is dead, for so long."""
+        for _ in range(0, loops, DECISION):
+            enemies = {unit.tag: unit for unit in self.units("enemy")}
+            for unit in self.units("own"):
+                if not self._armed(unit) or self._targets.get(unit.tag) in enemies or not enemies:
+                    continue
+                nearest = min(enemies.values(), key=lambda enemy: self.distance([enemy], [unit]))
+                self._targets[unit.tag] = nearest.tag
+                self._client.act(command(ATTACK, [unit.tag], target=nearest.tag))
+            self.step(DECISION)
 
     def picture(self, title: str) -> Image:
         """The screen, beside it the minimap and how the sides fare."""
@@ -141,6 +147,9 @@ class Stage:
         row = self._catalog.row_of_id.get(unit.unit_type)
         return row is not None and self._catalog.units[row].army
 
+    def _armed(self, unit: raw_pb2.Unit) -> bool:
+        return self._fights(unit) and bool(self._catalog.units[self._catalog.row_of_id[unit.unit_type]].weapons)
+
 
 def _pixels(image: common_pb2.ImageData) -> Image:
     """A picture as OpenCV writes files: blue, green, red."""
@@ -156,15 +165,15 @@ def _write(image: Image, text: str, at: tuple[int, int], colour: tuple[int, int,
 
 def clash(stage: Stage) -> None:
     """Both sides run into each other."""
-    stage.attack(104)
+    stage.attack(96)
 
 
 def cliff(stage: Stage) -> None:
-    """Colossi step up the cliff and burn what runs up the ramps after them."""
-    stage.attack(104)
-    stage.order(MOVE, stage.units("own"), (16, 17))
-    stage.step(48)
-    stage.attack(32)
+    """Colossi step down the cliff; the swarm has to run round by the ramps."""
+    stage.attack(72)
+    stage.order(MOVE, stage.units("own"), (16, 9.5))
+    stage.step(40)
+    stage.attack(16)
 
 
 def marauders(stage: Stage) -> None:

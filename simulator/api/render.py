@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import cv2
 from s2clientprotocol import spatial_pb2
 
 from simulator.api.painting.overview import OverviewPainter
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from simulator.api.wire import Part
 
 BITS_PER_PIXEL = 24
+cv2.setNumThreads(1)  # an image is too small to share, and a machine runs many games at once
 _FIELDS = spatial_pb2.ObservationRender.DESCRIPTOR.fields_by_name
 
 

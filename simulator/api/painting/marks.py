@@ -8,13 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import cv2
+import numpy as np
 
 from simulator.api.painting import palette
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from simulator.api.painting.palette import Colour
@@ -67,12 +67,18 @@ def line(image: Image, start: Point, end: Point, colour: Colour, width: int = 1)
     cv2.line(image, one, other, colour, width, cv2.LINE_AA, SHIFT)
 
 
-def beams(image: Image, shots: Iterable[tuple[Point, Point, Colour]], width: int) -> None:
+def beams(image: Image, shots: Sequence[tuple[Point, Point, Colour]], width: int) -> None:
     """Shots from attackers to targets, the ground shining through."""
-    over = image.copy()
+    ends = np.array([point for start, end, _ in shots for point in (start, end)])
+    x0, y0 = np.maximum(ends.min(axis=0).astype(np.intp) - width, 0).tolist()
+    x1, y1 = np.maximum(ends.max(axis=0).astype(np.intp) + width + 2, 0).tolist()
+    region = image[y0:y1, x0:x1]
+    if not region.size:
+        return
+    over = region.copy()
     for start, end, colour in shots:
-        line(over, start, end, colour, width)
-    cv2.addWeighted(over, BEAM_OPACITY, image, 1 - BEAM_OPACITY, 0, dst=image)
+        line(over, (start[0] - x0, start[1] - y0), (end[0] - x0, end[1] - y0), colour, width)
+    cv2.addWeighted(over, BEAM_OPACITY, region, 1 - BEAM_OPACITY, 0, dst=region)
 
 
 def spark(image: Image, at: Point, size: float, turn: int) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from simulator.api.painting import marks, palette, weather
 from simulator.api.painting.ground import Ground
 from simulator.api.painting.silhouettes import Class, class_of
-from simulator.api.painting.sprites import DIRECTIONS, Look, sprite_of
+from simulator.api.painting.sprites import DIRECTIONS, Look, wardrobe
 from simulator.api.shots import in_flight, strikes
 from simulator.api.sight import Alliance, Cloak, Display
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from simulator.api.layers import Frame
     from simulator.api.painting.marks import Point
     from simulator.api.painting.palette import Colour
-    from simulator.api.painting.sprites import Sprite
     from simulator.api.projection import Screen
     from simulator.api.types import Types
+    from simulator.records import UnitType
 
     Image = NDArray[np.uint8]
 
@@ -56,7 +56,8 @@ class ScenePainter:
     def __init__(self, screen: Screen, types: Types) -> None:
         self._screen, self._types = screen, types
         self._scale = 1 / screen.scale
-        self._sprites: dict[tuple[int, int, int, bool, bool], Sprite] = {}
+        self._wardrobe = wardrobe(types.catalog.version, self._scale)
+        self._level = np.array([_level(unit) for unit in types.catalog.units])
         self._bare = np.array([class_of(unit) in BARE for unit in types.catalog.units])
         self._ground = Ground(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)
 
@@ -73,13 +74,13 @@ class ScenePainter:
         return image
 
     def _actors(self, frame: Frame) -> list[Actor]:
-        """The units in view in drawing order: structures, units on the ground, flyers, the larger ones first."""
+        """The units in view in drawing order, from below to above, the larger ones first."""
         sight, screen = frame.sight, self._screen
         x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
         radius = sight.radius * self._scale
         margin = radius * 2 + 4
         near = (x > -margin) & (x < screen.columns + margin) & (y > -margin) & (y < screen.rows + margin)
-        layer = 2 * sight.flying + ~self._types.structure[sight.row]
+        layer = self._level[sight.row]
         rows = np.flatnonzero(near)
         rows = rows[np.lexsort((-radius[rows], layer[rows]))]
         columns = (rows, x[rows], y[rows], radius[rows])
@@ -94,14 +95,10 @@ class ScenePainter:
                 width = 1 + (actor.radius > TALL)
                 marks.ring(image, (actor.x, actor.y), actor.radius * 1.18 + 1.5, palette.SELECTED, width)
         for actor in actors:
-            look = looks[actor.row]
-            sprite = self._sprites.get(look)
-            if sprite is None:
-                sprite = self._sprites[look] = self._sprite(look, actor.radius)
-            sprite.stamp(image, int(actor.x), int(actor.y))
+            self._wardrobe.sprite(looks[actor.row]).stamp(image, int(actor.x), int(actor.y))
 
-    def _looks(self, frame: Frame) -> list[tuple[int, int, int, bool, bool]]:
-        """For each unit what its sprite depends on: type, side, direction, whether translucent, whether unfinished."""
+    def _looks(self, frame: Frame) -> list[Look]:
+        """The look of each unit of the sight."""
         sight = frame.sight
         turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
         turn *= ~self._types.structure[sight.row]
@@ -109,12 +106,7 @@ class ScenePainter:
         veiled |= sight.hallucination | sight.burrowed
         sides = palette.sides(sight.owner, sight.alliance, frame.player)
         columns = (sight.row, sides, turn, veiled, sight.build_progress < 1)
-        return list(zip(*(column.tolist() for column in columns), strict=True))
-
-    def _sprite(self, look: tuple[int, int, int, bool, bool], radius: float) -> Sprite:
-        row, side, direction, veiled, unfinished = look
-        unit = self._types.catalog.units[row]
-        return sprite_of(Look(unit, unit.id, side, radius, direction, veiled, unfinished))
+        return list(map(Look._make, zip(*(column.tolist() for column in columns), strict=True)))
 
     # shots ------------------------------------------------------------------------------------------------------------
 
@@ -184,3 +176,10 @@ class ScenePainter:
             bottom = int(actor.y - actor.radius * 1.12) - 1
             height = 1 if actor.radius < SMALL else 2 if actor.radius < TALL else 3
             marks.bars(image, int(actor.x), bottom, width, height, shares)
+
+
+def _level(unit: UnitType) -> int:
+    """How high above the ground a type is drawn: structures, walkers, those that walk over the others, flyers."""
+    if unit.flying:
+        return 3
+    return 2 if "air" in unit.planes else 0 if unit.structure else 1

@@ -1,7 +1,8 @@
 """Units as small images with soft edges, made once for each look and stamped wherever such a unit is.
 
-A look is a type in a side's colours, at a size, facing one of a few directions. Above: `scene.py`.
-Below: `silhouettes.py`, `palette.py`.
+The body of a type in the colours of a side is drawn once, facing right and twice as large as it will be; turning it,
+shrinking it, and adding what does not turn with it (shadow, light, letters) gives its sprite in one of a few
+directions. Above: `scene.py`. Below: `silhouettes.py`, `palette.py`.
 """
 
 from __future__ import annotations
@@ -9,48 +10,55 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from simulator.api.painting import palette
 from simulator.api.painting.silhouettes import Class, class_of, code_of, outline_of
+from simulator.catalog import load_catalog
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from simulator.api.painting.palette import Colour
+    from simulator.api.painting.palette import Colour, Livery
     from simulator.records import UnitType
 
     Image = NDArray[np.uint8]
+    Floats = NDArray[np.float32]
     Mask = NDArray[Any]  # of bytes; OpenCV's functions do not say so
 
-DIRECTIONS = 24
+DIRECTIONS = 16
 """Directions in which a unit is drawn facing."""
-FINER, LARGE = 4, 12.0
-"""How many times finer than its pixels a sprite is drawn; half of it from this radius on."""
+FINER = 2
+"""How many times larger a body is drawn than it is shown."""
 REACH = 1.8
 """Half of a sprite's size in radii of its unit: the longest outline and its shadow."""
 ONE_LETTER, ALL_LETTERS = 4.6, 7.5
 """Radius in pixels from which a unit carries the first of its letters, and all of them."""
 UPRIGHT = frozenset({Class.STRUCTURE, Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
+RINGED = frozenset({Class.MASSIVE, Class.CAPITAL})
 NOSE = ((1.22, 0), (0.74, 0.2), (0.74, 0))
 """The tick that shows where a unit faces, as half an outline."""
 GHOST, UNFINISHED = 0.5, 0.75
 """Opacity of what is cloaked or not real, and of what is being built."""
+SHADOW = 0.5
+LIGHT = 0.35
+"""How much lighter a body is at its upper left than in the middle."""
+MAX_BYTES = 24 << 20
+"""Sprites of one size that are kept; beyond it all are made anew."""
+_SHIFT = 4
+"""OpenCV takes fractions of pixels as whole numbers of sixteenths."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Look:
-    """Everything that one sprite depends on."""
+class Look(NamedTuple):
+    """What a sprite depends on, besides its size."""
 
-    unit: UnitType = dataclasses.field(hash=False, compare=False)
-    type_id: int
-    side: int  # Alliance
-    radius: float  # pixels
+    row: int  # of the type in the catalog
+    side: int  # key of palette.LIVERIES
     direction: int  # of DIRECTIONS, counter-clockwise from the right
-    ghost: bool  # cloaked, burrowed or a hallucination
+    veiled: bool  # cloaked, burrowed, a hallucination or remembered
     unfinished: bool  # a structure that is being built
 
 
@@ -76,130 +84,154 @@ class Sprite:
         cv2.add(region, self.paint[inside], dst=region)
 
 
-@functools.lru_cache(maxsize=4096)
-def sprite_of(look: Look) -> Sprite:
-    """The sprite of a look."""
-    return _Easel(look).sprite()
+class Wardrobe:
+    """All sprites at one scale; they are made when they are first needed."""
+
+    def __init__(self, units: tuple[UnitType, ...], pixels_per_cell: float) -> None:
+        self._units, self._scale = units, pixels_per_cell
+        self._bodies: dict[tuple[int, int, bool], Floats] = {}
+        self._sprites: dict[Look, Sprite] = {}
+        self._bytes = 0
+
+    def sprite(self, look: Look) -> Sprite:
+        """The sprite of a look."""
+        sprite = self._sprites.get(look)
+        if sprite is None:
+            sprite = self._sprites[look] = self._make(look)
+            self._bytes += 2 * sprite.paint.nbytes
+            if self._bytes > MAX_BYTES:
+                self._sprites, self._bodies, self._bytes = {look: sprite}, {}, 0
+        return sprite
+
+    def _make(self, look: Look) -> Sprite:
+        unit = self._units[look.row]
+        livery, radius = palette.livery_of(unit, look.side), max(unit.radius_shown, 0.1) * self._scale
+        key = (look.row, look.side, look.unfinished)
+        body = self._bodies.get(key)
+        if body is None:
+            body = self._bodies[key] = draw_body(unit, livery, radius, unfinished=look.unfinished)
+            self._bytes += body.nbytes
+        upright = class_of(unit) in UPRIGHT
+        image = _turned(body, 0.0 if upright else 2 * math.pi * look.direction / DIRECTIONS)
+        image[..., :3] *= _light(len(image))
+        if unit.flying:
+            image = _over(_shadow(image[..., 3], radius), image)
+        code = code_of(unit) if radius >= ONE_LETTER else ""
+        if code:
+            image = _over(image, _letters(code if radius >= ALL_LETTERS else code[:1], radius, len(image), livery))
+        opacity = GHOST if look.veiled or class_of(unit) is Class.BARRIER else UNFINISHED if look.unfinished else 1.0
+        return _cut_out(image * np.float32(opacity))
+
+
+@functools.lru_cache(maxsize=4)
+def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
+    """The sprites of a catalog at this scale, shared by all games of the process."""
+    return Wardrobe(load_catalog(version).units, pixels_per_cell)
+
+
+# images of four channels: red, green, blue, all times the cover, and the cover, 0 to 255 ------------------------------
+
+
+def draw_body(unit: UnitType, livery: Livery, radius: float, *, unfinished: bool) -> Floats:
+    """A unit facing right, `FINER` times larger than it is shown: its rim, its body, what is on it."""
+    kind, easel = class_of(unit), _Easel(radius)
+    body = easel.outline(outline_of(unit))
+    easel.lay(cv2.dilate(body, _disc(max(FINER * 3 // 4, round(easel.radius * 0.1)))), livery.rim)
+    easel.lay(body, livery.body)
+    if kind is Class.STRUCTURE:
+        easel.lay(easel.inside(body, 0.16), livery.dark, 0.35 if unfinished else 0.8)
+    if kind in RINGED:
+        ring = easel.inside(body, 0.14)
+        easel.lay(cv2.subtract(ring, cv2.erode(ring, _disc(1))), livery.rim, 0.55)
+    if kind is Class.GEYSER:
+        easel.lay(easel.outline(outline_of(unit), 0.5), (12, 40, 20))
+    if kind is Class.WORKER:
+        easel.lay(easel.outline(((0.1, 0), (-0.2, 0.3), (-0.5, 0))), livery.dark)
+    if kind not in UPRIGHT:
+        easel.lay(easel.outline(NOSE), livery.ink, 0.9)
+    if unfinished:
+        easel.lay(easel.stripes(body), livery.rim, 0.35)
+    return easel.image
 
 
 class _Easel:
-    """One sprite in the making: masks are drawn at several times its size, shrunk, and laid over each other."""
+    """A body in the making: masks laid over each other in their colours."""
 
-    def __init__(self, look: Look) -> None:
-        self.look = look
-        self.kind = class_of(look.unit)
-        self.livery = palette.livery_of(look.unit, look.side)
-        self.half = math.ceil(look.radius * REACH) + 2
-        self.side = 2 * self.half + 1
-        self.finer = FINER if look.radius < LARGE else FINER // 2
-        self.size = self.side * self.finer
-        self.colour = np.zeros((self.side, self.side, 3), np.float32)
-        self.cover = np.zeros((self.side, self.side, 1), np.float32)
+    def __init__(self, radius: float) -> None:
+        self.radius = radius * FINER
+        self.size = (2 * _half(radius) + 1) * FINER
+        self.image = np.zeros((self.size, self.size, 4), np.float32)
 
-    def sprite(self) -> Sprite:
-        body = self._body()
-        rim = cv2.dilate(body, _disc(self._rim_width()))
-        if self.look.unit.flying:
-            self._shadow(rim)
-        self._lay(rim, self.livery.rim)
-        self._lay(body, self.livery.body)
-        self._light(body)
-        self._details(body)
-        if not self.look.ghost or self.look.radius >= ALL_LETTERS:
-            self._letters()
-        return self._finish()
-
-    def _points(self, half_outline: tuple[tuple[float, float], ...], scale: float = 1.0) -> NDArray[np.float64]:
-        """A mirrored outline in pixels of the easel."""
-        left = np.array(half_outline) * scale
-        whole = np.concatenate([left, left[::-1] * (1, -1)])
-        angle = 0.0 if self.kind in UPRIGHT else self.look.direction * 2 * math.pi / DIRECTIONS
-        cos, sin = math.cos(angle), math.sin(angle)
-        x, y = whole[:, 0] * cos - whole[:, 1] * sin, whole[:, 0] * sin + whole[:, 1] * cos
-        middle, radius = self.size / 2, self.look.radius * self.finer
-        return np.stack([middle + x * radius, middle - y * radius], axis=1)
-
-    def _mask(self, points: NDArray[np.float64]) -> Mask:
+    def outline(self, half: tuple[tuple[float, float], ...], scale: float = 1.0) -> Mask:
+        """The inside of a mirrored outline."""
+        left = np.array(half) * (scale * self.radius)
+        points = np.concatenate([left, left[::-1] * (1, -1)]) * (1, -1) + (self.size - 1) / 2
         mask = np.zeros((self.size, self.size), np.uint8)
-        cv2.fillPoly(mask, [np.round(points).astype(np.int32)], 255)
+        cv2.fillPoly(mask, [np.round(points * (1 << _SHIFT)).astype(np.int32)], 255, cv2.LINE_AA, _SHIFT)
         return mask
 
-    def _body(self) -> Mask:
-        return self._mask(self._points(outline_of(self.look.unit)))
+    def inside(self, mask: Mask, margin: float) -> Mask:
+        """A mask without a margin, given in radii."""
+        return cv2.erode(mask, _disc(max(FINER, round(self.radius * margin))))
 
-    def _rim_width(self) -> int:
-        return max(self.finer * 3 // 4, round(self.look.radius * self.finer * 0.1))
+    def stripes(self, mask: Mask) -> Mask:
+        """Every other diagonal stripe of a mask."""
+        line = np.arange(self.size) // (2 * FINER)
+        return mask * ((line[:, None] + line) % 2).astype(np.uint8)
 
-    def _lay(self, mask: Mask, colour: Colour, part: float = 1.0) -> None:
-        cover = self._small(mask) * part
-        self.colour *= 1 - cover
-        self.colour += cover * np.array(colour, np.float32)
-        self.cover += (1 - self.cover) * cover
-
-    def _small(self, mask: Mask) -> NDArray[np.float32]:
-        small = cv2.resize(mask, (self.side, self.side), interpolation=cv2.INTER_AREA)
-        return small.astype(np.float32)[..., None] / np.float32(255)
-
-    def _shadow(self, shape: Mask) -> None:
-        shift = self.look.radius * self.finer * 0.38
-        move = np.array([[0.92, 0, self.size * 0.04 + shift], [0, 0.92, self.size * 0.04 + shift * 1.2]], np.float32)
-        soft = cv2.GaussianBlur(cv2.warpAffine(shape, move, (self.size, self.size)), (0, 0), self.finer * 0.6)
-        self._lay(soft, (0, 0, 0), 0.5)
-
-    def _light(self, body: Mask) -> None:
-        """Bodies are lighter to the upper left."""
-        ramp = np.linspace(0.35, -0.35, self.side, dtype=np.float32)
-        glow = (ramp[:, None] + ramp[None, :])[..., None]
-        self.colour *= 1 + glow * self._small(body)
-
-    def _details(self, body: Mask) -> None:
-        look, livery = self.look, self.livery
-        if self.kind is Class.STRUCTURE:
-            inner = cv2.erode(body, _disc(max(self.finer, round(look.radius * self.finer * 0.16))))
-            self._lay(inner, livery.dark, 0.35 if look.unfinished else 0.8)
-        if self.kind is Class.MASSIVE or self.kind is Class.CAPITAL:
-            ring = cv2.erode(body, _disc(max(self.finer, round(look.radius * self.finer * 0.14))))
-            inner = cv2.erode(ring, _disc(self.finer * 3 // 4))
-            self._lay(cv2.subtract(ring, inner), livery.rim, 0.55)
-        if self.kind is Class.GEYSER:
-            self._lay(self._mask(self._points(outline_of(look.unit), 0.5)), (12, 40, 20))
-        if self.kind is Class.WORKER:
-            self._lay(self._mask(self._points(((0.1, 0), (-0.2, 0.3), (-0.5, 0)))), livery.dark)
-        if self.kind not in UPRIGHT:
-            self._lay(self._mask(self._points(NOSE)), livery.ink, 0.9)
-        if look.unfinished:
-            line = np.arange(self.size) // (2 * self.finer)
-            stripes = ((line[:, None] + line) % 2).astype(np.uint8)
-            self._lay(body * stripes, livery.rim, 0.35)
-
-    def _letters(self) -> None:
-        code, radius = code_of(self.look.unit), self.look.radius
-        if radius < ONE_LETTER or not code:
-            return
-        if radius < ALL_LETTERS:
-            code = code[:1]
-        mask = _text(code, self.size, min(radius * 0.95, 1.9 * radius / len(code)) * self.finer)
-        outline = cv2.dilate(mask, _disc(max(2, self.finer * 3 // 4)))
-        self._lay(outline, self.livery.dark, 0.9)
-        self._lay(mask, self.livery.ink)
-
-    def _finish(self) -> Sprite:
-        """Colours were laid over black, so they carry their cover already."""
-        thin = GHOST if self.look.ghost else UNFINISHED if self.look.unfinished else 1.0
-        if self.kind is Class.BARRIER:
-            thin *= GHOST
-        keep = np.repeat(np.round((1 - self.cover * thin) * 255), 3, axis=2).astype(np.uint8)
-        paint = np.clip(np.round(self.colour * thin), 0, 255 - keep).astype(np.uint8)
-        rows, columns = (np.flatnonzero((keep[..., 0] < 255).any(axis=axis)) for axis in (1, 0))
-        box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-        left, top = int(columns[0]) - self.half, int(rows[0]) - self.half
-        return Sprite(np.ascontiguousarray(paint[box]), np.ascontiguousarray(keep[box]), left, top)
+    def lay(self, mask: Mask, colour: Colour, part: float = 1.0) -> None:
+        """Paints over what is there."""
+        cover = mask.astype(np.float32)[..., None] * np.float32(part / 255)
+        self.image *= 1 - cover
+        self.image += cover * np.array([*colour, 255], np.float32)
 
 
-@functools.cache
-def _disc(radius: int) -> Mask:
-    result: Mask = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+def _half(radius: float) -> int:
+    return math.ceil(radius * REACH) + 2
+
+
+def _turned(body: Floats, angle: float) -> Floats:
+    """A body turned counter-clockwise and shrunk to the size in which it is shown."""
+    side, cos, sin = len(body) // FINER, math.cos(angle) * FINER, math.sin(angle) * FINER
+    middle, large = (side - 1) / 2, (len(body) - 1) / 2
+    inverse = np.array(
+        [[cos, -sin, large - (cos - sin) * middle], [sin, cos, large - (sin + cos) * middle]], np.float32
+    )
+    turned = cv2.warpAffine(body, inverse, (side, side), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    return np.asarray(turned, np.float32)
+
+
+def _over(lower: Floats, upper: Floats) -> Floats:
+    result: Floats = upper + lower * (1 - upper[..., 3:] * np.float32(1 / 255))
     return result
+
+
+def _shadow(cover: Floats, radius: float) -> Floats:
+    """The shadow of a shape, to the lower right of it."""
+    shift = radius * 0.38
+    side = len(cover)
+    move = np.array([[0.92, 0, side * 0.04 + shift], [0, 0.92, side * 0.04 + shift * 1.2]], np.float32)
+    image = np.zeros((side, side, 4), np.float32)
+    image[..., 3] = cv2.warpAffine(cover, move, (side, side)) * np.float32(SHADOW)
+    return image
+
+
+@functools.lru_cache(maxsize=64)
+def _light(side: int) -> Floats:
+    ramp = np.linspace(LIGHT, -LIGHT, side, dtype=np.float32)
+    return (1 + ramp[:, None] + ramp[None, :])[..., None]
+
+
+@functools.lru_cache(maxsize=512)
+def _letters(code: str, radius: float, side: int, livery: Livery) -> Floats:
+    """Capitals in the middle of an image, with an edge around them."""
+    size = side * FINER
+    mask = _text(code, size, min(radius * 0.95, 1.9 * radius / len(code)) * FINER)
+    image = np.zeros((size, size, 4), np.float32)
+    for shape, colour, part in ((cv2.dilate(mask, _disc(1)), livery.dark, 0.9), (mask, livery.ink, 1.0)):
+        cover = shape.astype(np.float32)[..., None] * np.float32(part / 255)
+        image = image * (1 - cover) + cover * np.array([*colour, 255], np.float32)
+    return np.asarray(cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _text(text: str, size: int, height: float) -> Mask:
@@ -212,3 +244,19 @@ def _text(text: str, size: int, height: float) -> Mask:
     at = (round((size - width) / 2), round((size + tall) / 2))
     cv2.putText(mask, text, at, font, scale, 255, thickness, cv2.LINE_AA)
     return mask
+
+
+def _cut_out(image: Floats) -> Sprite:
+    """The part of an image on which there is paint."""
+    cover = np.minimum(np.round(image[..., 3]), 255)
+    rows, columns = np.flatnonzero(cover.any(axis=1)), np.flatnonzero(cover.any(axis=0))
+    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    keep = (255 - cover[box]).astype(np.uint8)
+    paint = np.minimum(np.round(image[box][..., :3]), cover[box][..., None]).astype(np.uint8)
+    half = len(image) // 2
+    return Sprite(paint, cv2.merge([keep] * 3).astype(np.uint8), int(columns[0]) - half, int(rows[0]) - half)
+
+
+@functools.cache
+def _disc(radius: int) -> Mask:
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))

@@ -111,22 +111,14 @@ def test_a_unit_has_the_colour_of_its_side_where_it_stands(make_table: Any, name
     assert near(overview[24 - 6 : 24 + 6, 20 - 6 : 20 + 6], palette.LIVERIES[side].dot, 30) > 0
 
 
-def test_units_face_where_they_face(make_table: Any) -> None:
-    pictures = []
-    for facing in (0.0, np.pi / 2):
-        table = make_table(options((384, 384)))
-        table.put("Marine", 1, 16, 16, facing=facing)
-        pictures.append(table.picture()[192 - 12 : 192 + 13, 192 - 12 : 192 + 13])
-    assert (pictures[0] != pictures[1]).any()
-    lit = [near_body(picture) for picture in pictures]
-    assert lit[0][:, 13:].sum() > lit[0][:, :12].sum()
-    assert lit[1][:12].sum() > lit[1][13:].sum()
-
-
-def near_body(picture: Image) -> NDArray[np.bool_]:
-    """The pixels that are bluer than the ground."""
-    blue: NDArray[np.bool_] = picture[..., 2].astype(int) - picture[..., 0] > 40
-    return blue
+@pytest.mark.parametrize(("facing", "axis", "ahead"), [(0.0, 1, 1), (np.pi / 2, 0, -1), (np.pi, 1, -1), (4.7124, 0, 1)])
+def test_units_face_where_they_face(make_table: Any, facing: float, axis: int, ahead: int) -> None:
+    table = make_table(options((384, 384)))
+    table.put("SiegeTank", 1, 16, 16, facing=facing)  # its gun is longer than it is
+    picture = table.picture().astype(int)
+    blue = np.argwhere(picture[..., 2] - picture[..., 0] > 40)[:, axis] - 191.5
+    behind, before = sorted((blue.min(), blue.max()), key=lambda end: end * ahead)
+    assert abs(before) > abs(behind) + 4
 
 
 def test_bars_tell_life_and_shields(make_table: Any) -> None:
@@ -261,13 +253,27 @@ def test_cloaked_enemies_show_as_shades_to_those_who_asked_only(make_table: Any)
 @pytest.mark.parametrize("version", sorted(set(VERSION_OF_BUILD.values())))
 @pytest.mark.parametrize("pixels_per_cell", [1.5, 10.0, 30.0])
 def test_every_type_can_be_painted(version: str, pixels_per_cell: float) -> None:
-    for unit in load_catalog(version).units:
-        radius = max(unit.radius_shown, 0.1) * pixels_per_cell
-        sprite = sprites.sprite_of(
-            sprites.Look(unit, unit.id, Alliance.ENEMY, radius, 5, ghost=False, unfinished=False)
-        )
-        assert sprite.paint.any(), unit.name
-        assert (sprite.paint.astype(int) + sprite.keep <= 255).all(), unit.name
+    units = load_catalog(version).units
+    wardrobe = sprites.Wardrobe(units, pixels_per_cell)
+    for unit in units:
+        for unfinished in (False, unit.structure):
+            look = sprites.Look(unit.row, Alliance.ENEMY, 5, veiled=False, unfinished=unfinished)
+            sprite = wardrobe.sprite(look)
+            assert sprite.paint.any(), unit.name
+            assert (sprite.paint.astype(int) + sprite.keep <= 255).all(), unit.name
+
+
+def test_sprites_are_kept_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    units = load_catalog().units
+    wardrobe = sprites.Wardrobe(units, 10.0)
+    look = sprites.Look(load_catalog().unit("Zealot").row, Alliance.SELF, 3, veiled=False, unfinished=False)
+    first = wardrobe.sprite(look)
+    assert wardrobe.sprite(look) is first
+    monkeypatch.setattr(sprites, "MAX_BYTES", 1)
+    wardrobe.sprite(look._replace(direction=4))
+    again = wardrobe.sprite(look)
+    assert again is not first
+    assert (again.paint == first.paint).all()
 
 
 def test_outlines_and_codes_are_of_types_that_exist() -> None:
