@@ -52,7 +52,7 @@ class Ground:
 
     def paint(self, world: World, player: int, view: Rect, *, fog: bool) -> Image:
         """A fresh image of this part of the map; with `fog` dark where the player does not see."""
-        terrain, creep = world.map.terrain, world.map.terrain.creep
+        terrain, creep = world.map.terrain, world.creep
         if view != self._view or creep is not self._creep:
             self._image = self._bare(terrain, creep, view)
             self._view, self._creep = view, creep

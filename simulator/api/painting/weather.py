@@ -12,14 +12,15 @@ import math
 from typing import TYPE_CHECKING
 
 import cv2
+import numpy as np
 
 from simulator.api.effects import seen_fields
 from simulator.api.painting import marks, palette
+from simulator.api.sight import API_NEUTRAL, alliance_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from simulator.api.layers import Frame
@@ -29,6 +30,12 @@ if TYPE_CHECKING:
 
     Image = NDArray[np.uint8]
     Point = tuple[float, float]
+
+
+BOLTS = 7
+GOLDEN = 0.618034
+EDGE_SIDE = 0.65
+"""How much of its edge's colour an effect has from the side that made it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,16 +50,16 @@ class Manner:
 
 
 def _bolts(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
-    """Lightning between points of the disc, another one in every loop."""
-    for k in range(5):
-        seed = age * 7 + k * 13
-        points = []
-        for step in range(4):
-            angle = (seed * 2.399 + step * 1.9 + math.sin(seed + step)) % (2 * math.pi)
-            far = radius * (0.15 + 0.8 * ((seed * 37 + step * 53) % 97) / 97)
-            points.append((centre[0] + far * math.cos(angle), centre[1] + far * math.sin(angle)))
+    """Lightning from the middle outward, other bolts in every loop."""
+    glare = palette.mix(colour, (255, 255, 255), 0.75)
+    for k in range(BOLTS):
+        start = 2 * math.pi * (k + age * GOLDEN % 1) / BOLTS
+        points = [
+            (centre[0] + radius * far * math.cos(start + turn), centre[1] + radius * far * math.sin(start + turn))
+            for far, turn in ((far, 0.5 * math.sin(7.0 * k + 3.0 * age + 11.0 * far)) for far in (0.12, 0.36, 0.6, 0.9))
+        ]
         for one, other in itertools.pairwise(points):
-            marks.line(image, one, other, palette.mix(colour, (255, 255, 255), 0.8), 1 + (radius > 40))
+            marks.line(image, one, other, glare, 1 + (radius > 60))
 
 
 def _rings(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
@@ -115,11 +122,12 @@ def paint_above(image: Image, frame: Frame, screen: Screen, fields: list[Field])
 def _paint(image: Image, frame: Frame, screen: Screen, fields: list[Field]) -> None:
     for field in fields:
         manner, age = MANNERS.get(field.effect, OTHER), frame.world.loop - field.begun
+        edge = palette.mix(manner.colour, palette.LIVERIES[_side(field, frame)].dot, EDGE_SIDE)
         radius = max(field.radius / screen.scale, 2.0)
         for point in field.points:
             centre = screen.to_pixels(point[0], point[1], frame.camera)
             if _in_view(centre, 2 * radius, screen):
-                _disc(image, centre, radius, manner)
+                _disc(image, centre, radius, manner, edge)
                 if manner.figure is not None:
                     manner.figure(image, centre, radius, manner.colour, age)
 
@@ -129,7 +137,13 @@ def _in_view(centre: Point, reach: float, screen: Screen) -> bool:
     return -reach < x < screen.columns + reach and -reach < y < screen.rows + reach
 
 
-def _disc(image: Image, centre: Point, radius: float, manner: Manner) -> None:
+def _side(field: Field, frame: Frame) -> int:
+    owner = np.array([field.owner or API_NEUTRAL])
+    alliance = alliance_of(np.array([field.owner]), frame.player)
+    return int(palette.sides(owner, alliance, frame.player)[0])
+
+
+def _disc(image: Image, centre: Point, radius: float, manner: Manner, edge: Colour) -> None:
     """A translucent disc with an edge, painted on the square around it."""
     (rows, columns), reach = image.shape[:2], math.ceil(radius) + 2
     x0, y0 = max(0, int(centre[0]) - reach), max(0, int(centre[1]) - reach)
@@ -140,4 +154,4 @@ def _disc(image: Image, centre: Point, radius: float, manner: Manner) -> None:
     at = (marks.fixed(centre[0] - x0), marks.fixed(centre[1] - y0))
     cv2.circle(over, at, round(radius * (1 << marks.SHIFT)), manner.colour, -1, cv2.LINE_AA, marks.SHIFT)
     region[...] = cv2.addWeighted(over, manner.fill, region, 1 - manner.fill, 0)
-    marks.ring(image, centre, radius, manner.colour, 1 + (radius > 30))
+    marks.ring(image, centre, radius, edge, 1 + (radius > 30))
