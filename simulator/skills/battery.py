@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 OVERCHARGE = "BatteryOvercharge"
+OVERCHARGE_ABILITY = 4107
 
 
 def _begin(world: World, cast: Cast) -> None:
@@ -49,20 +50,17 @@ def _boost(world: World, slot: int) -> float:
     return number(world.catalog.ability(OVERCHARGE_ABILITY), "rate")
 
 
-OVERCHARGE_ABILITY = 4107
-
-
 def _cant_recharge(world: World, cast: Cast) -> Refusal:
     target = cast.target
     if target == NOBODY or world.shields[target] >= world.shields_max[target]:
         return Refusal.CANT_TARGET_THAT_UNIT
     if world.unit_type(target).name == "Interceptor":
         return Refusal.CANT_TARGET_THAT_UNIT
-    enough = number(cast, "least_energy") if _boost(world, cast.slot) <= 1.0 else 0.0
-    at_work = bool(world.channels[cast.slot])
-    if not at_work and (world.energy[cast.slot] < enough or world.energy[cast.slot] <= 0.0):
-        return Refusal.NOT_ENOUGH_ENERGY
-    return Refusal.SUCCESS
+    if world.channels[cast.slot] or _boost(world, cast.slot) > 1.0:
+        return Refusal.SUCCESS
+    energy = float(world.energy[cast.slot])
+    enough = energy > 0.0 and energy >= number(cast, "least_energy")
+    return Refusal.SUCCESS if enough else Refusal.NOT_ENOUGH_ENERGY
 
 
 def _stop(world: World, cast: Cast) -> None:

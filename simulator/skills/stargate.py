@@ -86,8 +86,7 @@ def _retarget(world: World, slot: int) -> None:
 
 
 def _cant_lift(world: World, cast: Cast) -> Refusal:
-    lifted = buffs.has(world, cast.target, LIFT) or buffs.has(world, cast.target, "Yoink")
-    return Refusal.ALREADY_TARGETED if lifted else Refusal.SUCCESS
+    return Refusal.ALREADY_TARGETED if buffs.has(world, cast.target, "Yoink") else Refusal.SUCCESS
 
 
 def _let_go(world: World, cast: Cast) -> None:
