@@ -18,6 +18,10 @@ import numpy as np
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator.api.painting import palette
+from simulator.api.painting.silhouettes import OUTLINES
+from simulator.api.painting.sprites import Look, wardrobe
+from simulator.api.sight import Alliance
 from simulator.catalog import load_catalog
 from simulator.client import Client, command, interface
 
@@ -38,6 +42,8 @@ GROUND, TEXT, FAINT = (20, 18, 17), (240, 236, 232), (168, 160, 152)
 COLOURS = {"own": (255, 150, 70), "enemy": (52, 96, 244)}  # blue, green, red, as OpenCV writes files
 SANS = cv2.FontFace("sans")
 
+GALLERY, GALLERY_COLUMNS, GALLERY_SCALE, CELL = "looks", 4, 20.0, (256, 60)
+"""Name, columns, pixels per world unit and size of a cell of the picture of all looks."""
 LOOPS_PER_SECOND = 22.4
 REACH = 9.0
 """World units around own units within which somebody belongs to the fight."""
@@ -228,15 +234,36 @@ MOMENTS = {
 }
 
 
+def gallery() -> Image:
+    """Every type with an outline of its own, on both sides."""
+    catalog = load_catalog()
+    sprites = wardrobe(catalog.version, GALLERY_SCALE)
+    names = [name for name in OUTLINES if not name.endswith(("Phased", "Burrowed"))]
+    rows = -(-len(names) // GALLERY_COLUMNS)
+    image = np.full((rows * CELL[1], GALLERY_COLUMNS * CELL[0], 3), palette.LOW, np.uint8)
+    for k, name in enumerate(names):
+        row = catalog.unit(name).row
+        left, top = k // rows * CELL[0], k % rows * CELL[1]
+        for side, turn, column in ((Alliance.SELF, 0, 34), (Alliance.ENEMY, 8, 102)):
+            look = Look(row, side, turn, veiled=False, unfinished=False)
+            sprites.sprite(look).stamp(image, left + column, top + CELL[1] // 2)
+        _write(image, name, (left + 138, top + CELL[1] // 2 + 5), TEXT, 14)
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def take(moment: Moment) -> Image:
+    """Plays up to a moment and takes its picture."""
+    stage = Stage(moment.map_name, moment.seed)
+    moment.script(stage)
+    return stage.picture(moment.map_name.partition("/")[2])
+
+
 def main() -> None:
     """Takes the pictures that are named, or all."""
     OUT.mkdir(parents=True, exist_ok=True)
-    for name in sys.argv[1:] or MOMENTS:
-        moment = MOMENTS[name]
-        stage = Stage(moment.map_name, moment.seed)
-        moment.script(stage)
+    for name in sys.argv[1:] or (*MOMENTS, GALLERY):
         path = OUT / f"{name}.webp"
-        image = stage.picture(moment.map_name.partition("/")[2])
+        image = gallery() if name == GALLERY else take(MOMENTS[name])
         if not cv2.imwrite(str(path), image, [cv2.IMWRITE_WEBP_QUALITY, QUALITY]):
             raise SystemExit(f"{path} cannot be written")
         sys.stdout.write(f"{path}: {path.stat().st_size / 1e3:.0f} kB\n")

@@ -48,30 +48,42 @@ class Ground:
         self._grid = grid
         self._view: Rect | None = None
         self._creep: Mask | None = None
-        self._image: Image = np.zeros((rows, columns, 3), np.uint8)
+        self._bare: Image = np.zeros((rows, columns, 3), np.uint8)
+        self._covered = self._bare
 
     def paint(self, world: World, player: int, view: Rect, *, fog: bool) -> Image:
         """A fresh image of this part of the map; with `fog` dark where the player does not see."""
-        terrain, creep = world.map.terrain, world.creep
-        if view != self._view or creep is not self._creep:
-            self._image = self._bare(terrain, creep, view)
-            self._view, self._creep = view, creep
+        height, creep = world.map.terrain.size[1], world.creep
+        if view != self._view:
+            self._bare, self._view, self._creep = self._cut(world.map.terrain, view), view, None
+        if creep is not self._creep:
+            self._covered, self._creep = self._cover(creep, view), creep
         if not fog:
-            return self._image.copy()
-        light = cut(_LIGHT[world.visibility[player, ::-1]], (0, terrain.size[1]), 1, view, self._size)
-        return np.asarray(cv2.multiply(self._image, cv2.cvtColor(light, cv2.COLOR_GRAY2RGB), scale=1 / 255), np.uint8)
+            return self._covered.copy()
+        light = cut(_LIGHT[world.visibility[player, ::-1]], (0, height), 1, view, self._size)
+        shade = cv2.cvtColor(light, cv2.COLOR_GRAY2RGB)
+        return np.asarray(cv2.multiply(self._covered, shade, scale=1 / 255), np.uint8)
 
-    def _bare(self, terrain: Terrain, creep: Mask, view: Rect) -> Image:
+    def _cut(self, terrain: Terrain, view: Rect) -> Image:
         tiles = Cells(*(math.floor(v / TILE) for v in view[:2]), *(math.ceil(v / TILE) for v in view[2:]))
-        image = _mosaic(terrain, tiles, self._density)
-        corner = (tiles.x0 * TILE, tiles.y1 * TILE)
-        colour = cut(image, corner, self._density, view, self._size).astype(np.float32)
-        if creep.any():
-            mask = cut(creep[::-1].astype(np.uint8) * 255, (0, terrain.size[1]), 1, view, self._size)
-            blend(colour, palette.CREEP, CREEP_OPACITY * (mask > 127))
+        image = cut(
+            _mosaic(terrain, tiles, self._density), (tiles.x0 * TILE, tiles.y1 * TILE), self._density, view, self._size
+        )
         if self._grid:
-            blend(colour, palette.GRID, GRID_OPACITY * (_lines(view, self._size) & (colour.max(axis=2) > DARK)))
-        return colour.astype(np.uint8)
+            colour = image.astype(np.float32)
+            blend(colour, palette.GRID, GRID_OPACITY * (_lines(view, self._size) & (image.max(axis=2) > DARK)))
+            image = colour.astype(np.uint8)
+        return image
+
+    def _cover(self, creep: Mask, view: Rect) -> Image:
+        """The bare ground with creep on it."""
+        if not creep.any():
+            return self._bare
+        mask = cut(creep[::-1].astype(np.uint8) * 255, (0, creep.shape[0]), 1, view, self._size) > 127
+        violet = np.array(palette.CREEP, np.float32) * CREEP_OPACITY
+        image = self._bare.copy()
+        image[mask] = (image[mask] * (1 - CREEP_OPACITY) + violet).astype(np.uint8)
+        return image
 
 
 def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
@@ -83,7 +95,7 @@ def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
     return np.concatenate(rows, axis=0)
 
 
-@functools.lru_cache(maxsize=96)
+@functools.lru_cache(maxsize=128)
 def _tile(terrain: Terrain, x: int, y: int, density: int) -> Image:
     """One tile; those off the map are one and the same."""
     cells = Cells(x * TILE, y * TILE, (x + 1) * TILE, (y + 1) * TILE)

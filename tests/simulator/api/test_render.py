@@ -181,6 +181,15 @@ def test_terrain_tells_walkable_ground_from_cliffs(make_table: Any) -> None:
     assert np.median(picture[walk & high]) > 1.2 * np.median(picture[walk & ~high])
 
 
+def test_creep_is_violet(make_table: Any) -> None:
+    table = make_table(options((256, 256), (32, 32)), "char_pit")
+    overview = table.overview().astype(int)
+    violet = overview[..., 0] + overview[..., 2] - 2 * overview[..., 1]
+    creep = table.world.creep[::-1]
+    assert creep.any()
+    assert np.median(violet[creep]) > np.median(violet[~creep & table.world.map.terrain.walk[::-1]]) + 20
+
+
 def test_the_minimap_shows_where_the_camera_looks(make_table: Any) -> None:
     table = make_table(options())
     white = (table.overview() == 255).all(axis=2)
