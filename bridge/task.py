@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
@@ -123,7 +124,9 @@ class TaskConfig(Frozen):
 
     name: KeyName
     description: str = ""
-    map: MapName
+    map: MapName = ""
+    own_map: MapSpec | None = None
+    """Instead of `map`: one that is not in the table, such as a scenario of your own."""
     race: Race | None = None
     """The agents' race; None for the map's own."""
     opponent: Opponent = Opponent()
@@ -161,11 +164,21 @@ class TaskConfig(Frozen):
         _once((str(group) for group in groups), "control group")
         return agents
 
+    @model_validator(mode="after")
+    def _one_map(self) -> Self:
+        if bool(self.map) == (self.own_map is not None):
+            raise ValueError("give either map or own_map")
+        return self
+
     @property
     def map_spec(self) -> MapSpec:
         """The map, with what this task changes of it."""
         changed = {"race": self.race, "opponent": self.opponent.race, "difficulty": self.opponent.difficulty}
-        return known_maps()[self.map].model_copy(update={k: v for k, v in changed.items() if v is not None})
+        if self.own_map is None:
+            spec = known_maps()[self.map]
+        else:
+            spec = self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
+        return spec.model_copy(update={k: v for k, v in changed.items() if v is not None})
 
     def agent(self, name: str) -> AgentConfig:
         """The agent of this name."""

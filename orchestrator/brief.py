@@ -43,7 +43,7 @@ def run_card(config: MatchConfig, game: GameInfo) -> Run:
     return Run(
         run=config.run,
         task=task.name,
-        map_name=task.map,
+        map_name=task.map_spec.name,
         map_sha256=game.map_sha256,
         seed=config.seed,
         episodes=config.episodes,

@@ -68,7 +68,7 @@ def tasks(*, as_json: Json = False) -> None:
     found = list(all_tasks())
     if as_json:
         rows = [
-            {"name": t.name, "map": t.map, "agents": [a.name for a in t.agents], "description": t.description}
+            {"name": t.name, "map": t.map_spec.name, "agents": [a.name for a in t.agents], "description": t.description}
             for t in found
         ]
         typer.echo(json.dumps({"tasks": rows}))

@@ -96,7 +96,7 @@ def _task(task: TaskConfig) -> str:
     wait = "as long as it takes" if task.clock.max_wait_s is None else f"at most {task.clock.max_wait_s:g} s"
     clock = f"clock {code(task.clock.rule)}: {task.clock.step_loops} game loops a step, waits {wait}"
     facts = [
-        f"* Map [{code(task.map)}](maps.md), executor {code(task.executor)}, {clock}.",
+        f"* Map [{code(task.map_spec.name)}](maps.md), executor {code(task.executor)}, {clock}.",
         f"* At most {task.max_actions} actions per team and reply.",
     ]
     if len(task.agents) > 1 and task.communication:

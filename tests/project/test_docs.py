@@ -1,7 +1,7 @@
 """The documentation, executed: its Python runs, its commands parse, its files are valid, its links lead somewhere.
 
 The first word behind a fence is the language, the second says what a block is: `python compile` is not run, since it
-needs a network; `yaml task`, `yaml model` and `yaml agents` are files that are read as such.
+needs a network; `yaml task`, `yaml model` and `yaml agents` are files that are read as such, `yaml scenario` is played.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from protocol.configfile import loads
 from protocol.errors import ConfigError
 from protocol.messages import Briefing
 from protocol.recording import Recording
+from simulator.mapfile import read_map
+from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -46,7 +48,7 @@ GOLDEN = ROOT / "tests" / "khala" / "golden.mcap"
 FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
-LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", *MODELS}
+LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", *MODELS}
 OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "source", "ssh"}
 
 
@@ -211,6 +213,13 @@ def test_a_wrong_command_would_be_found(words: str, fault: str) -> None:
 @pytest.mark.parametrize("block", blocks(*MODELS))
 def test_a_file_on_a_page_is_valid(block: Block) -> None:
     loads(block.text, MODELS[block.info], source=block.name)
+
+
+@pytest.mark.parametrize("block", blocks("yaml scenario"))
+def test_a_scenario_on_a_page_is_played_to_its_end(block: Block) -> None:
+    world = new_game(read_map(block.text.encode(), block.name), seed=1)
+    advance(world, 5000)
+    assert world.ended
 
 
 def test_the_mistake_in_the_tutorial_is_reported_as_it_says() -> None:
