@@ -62,7 +62,7 @@ def _found_base(world: World, player: int, place: tuple[float, float]) -> None:
     if owner.race == "zerg":
         _hatch(world, player, place)
     if len(fields):
-        commands.smart(world, workers, target=world.tag_of(int(fields[min(FIRST_FIELD, len(fields)) - 1])))
+        commands.gather(world, workers, world.tag_of(int(fields[min(FIRST_FIELD, len(fields)) - 1])))
 
 
 def _hatch(world: World, player: int, place: tuple[float, float]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from simulator import commands, melee
+from simulator import casting, commands, melee
 from simulator.places import Column, Grid, RandomPlace
 from simulator.players import NEUTRAL, GameResult
 from simulator.scenario import MELEE_MINERALS
@@ -208,9 +208,20 @@ def _command(world: World, spec: OrderSpec, slots: list[int], *, queue: bool) ->
     elif spec.gather_near is not None:
         fields = melee.mineral_fields(world, point_of(world, spec.gather_near))
         if fields.size:
-            commands.smart(world, slots, target=world.tag_of(int(fields[0])), queue=queue)
+            commands.gather(world, slots, world.tag_of(int(fields[0])), queue=queue)
+    elif spec.unload_at is not None:
+        _unload(world, slots, point_of(world, spec.unload_at), queue=queue)
     elif spec.attack_units_of is not None:
         _attack_all(world, slots, world.units_of(spec.attack_units_of), queue=queue)
+
+
+def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> None:
+    """Each transport among the slots unloads everybody at the point."""
+    for slot in slots:
+        card = world.catalog.cards[int(world.type[slot])]
+        ability = next((ability for ability in card if ability.does == "unload_all_at"), None)
+        if ability is not None:
+            casting.use(world, [slot], ability, point=point, queue=queue)
 
 
 def _attack_all(world: World, slots: list[int], victims: Ints, *, queue: bool) -> None:
