@@ -68,8 +68,9 @@ class Ability:
     """One specific ability; distances are world units, ``range`` from edge to edge, 500 is the whole map.
 
     ``general`` is the id under which clients may also ask for it, ``solo`` says that of several units told to use it
-    only one does, ``transient`` that it leaves the unit's orders alone. ``count`` is how many it makes, ``supply`` what
-    they use in all. ``numbers`` are the skill's own figures.
+    only one does, ``transient`` that it leaves the unit's orders alone, ``overhead`` that the unit has to be right
+    above the point. ``count`` is how many it makes, ``supply`` what they use in all. ``numbers`` are the skill's own
+    figures.
     """
 
     id: int
@@ -96,6 +97,7 @@ class Ability:
     autocast_range: float = 0.0
     autocast_filters: Filter = Filter()
     transient: bool = False
+    overhead: bool = False
     moves: bool = False
     solo: bool = False
     intro_loops: float = 0.0

@@ -74,6 +74,7 @@ class Buff:
     shield_armor_add: float = 0.0
     sight_add: float = 0.0
     detect: float = 0.0
+    radar: float = 0.0
     supply: float = 0.0
     life_regen_n: float = 0.0
     shields_regen_n: float = 0.0

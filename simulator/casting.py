@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import commands, prices, supply
 from simulator.casts import Cast
-from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 ANYWHERE: Final = 500.0
 ORDINARY: Final = frozenset({"smart", "stop", "move", "patrol", "hold_position", "scan_move", "attack"})
 """What ``commands`` carries out; everything else is a skill."""
-MORPHS: Final = frozenset({"morph", "grow", "root", "burrow_tumor"})
+MORPHS: Final = frozenset({"morph", "grow", "root", "burrow_tumor", "lift", "land"})
 """Abilities whose time, or a random part of it, passes before they take effect."""
 PAID_FIRST: Final = frozenset({"grow"})
 """Those that are paid for when they begin: their time passes after the effect."""
@@ -45,29 +44,20 @@ def is_modelled(ability: Ability) -> bool:
     return ability.does in ORDINARY or ability.does in SKILLS
 
 
+def as_is(world: World, slot: int, ability: Ability) -> Ability:
+    """The ability as a unit has it now: with what its owner's upgrades change."""
+    return world.stats.ability(int(world.owner[slot]), ability)
+
+
 def prep_loops(world: World, slot: int, ability: Ability) -> float:
     """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
+    ability = as_is(world, slot, ability)
     loops = ability.intro_loops + ability.prep_loops
     if ability.does not in MORPHS:
         return loops
-    takes, random = _morph_loops(world, int(world.owner[slot]), ability)
-    if random:
-        takes += world.rng.random() * random
-    return loops + takes
-
-
-def _morph_loops(world: World, owner: int, ability: Ability) -> tuple[float, float]:
-    """Loops that a morph takes with the owner's upgrades, and the most that chance adds to them."""
-    takes, random = 0.0 if ability.does in PAID_FIRST else ability.loops, ability.random_loops
-    for number in world.players[owner].upgrades:
-        for change in world.catalog.upgrade(number).changes:
-            if change.catalog == "abil" and change.entry == ability.link and change.op == "subtract":
-                loops = float(change.value) * LOOPS_PER_NORMAL_SECOND
-                if change.field.endswith("RandomDelayMax"):
-                    random -= loops
-                elif "[Stats]" in change.field:
-                    takes -= loops
-    return max(takes, 0.0), max(random, 0.0)
+    if ability.does not in PAID_FIRST:
+        loops += ability.loops
+    return loops + (world.rng.random() * ability.random_loops if ability.random_loops else 0.0)
 
 
 # may it ---------------------------------------------------------------------------------------------------------------
@@ -211,6 +201,8 @@ def in_range(world: World, cast: Cast, *, slop: float | None = None) -> bool:
 
 def reach(world: World, cast: Cast) -> float:
     """From centre to centre, how near a caster must come."""
+    if cast.ability.overhead:
+        return 0.0
     body = float(world.radius[cast.target]) if cast.target != NOBODY else 0.0
     return cast.ability.range + float(world.radius[cast.slot]) + body
 
@@ -232,8 +224,8 @@ def use(
     Those that can't are left alone. Of several only the nearest uses an ability that is ``solo``.
     """
     victim = world.slot_of(target)
-    casts = [Cast(slot, ability, victim, point) for slot in slots]
-    casts = [c for c in casts if refusal(world, c.slot, ability) is Refusal.SUCCESS]
+    casts = [Cast(slot, as_is(world, slot, ability), victim, point) for slot in slots]
+    casts = [c for c in casts if refusal(world, c.slot, c.ability) is Refusal.SUCCESS]
     casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
     give = SKILLS[ability.does].give
     if give is not None:

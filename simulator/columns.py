@@ -113,6 +113,8 @@ class UnitColumns:
     load: Ints = state(int)  # resources that it carries
     contents: Ints = state(int)  # resources that are left in it
     work_until: Floats = state(float)  # loop at which it is done at its resource
+    zone: Floats = state(float, width=2)  # middle of the circle in which alone it fires
+    zone_radius: Floats = state(float)  # that circle's radius, 0 for who fires anywhere
     help_loop: Ints = state(int, LONG_AGO)  # last loop this unit called for help
     nav_point: Floats = state(float, width=2)  # next corner of the path
     nav_loop: Ints = state(int)  # loop at which the path is looked over again

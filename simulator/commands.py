@@ -10,6 +10,8 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from simulator import harvesting
 from simulator.columns import NOBODY
 from simulator.orders import (
@@ -181,14 +183,16 @@ def debug_set_value(world: World, tag: int, *, life: float | None = None, shield
 
 
 def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
-    """Give a player a finished upgrade; its numbers count from now on."""
+    """Give a player a finished upgrade; its numbers count from now on, and more life is there at once."""
     owned = world.players[player].upgrades
     if upgrade_id not in owned:
         owned.append(world.catalog.upgrade(upgrade_id).id)
         owned.sort()
         world.stats.apply(player, owned)
-        for slot in world.units_of(player).tolist():
+        for slot in np.flatnonzero(world.alive & (world.owner == player)).tolist():
+            before = float(world.life_max[slot])
             world.refresh(slot)
+            world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
 
 
 # what a unit can do ---------------------------------------------------------------------------------------------------

@@ -57,6 +57,12 @@ class Mechanics:
     crowd_near: float
     crowd_patience: int
     vision_period: int
+    emp_speed_n: float
+    yamato_speed_n: float
+    mine_missile_speed_n: float
+    matrix_speed_n: float
+    shredder_speed_n: float
+    knockback_loops: int
     high_ground_step: float
     harvest_gap: float
     harvest_search: float

@@ -89,7 +89,7 @@ def _units(world: World, slot: int, need: Need) -> float:
     player = int(world.owner[slot])
     if need.state.endswith("_here"):
         return float(world.addon[slot] >= 0 and int(world.type[world.addon[slot]]) in rows)
-    mine = world.live[world.owner[world.live] == player]
+    mine = np.flatnonzero(world.alive & (world.owner == player))  # those inside others count as well
     of_kind = np.isin(world.type[mine], list(rows))
     if need.state == "done":
         of_kind &= world.build_progress[mine] >= 1.0

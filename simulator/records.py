@@ -220,6 +220,7 @@ class UnitType:
     provides: float = 0.0
     cost: tuple[int, int] = (0, 0)
     build_loops: float = 0.0
+    repair_n: float = 0.0
     ability: int = 0
     tech_requirement: int = 0
     require_attached: bool = False
@@ -265,6 +266,11 @@ class UnitType:
     def radius_shown(self) -> float:
         """The radius that the API reports: the footprint's for structures, the body's otherwise."""
         return self.radius if self.radius_api is None else self.radius_api
+
+    @property
+    def repair_loops(self) -> float:
+        """Loops in which one worker mends all its life; as long as it takes to make where the data says nothing."""
+        return self.repair_n * 16.0 or self.build_loops
 
     def weapon_against(self, plane: str) -> Weapon | None:
         """The weapon with the longest range that a unit of this type can aim at ``plane`` by itself, or None."""

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from simulator.abilities import Ability
     from simulator.catalog import Catalog, Hit, UnitType, Weapon
     from simulator.geometry import Floats
     from simulator.records import Change
@@ -98,16 +100,29 @@ class Stats:
         self.plane_bits: NDArray[np.int64] = np.array([_plane_bits(u) for u in catalog.units])
         self.beam: NDArray[np.bool_] = np.array([w.is_beam for w in catalog.weapons])
         self.kamikaze: NDArray[np.bool_] = np.array([w.is_kamikaze for w in catalog.weapons])
+        self._changes: list[_Changes] = [_Changes(catalog, ()) for _ in range(players)]
+        self._abilities: list[dict[int, Ability]] = [{} for _ in range(players)]
         for player in range(players):
             self.apply(player, ())
 
     def apply(self, player: int, upgrades: Iterable[int]) -> None:
         """Recompute the rows of ``player`` for exactly these upgrade ids."""
-        changes = _Changes(self.catalog, upgrades)
+        changes = self._changes[player] = _Changes(self.catalog, upgrades)
+        self._abilities[player] = {
+            a.id: _ability(a, changes) for a in self.catalog.abilities if a.link in changes.links
+        }
         for unit in self.catalog.units:
             self._apply_unit(player, unit, changes)
         for weapon in self.catalog.weapons:
             self._apply_weapon(player, weapon, changes)
+
+    def ability(self, player: int, ability: Ability) -> Ability:
+        """The ability as it is for a player now: with the range, cooldown and times that upgrades change."""
+        return self._abilities[player].get(ability.id, ability)
+
+    def changed(self, player: int, catalog: str, entry: str, field: str, base: float) -> float:
+        """A number of the game's data as the player's upgrades have it; in the data's own unit."""
+        return self._changes[player].value(catalog, entry, field, base)
 
     def _apply_unit(self, player: int, unit: UnitType, changes: _Changes) -> None:
         def value(field: str, base: float) -> float:
@@ -150,6 +165,7 @@ class _Changes:
                 if isinstance(change.value, int | float):
                     key = (change.catalog, change.entry, change.field)
                     self._by_field.setdefault(key, []).append((change.op, float(change.value)))
+        self.links = {entry for catalog, entry, _ in self._by_field if catalog == "abil"}
 
     def value(self, catalog: str, entry: str, field: str, base: float) -> float:
         for op, amount in self._by_field.get((catalog, entry, field), ()):
@@ -165,6 +181,27 @@ class _Changes:
         prefix = "AttributeBonus["
         fields = (f for c, e, f in self._by_field if c == "effect" and e == effect)
         return [f[len(prefix) : -1].lower() for f in fields if f.startswith(prefix)]
+
+
+MORPH_TIME: Final = ("InfoArray[0].SectionArray[Stats].DurationArray[Delay]",
+                     "InfoArray[0].SectionArray[Stats].DurationArray[Duration]")  # fmt: skip
+
+
+def _ability(ability: Ability, changes: _Changes) -> Ability:
+    """An ability with changed range, cooldown and morphing time; the data's times are normal seconds."""
+
+    def value(field: str, base: float) -> float:
+        return changes.value("abil", ability.link, field, base)
+
+    second = LOOPS_PER_NORMAL_SECOND
+    return dataclasses.replace(
+        ability,
+        range=value("Range[0]", ability.range),
+        autocast_range=value("AutoCastRange", ability.autocast_range),
+        cooldown_loops=value("Cost[0].Cooldown.TimeUse", ability.cooldown_loops / second) * second,
+        loops=max(ability.loops + sum(value(field, 0.0) for field in MORPH_TIME) * second, 0.0),
+        random_loops=max(value("InfoArray[0].RandomDelayMax", ability.random_loops / second) * second, 0.0),
+    )
 
 
 def _damage(hit: Hit, changes: _Changes) -> Damage:

@@ -117,6 +117,7 @@ def _change(world: World, slot: int, buff: Buff) -> None:
     if buff.speed_max_n is not None:
         world.step_max[slot] = min(float(world.step_max[slot]), buff.speed_max_n / second)
     world.step_gain[slot] = world.step_gain[slot] * buff.acceleration + buff.acceleration_add_n / second**2
+    world.step_loss[slot] += buff.deceleration_add_n / second**2
     world.attack_rate[slot] *= buff.attack_rate * buff.time
     world.range_add[slot] += buff.range_add
     world.armor_add[slot] += buff.armor_add

@@ -214,6 +214,7 @@ class World(UnitColumns):
         """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept."""
         owner = int(self.owner[slot])
         before = float(self.life_max[slot]) or 1.0
+        had_energy = self.energy_max[slot] > 0.0
         self.type[slot] = unit.row
         self.burrowed[slot] = unit.burrowed
         self.ground.unblock(slot)
@@ -221,7 +222,8 @@ class World(UnitColumns):
         self.ground.block(slot, self.footprint_cells(slot))
         self.life[slot] = min(float(self.life[slot]) * float(self.life_max[slot]) / before, float(self.life_max[slot]))
         self.shields[slot] = min(float(self.shields[slot]), float(self.stats.shields_max[owner, unit.row]))
-        self.energy[slot] = min(float(self.energy[slot]), float(self.stats.energy_max[owner, unit.row]))
+        energy = float(self.energy[slot] if had_energy else self.stats.energy_start[owner, unit.row])
+        self.energy[slot] = min(energy, float(self.stats.energy_max[owner, unit.row]))
         wanted = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
         self.autocast.pop(slot, None)
         if wanted:

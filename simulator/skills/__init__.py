@@ -28,6 +28,7 @@ from simulator.skills import (
     sentry,
     stargate,
     templar,
+    terran,
 )
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ SKILLS: Final[dict[str, Skill]] = {
     **stargate.SKILLS,
     **mothership.SKILLS,
     **battery.SKILLS,
+    **terran.SKILLS,
 }
 FIELDS: Final[dict[str, FieldRule]] = {
     **sentry.FIELDS,
@@ -56,14 +58,17 @@ FIELDS: Final[dict[str, FieldRule]] = {
     **robotics.FIELDS,
     **stargate.FIELDS,
     **mothership.FIELDS,
+    **terran.FIELDS,
 }
 TICKS: Final[dict[str, BuffRule]] = {
     **templar.TICKS,
     **mothership.TICKS,
+    **terran.TICKS,
 }
 ENDS: Final[dict[str, BuffRule]] = {
     **robotics.ENDS,
     **stargate.ENDS,
+    **terran.ENDS,
 }
 FINALS: Final[dict[str, BuffRule]] = {}
 PASSIVES: Final[dict[str, UnitRule]] = {
@@ -72,5 +77,6 @@ PASSIVES: Final[dict[str, UnitRule]] = {
     **robotics.PASSIVES,
     **stargate.PASSIVES,
     **mothership.PASSIVES,
+    **terran.PASSIVES,
 }
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}

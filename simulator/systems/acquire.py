@@ -19,6 +19,7 @@ from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.stats import AIR_PLANE, GROUND_PLANE
+from simulator.systems.engagement import inside_zone
 from simulator.targets import disengage, engage
 
 if TYPE_CHECKING:
@@ -159,6 +160,9 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     sparing = world.spares_structures.take(seekers)
     if some(sparing):
         wanted &= ~(sparing[:, None] & world.walled.take(foes))
+    if world.fields:
+        k, m = wanted.shape
+        wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)
     rank = world.priority[foes] * PRIORITY_WEIGHT
     threat = (_threatened_planes(world, foes) & world.plane_bits[seekers, None]) != 0
     worth = np.where(wanted, rank + THREAT_WEIGHT * threat - gap, OUT_OF_SIGHT)

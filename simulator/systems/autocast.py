@@ -32,7 +32,7 @@ def look_out(world: World) -> None:
     for slot in sorted(world.autocast):
         if world.carrier[slot] == NOBODY and world.can_cast[slot] and not world.casts[slot]:
             for number in world.autocast[slot]:
-                if _try(world, slot, world.catalog.ability(number)):
+                if _try(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
                     break
 
 

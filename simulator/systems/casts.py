@@ -34,7 +34,7 @@ def carry_on(world: World) -> None:
 
 def current(world: World, slot: int) -> Cast:
     """The cast that a unit's current order asks for."""
-    ability = world.catalog.ability(int(world.order_ability[slot]))
+    ability = casting.as_is(world, slot, world.catalog.ability(int(world.order_ability[slot])))
     x, y = world.order_point[slot].tolist()
     point = (x, y) if world.order_aimed[slot] else None
     return Cast(slot, ability, int(world.order_target[slot]), point, world.loop, int(world.type[slot]))
@@ -77,7 +77,7 @@ def _begin(world: World, cast: Cast) -> None:
 def _take_effect(world: World, cast: Cast) -> None:
     slot, skill = cast.slot, casting.skill_of(cast.ability)
     why = Refusal.SUCCESS
-    if world.cast_at[slot] < world.loop:  # it took time to prepare: look again
+    if world.cast_at[slot] < world.loop and not world.bound[slot]:  # it took time to prepare: look again
         why = casting.refusal(world, slot, cast.ability)
         if why is Refusal.SUCCESS and not casting.in_range(world, cast):
             why = Refusal.TARGET_IS_OUT_OF_RANGE

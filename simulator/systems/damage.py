@@ -7,7 +7,7 @@ fraction before armor. The formula's source is in ``data/SOURCES.md``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from simulator.columns import Ints
     from simulator.records import Affects, Search
     from simulator.shots import Shot
@@ -23,6 +25,10 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 BEHIND = 1e-9
+
+IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {}
+"""What a hit does to its target beside its damage, by the hit's effect: a function of the world, the attacker (a slot
+or NOBODY), its owner and the target."""
 
 
 def hit_with(world: World, shot: Shot) -> None:
@@ -43,8 +49,12 @@ def hit_with(world: World, shot: Shot) -> None:
 
 def hit_target(world: World, shot: Shot) -> None:
     """Carry out a hit on its target alone, if that still lives."""
-    if shot.target != NOBODY:
-        strike(world, shot.source, shot.owner, shot.target, world.stats.damage[shot.owner][shot.weapon][shot.hit])
+    if shot.target == NOBODY:
+        return
+    damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
+    if damage.hit.effect in IMPACTS:
+        IMPACTS[damage.hit.effect](world, shot.source, shot.owner, shot.target)
+    strike(world, shot.source, shot.owner, shot.target, damage)
 
 
 def _give_life(world: World, slot: int) -> None:

@@ -18,7 +18,7 @@ from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 
 if TYPE_CHECKING:
-    from simulator.columns import Ints
+    from simulator.columns import Bools, Ints
     from simulator.world import World
 
 EDGE_TOLERANCE = 1e-9
@@ -81,6 +81,8 @@ def _close_in(world: World, slots: Ints) -> None:
         near |= swinging & (gap <= reach + world.slop.take(slots))
     near &= gap >= world.reach_min.take(slots)
     near &= world.can_attack.take(slots)
+    if world.fields:
+        near &= inside_zone(world, slots, target)
     world.beaming[slots] &= near
     world.gap[slots] = gap
     world.in_reach[slots] = near
@@ -94,6 +96,14 @@ def _close_in(world: World, slots: Ints) -> None:
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
     world.wants[slots] = beyond
+
+
+def inside_zone(world: World, slots: Ints, targets: Ints) -> Bools:
+    """(k,) whether each target touches the circle in which alone the unit fires; most fire anywhere."""
+    radius = world.zone_radius.take(slots)
+    offset = world.pos.take(targets, 0) - world.zone.take(slots, 0)
+    inside: Bools = geometry.length(offset) <= radius + world.radius.take(targets)
+    return inside | (radius <= 0.0)
 
 
 def _follow(world: World) -> None:
@@ -130,13 +140,14 @@ def _approach(world: World) -> None:
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])
         ability = world.catalog.ability(int(world.order_ability[slot]))
+        ability = world.stats.ability(int(world.owner[slot]), ability)
         aimed = target != NOBODY or bool(world.order_aimed[slot])
         waits = world.cast_at[slot] < 0.0 and not world.channels[slot]
         if not (aimed and waits) or ability.range >= ANYWHERE:
             continue
         goal = world.pos[target] if target != NOBODY else world.order_point[slot]
         body = float(world.radius[target]) if target != NOBODY else 0.0
-        stop_at = ability.range + float(world.radius[slot]) + body
+        stop_at = 0.0 if ability.overhead else ability.range + float(world.radius[slot]) + body
         dx, dy = (goal - world.pos[slot]).tolist()
         world.goal[slot] = goal
         world.stop_at[slot] = max(stop_at - MECHANICS.chase_slack, 0.0)

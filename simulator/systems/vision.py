@@ -51,7 +51,7 @@ def _seen_units(world: World, player: int) -> NDArray[np.bool_]:
         return seen
     slots = world.live
     own = world.owner[slots] == player
-    hidden = (world.cloaked[slots] | world.burrowed[slots]) & ~own
+    hidden = world.cloaked[slots] & ~own  # whatever burrows is cloaked until something uncovers it
     if hidden.any():
         found = np.flatnonzero(hidden)
         hidden[found[_detected(world, player, slots[found])]] = False

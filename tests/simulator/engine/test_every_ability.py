@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting
+from simulator import buffs, casting
 from simulator.abilities import Aim
 from simulator.casts import Cast
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
@@ -98,7 +98,32 @@ def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point
                 yield NOBODY, (px, py)
 
 
-PREPARE: dict[str, Callable[[World, int], None]] = {}
+def _bear(*names: str) -> Callable[[World, int], None]:
+    """Lay the first of the buffs that the version has."""
+    return lambda world, slot: buffs.apply(world, slot, next(n for n in names if n in world.catalog.buff_of_name))
+
+
+def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], None]:
+    """Have the unit use another ability first, at the enemy's Marine or beside it."""
+
+    def prepare(world: World, slot: int) -> None:
+        ability = world.catalog.ability(number)
+        foe = next(s for s in world.units_of(2).tolist() if world.unit_type(s).name == "Roach")
+        tag = world.tag_of(foe) if Aim.UNIT in ability.aim else 0
+        casting.use(world, [slot], ability, target=tag, point=point if Aim.POINT in ability.aim else None)
+        advance(world, 2)
+
+    return prepare
+
+
+PREPARE: dict[str, Callable[[World, int], None]] = {
+    "ghost_weapons_free": _bear("GhostHoldFireB"),
+    "ghost_cloak_off": _bear("GhostCloak"),
+    "banshee_cloak_off": _bear("BansheeCloak"),
+    "cancel_lock_on_cancel": _use(2350),
+    "cancel_channel_snipe": _use(2714),
+    "cancel_tac_nuke_strike": _use(1622),
+}
 """By a skill's name: what has to be the case before a unit can use it."""
 
 

@@ -1,0 +1,104 @@
+"""Flight: missiles of abilities, which chase a unit or head for a point and do something where they arrive.
+
+A missile of a weapon lives in ``world.missiles``; one of an ability is a field that moves, because what it does on
+arrival is a rule and not damage. Skills call ``launch`` and put a rule of theirs into ``ARRIVALS``; a missile whose
+target has died or can't be touched any more is lost. Speeds are estimates (see ``data/mechanics.yaml``).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from simulator.buffs import FOREVER
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
+from simulator.fields import Field
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.abilities import Ability
+    from simulator.casts import Cast
+    from simulator.fields import Point
+    from simulator.skills.skill import FieldRule
+    from simulator.world import World
+
+NO_TARGET: Final = 0
+
+ARRIVALS: Final[dict[str, Callable[[World, Field, int], None]]] = {}
+"""What a missile does where it arrives, by the ability's ``does``: a function of the world, the missile (its place is
+where it arrived) and the target (a slot, or NOBODY for one that was sent to a point)."""
+
+
+def launch(world: World, cast: Cast, speed_n: float) -> Field:
+    """Send a missile on its way from the caster to what the cast is aimed at; it flies from the next loop on."""
+    return launch_at(world, cast.ability, cast.slot, cast.target, speed_n, point=cast.point)
+
+
+def launch_at(
+    world: World, ability: Ability, source: int, target: int, speed_n: float, *, point: Point | None = None
+) -> Field:
+    """Send an ability's missile from a unit to another one, or with no target (NOBODY) to a point."""
+    x, y = world.pos[source].tolist()
+    homing = target != NOBODY
+    goal = point if point is not None and not homing else (x, y)
+    missile = Field(
+        "missile",
+        owner=int(world.owner[source]),
+        points=[(x, y)],
+        radius=0.0,
+        begun=world.loop,
+        end=FOREVER,
+        due=world.loop + 1,
+        ability=ability.id,
+        source=world.tag_of(source),
+        target=world.tag_of(target) if homing else NO_TARGET,
+        memory={"step": speed_n / LOOPS_PER_NORMAL_SECOND, "x": goal[0], "y": goal[1], "from_x": x, "from_y": y},
+    )
+    world.fields.append(missile)
+    return missile
+
+
+def fly(world: World, missile: Field) -> None:
+    """Move a missile by one loop, and let it arrive at its target's edge or at its point."""
+    target = world.slot_of(missile.target) if missile.target else NOBODY
+    if missile.target and (target == NOBODY or not _touchable(world, target)):
+        end(world, missile)
+        return
+    goal = _goal(world, missile, target)
+    body = float(world.radius[target]) if target != NOBODY else 0.0
+    (x, y), step = missile.at, missile.memory["step"]
+    away = math.hypot(goal[0] - x, goal[1] - y)
+    if away - body > step:
+        missile.points = [(x + (goal[0] - x) * step / away, y + (goal[1] - y) * step / away)]
+        return
+    missile.points = [goal]
+    end(world, missile)
+    ability = world.catalog.ability(missile.ability)
+    ARRIVALS[ability.does](world, missile, target)
+
+
+def end(world: World, missile: Field) -> None:
+    """Take a missile, or any other field, out of the world at the end of this loop."""
+    missile.end = world.loop
+
+
+def flown(missile: Field) -> float:
+    """How far a missile is from where it was launched."""
+    (x, y), memory = missile.at, missile.memory
+    return math.hypot(x - memory["from_x"], y - memory["from_y"])
+
+
+def _touchable(world: World, target: int) -> bool:
+    return bool(world.targetable[target]) and world.carrier[target] == NOBODY
+
+
+def _goal(world: World, missile: Field, target: int) -> Point:
+    if target == NOBODY:
+        return missile.memory["x"], missile.memory["y"]
+    x, y = world.pos[target].tolist()
+    return x, y
+
+
+FIELDS: Final[dict[str, FieldRule]] = {"missile": fly}

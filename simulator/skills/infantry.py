@@ -1,0 +1,146 @@
+"""Infantry: stimpacks, concussive shells and the Reaper's charge.
+
+The Reaper's leaps are its mover's (``pathing``), its regeneration out of combat and combat shields are numbers of the
+tables.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs
+from simulator.columns import NOBODY
+from simulator.fields import Field, source_slot
+from simulator.mechanics import MECHANICS
+from simulator.skills.basics import on_self
+from simulator.skills.skill import Skill, around, number, place_of
+from simulator.systems.damage import wound
+from simulator.traits import Layer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.casts import Cast
+    from simulator.skills.skill import FieldRule
+    from simulator.world import World
+
+# concussive shells ----------------------------------------------------------------------------------------------------
+
+SHELLS: Final = "PunisherGrenades"
+
+
+def _slow(world: World, source: int, owner: int, victim: int) -> None:
+    """Slow whom a grenade hits when its owner has the shells; nothing massive and no structure."""
+    unit = world.unit_type(victim)
+    researched = world.catalog.upgrade(SHELLS).id in world.players[owner].upgrades
+    if (
+        researched
+        and not unit.structure
+        and "massive" not in unit.attributes
+        and not buffs.has(world, victim, "Frenzy")
+    ):
+        buffs.apply(world, victim, "Slow", source=source, owner=owner)
+
+
+# KD8 charge -----------------------------------------------------------------------------------------------------------
+
+STAYS_PUT: Final = frozenset(
+    {"Larva", "Egg", "BanelingCocoon", "BroodLordCocoon", "RavagerCocoon", "LurkerMPEgg", "TransportOverlordCocoon"}
+)
+UNTOUCHED: Final = frozenset({"DisruptorPhased", "AdeptPhaseShift"})
+STEP_TESTED: Final = 0.25
+
+
+def _throw_charge(world: World, cast: Cast) -> None:
+    """Lay a charge that goes off after its fuse, hurts all on the ground around it and throws them outwards."""
+    point, fuse = place_of(world, cast), number(cast, "fuse_loops")
+    owner = int(world.owner[cast.slot])
+    charge = world.spawn(world.catalog.unit("KD8Charge"), owner, point)
+    world.fields.append(
+        Field(
+            "kd8_charge",
+            owner=owner,
+            points=[point],
+            radius=number(cast, "radius"),
+            begun=world.loop,
+            end=world.loop + fuse,
+            due=world.loop + fuse,
+            ability=cast.ability.id,
+            source=world.tag_of(cast.slot),
+            target=world.tag_of(charge),
+        )
+    )
+
+
+def _explode(world: World, charge: Field) -> None:
+    """Hurt everybody on the ground around a charge, friends as well, and throw them outwards."""
+    ability, source = world.catalog.ability(charge.ability), source_slot(world, charge)
+    body = world.slot_of(charge.target)
+    for slot in around(world, charge.at, charge.radius, plane="ground"):
+        if world.unit_type(slot).name not in UNTOUCHED:
+            wound(world, source, charge.owner, slot, number(ability, "damage"))
+            _throw(world, charge, slot)
+    if body != NOBODY:
+        world.life[body] = 0.0
+        world.attacker[body] = NOBODY
+
+
+def _throw(world: World, charge: Field, slot: int) -> None:
+    unit = world.unit_type(slot)
+    firm = unit.structure or "massive" in unit.attributes or bool(world.burrowed[slot]) or unit.name in STAYS_PUT
+    if firm or world.life[slot] <= 0.0 or buffs.has(world, slot, "Frenzy"):
+        return
+    ability = world.catalog.ability(charge.ability)
+    loops = MECHANICS.knockback_loops
+    buffs.apply(world, slot, "ReaperKD8Knockback", owner=charge.owner, loops=loops)
+    (x, y), (from_x, from_y) = world.pos[slot].tolist(), charge.at
+    away = math.hypot(x - from_x, y - from_y)
+    across, along = ((x - from_x) / away, (y - from_y) / away) if away > 0.0 else (1.0, 0.0)
+    step = number(ability, "knockback_distance") / loops
+    world.fields.append(
+        Field(
+            "knockback",
+            owner=charge.owner,
+            points=[(x, y)],
+            radius=0.0,
+            begun=world.loop,
+            end=world.loop + loops,
+            due=world.loop + 1,
+            target=world.tag_of(slot),
+            memory={"dx": across * step, "dy": along * step},
+        )
+    )
+
+
+def _fly_back(world: World, item: Field) -> None:
+    """Carry a thrown unit on, until something is in its way that it can't walk on."""
+    slot = world.slot_of(item.target)
+    if slot == NOBODY or world.carrier[slot] != NOBODY:
+        item.end = world.loop
+        return
+    x, y = world.pos[slot].tolist()
+    goal = x + item.memory["dx"], y + item.memory["dy"]
+    surface = world.ground.surface(Layer(int(world.layer[slot])))
+    there = world.pos[slot] * 0.0 + goal
+    if not surface.flat[surface.cell(there[None])][0]:
+        item.end = world.loop
+        return
+    world.pos[slot] = world.guard[slot] = there
+    world.nav_loop[slot] = 0
+    world.settled = -1
+
+
+SKILLS: Final = {
+    "stimpack": Skill(on_self("Stimpack")),
+    "stimpack_marauder": Skill(on_self("StimpackMarauder")),
+    "kd8_charge": Skill(
+        _throw_charge,
+        estimates=(
+            "a KD8 charge lies at its place at once; in the game it is thrown there",
+            "a thrown unit moves evenly for a fixed time and stops at the first cell that it can't walk on",
+        ),
+    ),
+}
+FIELDS: Final[dict[str, FieldRule]] = {"kd8_charge": _explode, "knockback": _fly_back}
+IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {"PunisherGrenadesU": _slow}

@@ -1,0 +1,101 @@
+"""Terran structures that fly: lifting off, landing, and the add-ons that stay behind and are taken up again.
+
+An add-on belongs to the structure at its left; without one it is a plain tech lab or reactor that anybody of its owner
+may land at. Making add-ons, and what they are good for, is production's matter.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.skills import sites, teleport
+from simulator.skills.skill import Skill
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast, Point
+    from simulator.records import UnitType
+    from simulator.world import World
+
+KINDS: Final = ("TechLab", "Reactor")
+BESIDE: Final = (2.5, -0.5)
+"""Where an add-on stands, from the middle of its structure."""
+CLOSE: Final = 0.1
+
+
+def _lift(world: World, cast: Cast) -> None:
+    """Take off and leave the add-on behind."""
+    slot = cast.slot
+    detach(world, slot)
+    world.become(slot, world.catalog.unit(cast.ability.unit))
+
+
+def _can_lift(world: World, cast: Cast) -> Refusal:
+    """Refuse a structure that is at work or has an add-on in the making."""
+    return Refusal.CANT_QUEUE_THAT_ORDER if cast.slot in world.jobs else Refusal.SUCCESS
+
+
+def _can_land(world: World, cast: Cast) -> Refusal:
+    if cast.point is None:
+        return Refusal.CANT_LAND_LOCATION_INVALID
+    unit = world.catalog.unit(cast.ability.unit)
+    free = sites.is_free(world, unit, sites.centre(world, unit, cast.point), ignoring=cast.slot)
+    return Refusal.SUCCESS if free else Refusal.CANT_LAND_LOCATION_INVALID
+
+
+def _settle(world: World, cast: Cast) -> None:
+    """Come down, unless something has come under it by now, and take up an add-on that stands at the right place."""
+    slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
+    assert cast.point is not None
+    place = sites.centre(world, unit, cast.point)
+    if not sites.is_free(world, unit, place, ignoring=slot):
+        return
+    teleport.to(world, slot, place)
+    world.become(slot, unit)
+    attach(world, slot)
+
+
+# add-ons --------------------------------------------------------------------------------------------------------------
+
+
+def detach(world: World, slot: int) -> None:
+    """Leave a structure's add-on behind, as a plain one."""
+    addon = int(world.addon[slot])
+    world.addon[slot] = NOBODY
+    if addon != NOBODY:
+        world.become(addon, _plain(world, addon))
+
+
+def attach(world: World, slot: int) -> None:
+    """Take up the plain add-on of the same owner that stands beside a structure, if there is one."""
+    x, y = world.pos[slot].tolist()
+    goal = x + BESIDE[0], y + BESIDE[1]
+    for other in world.units_of(int(world.owner[slot])).tolist():
+        unit = world.unit_type(other)
+        own = world.catalog.row_of_name.get(world.unit_type(slot).name + unit.name)
+        if unit.name in KINDS and own is not None and _is_at(world, other, goal):
+            world.addon[slot] = other
+            world.become(other, world.catalog.units[own])
+            return
+
+
+def _is_at(world: World, slot: int, point: Point) -> bool:
+    x, y = world.pos[slot].tolist()
+    return bool(abs(x - point[0]) < CLOSE and abs(y - point[1]) < CLOSE)
+
+
+def _plain(world: World, addon: int) -> UnitType:
+    kind = next(kind for kind in KINDS if world.unit_type(addon).name.endswith(kind))
+    return world.catalog.unit(kind)
+
+
+SKILLS: Final = {
+    "lift": Skill(_lift, refuse=_can_lift, binds=True),
+    "land": Skill(
+        _settle,
+        refuse=_can_land,
+        binds=True,
+        estimates=("a landing structure that finds its place taken in the end stays in the air",),
+    ),
+}

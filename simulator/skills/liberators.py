@@ -1,0 +1,106 @@
+"""Liberators: a Defender zone is laid out, the ship takes its mode, and then fires at what stands in the circle.
+
+The zone is a field from the order on (the API's effect 8 while it is set up, 9 when it works); it ends when the ship
+leaves its mode, dies, or is carried away from it. That a ship fires only inside is in the columns ``zone`` and
+``zone_radius``, which choosing and measuring targets look at.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import commands
+from simulator.buffs import FOREVER
+from simulator.columns import NOBODY
+from simulator.fields import Field
+from simulator.orders import Order, OrderKind
+from simulator.skills import flight
+from simulator.skills.skill import Skill, distance, number
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.skills.skill import FieldRule
+    from simulator.world import World
+
+SETTING_UP: Final = 8  # the API's LiberatorTargetMorphDelayPersistent
+WORKING: Final = 9  # and LiberatorTargetMorphPersistent
+TO_GROUND: Final = "LiberatorMorphtoAG"
+TO_AIR: Final = "LiberatorMorphtoAA"
+
+
+def _lay_out(world: World, cast: Cast) -> None:
+    """Mark the zone and begin the morph; what waited in the queue comes after it."""
+    slot, point = cast.slot, cast.point
+    assert point is not None
+    _leave(world, slot)
+    zone = Field(
+        "liberator_zone",
+        owner=int(world.owner[slot]),
+        points=[point],
+        radius=number(cast, "radius"),
+        begun=world.loop,
+        end=FOREVER,
+        effect=SETTING_UP,
+        due=world.loop + 1,
+        ability=cast.ability.id,
+        source=world.tag_of(slot),
+        sights=number(cast, "reveal_radius"),
+        memory={"works": world.loop + number(cast, "setup_loops")},
+    )
+    world.fields.append(zone)
+    world.zone[slot], world.zone_radius[slot] = point, zone.radius
+    _morph(world, slot, TO_GROUND)
+
+
+def _guard(world: World, zone: Field) -> None:
+    """Let the zone work when it is set up, and end it when its ship is gone, or too far away."""
+    slot = world.slot_of(zone.source)
+    if slot == NOBODY or world.carrier[slot] != NOBODY:
+        flight.end(world, zone)
+        return
+    leash = number(world.catalog.ability(zone.ability), "leash_range") + _more_range(world, zone)
+    if distance(world, slot, zone.at) > leash:
+        _leave(world, slot)
+        if not world.bound[slot]:
+            world.queue[slot] = []
+            _morph(world, slot, TO_AIR)
+    elif world.loop >= zone.memory["works"]:
+        zone.effect = WORKING
+
+
+def _more_range(world: World, zone: Field) -> float:
+    """What upgrades add to how far from the ship a zone may lie; the leash grows with it."""
+    ability = world.catalog.ability(zone.ability)
+    return world.stats.ability(zone.owner, ability).range - ability.range
+
+
+def _take_off(world: World, cast: Cast) -> None:
+    """Give up the zone and take the mode against ships."""
+    _leave(world, cast.slot)
+    _morph(world, cast.slot, TO_AIR)
+
+
+def _leave(world: World, slot: int) -> None:
+    world.zone_radius[slot] = 0.0
+    for zone in world.fields:
+        if zone.does == "liberator_zone" and zone.source == world.tag_of(slot):
+            flight.end(world, zone)
+            zone.effect = 0
+
+
+def _morph(world: World, slot: int, link: str) -> None:
+    """Make the morph with this link the unit's current order; what waits behind stays."""
+    waiting = world.queue[slot]
+    ability = next(a for a in world.catalog.abilities if a.link == link and a.does == "morph")
+    commands.begin(world, slot, Order(OrderKind.CAST, ability.id))
+    world.queue[slot] = waiting
+
+
+SKILLS: Final = {
+    "liberator_ag_target": Skill(
+        _lay_out,
+        estimates=("a Liberator that is carried away from its zone leaves its mode when it is free to do so",),
+    ),
+    "liberator_aa_target": Skill(_take_off),
+}
+FIELDS: Final[dict[str, FieldRule]] = {"liberator_zone": _guard}

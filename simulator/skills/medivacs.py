@@ -1,0 +1,79 @@
+"""Medivacs: healing, and the afterburners. What they carry is the transports' matter.
+
+A Medivac heals one unit at a time for energy, follows it while it walks, and does so by itself unless it is told
+not to. Nobody is healed by two at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.skills.basics import on_self
+from simulator.skills.skill import Skill, gap, number
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+DONE: Final = 1e-9
+
+
+def _can_heal(world: World, cast: Cast) -> Refusal:
+    """Refuse who needs no healing or has somebody who heals him, and Medivacs without energy."""
+    slot, target = cast.slot, cast.target
+    if target == NOBODY:
+        return Refusal.MUST_TARGET_UNIT
+    if world.life[target] >= world.life_max[target] - DONE or _is_healed(world, cast):
+        return Refusal.REQUIRES_HEAL_TARGET
+    return Refusal.SUCCESS if world.energy[slot] > 0.0 else Refusal.NOT_ENOUGH_ENERGY
+
+
+def _is_healed(world: World, cast: Cast) -> bool:
+    """Whether another Medivac heals the target now."""
+    return any(
+        other.target == cast.target and other.ability.does == cast.ability.does and slot != cast.slot
+        for slot, other in world.channelling.items()
+    )
+
+
+def _heal(world: World, cast: Cast) -> bool:
+    """Heal for one loop; go after a target that walks away, stop when it is well or the energy is used up."""
+    slot, target = cast.slot, cast.target
+    if target == NOBODY or not world.can_cast[slot] or not world.targetable[target]:
+        return False
+    if gap(world, slot, target) > cast.ability.range:
+        resume(world, slot)
+        return True
+    price = number(cast, "energy_per_life")
+    missing = float(world.life_max[target] - world.life[target])
+    rate = number(cast, "life_per_s_normal") / LOOPS_PER_NORMAL_SECOND
+    healed = min(rate, missing, float(world.energy[slot]) / price)
+    world.life[target] += healed
+    world.energy[slot] -= healed * price
+    world.players[int(world.owner[slot])].score.healed.life += healed
+    return missing - healed > DONE and bool(world.energy[slot] > DONE)
+
+
+def resume(world: World, slot: int) -> None:
+    """Let a caster walk into range again and go on from there."""
+    world.channels[slot] = False
+    world.cast_at[slot] = -1.0
+
+
+def _begin(world: World, cast: Cast) -> None:
+    """Give a friend life for energy, loop by loop, as long as both last and he can be followed."""
+    _heal(world, cast)
+
+
+SKILLS: Final = {
+    "medivac_heal": Skill(
+        _begin,
+        refuse=_can_heal,
+        hold=_heal,
+        estimates=("healing is given evenly in every loop, and a follower heals from the range at which it begins",),
+    ),
+    "medivac_speed_boost": Skill(on_self("MedivacSpeedBoost")),
+}

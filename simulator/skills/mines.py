@@ -1,0 +1,81 @@
+"""Widow mines: burrowed they fire Sentinel missiles by themselves, and show themselves while they reload.
+
+Burrowing itself is a morph; the missile is an ability with autocast, armed as long as the mine is in the ground.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs
+from simulator.columns import NOBODY
+from simulator.fields import source_slot
+from simulator.mechanics import MECHANICS
+from simulator.refusal import Refusal
+from simulator.skills import flight
+from simulator.skills.skill import Skill, around, number
+from simulator.systems.damage import wound
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.fields import Field
+    from simulator.skills.skill import UnitRule
+    from simulator.world import World
+
+MINES: Final = frozenset({"WidowMine", "WidowMineBurrowed"})
+ARMED: Final = "WidowMineArmed"
+SHOWN: Final = "WidowMineBurrowedCloakingBehavior"
+TIMER: Final = "WidowMineAttack"
+CLAWS: Final = "DrillClaws"
+
+
+def _no_larva(world: World, cast: Cast) -> Refusal:
+    larva = cast.target != NOBODY and world.unit_type(cast.target).name == "Larva"
+    return Refusal.CANT_TARGET_THAT_UNIT if larva else Refusal.SUCCESS
+
+
+def _fire(world: World, cast: Cast) -> None:
+    """Send a missile that hurts its target much and all around it, friends as well, a little."""
+    flight.launch(world, cast, MECHANICS.mine_missile_speed_n)
+
+
+def _explode(world: World, missile: Field, target: int) -> None:
+    """Hurt the target, and whoever is around it, friends as well, but no structure and no mine of the owner's."""
+    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    owner = missile.owner
+    wound(world, source, owner, target, number(ability, "damage"), shield_bonus=number(ability, "bonus_vs_shields"))
+    amount, more = number(ability, "splash_damage"), number(ability, "splash_bonus_vs_shields")
+    for slot in around(world, missile.at, number(ability, "splash_radius"), structures=False):
+        own_mine = world.owner[slot] == owner and world.unit_type(slot).name in MINES
+        if slot != target and not own_mine:
+            wound(world, source, owner, slot, amount, kind="splash", shield_bonus=more)
+
+
+def _keep_watch(world: World, slots: list[int]) -> None:
+    """Arm burrowed mines, and uncover those that reload; drilling claws may keep these hidden."""
+    for slot in slots:
+        if not buffs.has(world, slot, ARMED):
+            buffs.apply(world, slot, ARMED)
+        reloads = world.timers.get(slot, {}).get(TIMER, 0.0) > world.loop and not _claws_hide(world, slot)
+        if reloads != buffs.has(world, slot, SHOWN):
+            (buffs.apply if reloads else buffs.remove)(world, slot, SHOWN)
+
+
+def _claws_hide(world: World, slot: int) -> bool:
+    """Whether the owner has the claws; in both versions they take the reloading mine's visibility away."""
+    return world.catalog.upgrade(CLAWS).id in world.players[int(world.owner[slot])].upgrades
+
+
+def _climb_out(world: World, slots: list[int]) -> None:
+    """Disarm mines that have come out of the ground."""
+    for slot in slots:
+        if len(world.buffs) and buffs.remove(world, slot, ARMED):
+            buffs.remove(world, slot, SHOWN)
+
+
+SKILLS: Final = {
+    "widow_mine_attack": Skill(_fire, refuse=_no_larva, estimates=("the speed of the Widow Mine's missile",)),
+}
+PASSIVES: Final[dict[str, UnitRule]] = {"WidowMineBurrowed": _keep_watch, "WidowMine": _climb_out}
+
+flight.ARRIVALS["widow_mine_attack"] = _explode

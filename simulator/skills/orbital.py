@@ -1,0 +1,126 @@
+"""Orbital commands: scanner sweep, MULE and extra supplies. What a MULE does when it is down is harvesting's matter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs, commands
+from simulator.columns import NOBODY
+from simulator.fields import Field
+from simulator.refusal import Refusal
+from simulator.skills import teleport
+from simulator.skills.skill import Skill, number, place_of
+from simulator.systems.placement import free_places
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from simulator.casts import Cast
+    from simulator.skills.skill import BuffRule, FieldRule
+    from simulator.world import World
+
+SWEEP: Final = 6  # the API's ScannerSweep
+
+# scanner sweep --------------------------------------------------------------------------------------------------------
+
+
+def _sweep(world: World, cast: Cast) -> None:
+    """See everything in a circle anywhere on the map for a while, what is cloaked or burrowed as well."""
+    lasts, radius = number(cast, "duration_loops"), number(cast, "radius")
+    world.fields.append(
+        Field(
+            "scanner_sweep",
+            owner=int(world.owner[cast.slot]),
+            points=[place_of(world, cast)],
+            radius=radius,
+            begun=world.loop,
+            end=world.loop + lasts,
+            effect=SWEEP,
+            due=world.loop + lasts,
+            ability=cast.ability.id,
+            sights=radius,
+            detects=True,
+        )
+    )
+    world.looked_at = -1
+
+
+# MULE -----------------------------------------------------------------------------------------------------------------
+
+SEEN: Final = 2
+
+
+def _can_call(world: World, cast: Cast) -> Refusal:
+    """Refuse units that hold no minerals, and places that the player does not see now."""
+    target = cast.target
+    if target != NOBODY and world.unit_type(target).resource != "minerals":
+        return Refusal.MUST_TARGET_RESOURCES
+    x, y = place_of(world, cast)
+    seen = not world.fog or world.visibility[int(world.owner[cast.slot]), int(y), int(x)] == SEEN
+    return Refusal.SUCCESS if seen else Refusal.MUST_TARGET_VISIBLE_LOCATION
+
+
+def _call_mule(world: World, cast: Cast) -> None:
+    """Have a MULE come down, which mines for the time it lives."""
+    falls = number(cast, "delay_loops")
+    world.fields.append(
+        Field(
+            "calldown_mule",
+            owner=int(world.owner[cast.slot]),
+            points=[place_of(world, cast)],
+            radius=0.0,
+            begun=world.loop,
+            end=world.loop + falls,
+            due=world.loop + falls,
+            ability=cast.ability.id,
+            target=world.tag_of(cast.target) if cast.target != NOBODY else 0,
+        )
+    )
+
+
+def _land_mule(world: World, item: Field) -> None:
+    ability = world.catalog.ability(item.ability)
+    unit = world.catalog.unit(str(ability.numbers["unit"]))
+    mule = world.spawn(unit, item.owner, free_places(world, unit, item.at, 1)[0])
+    lasts = number(ability, "duration_loops") + world.rng.random() * number(ability, "duration_random_loops")
+    teleport.live_until(world, mule, world.loop + lasts)
+    if world.slot_of(item.target) != NOBODY and item.target:
+        commands.smart(world, [mule], target=item.target)
+
+
+# extra supplies -------------------------------------------------------------------------------------------------------
+
+DEPOTS: Final = frozenset({"SupplyDepot", "SupplyDepotLowered"})
+ON_ITS_WAY: Final = "SupplyDropEnRoute"
+DROPPED: Final = "SupplyDrop"
+
+
+def _is_plain_depot(world: World, cast: Cast) -> Refusal:
+    slot = cast.target
+    depot = slot != NOBODY and world.unit_type(slot).name in DEPOTS
+    taken = depot and any(buffs.has(world, slot, name) for name in (ON_ITS_WAY, DROPPED))
+    return Refusal.SUCCESS if depot and not taken else Refusal.CANT_TARGET_THAT_UNIT
+
+
+def _drop_supplies(world: World, cast: Cast) -> None:
+    """Have a depot provide more supply from a moment later on."""
+    buffs.apply(world, cast.target, ON_ITS_WAY, source=cast.slot, loops=number(cast, "delay_loops"))
+
+
+def _arrive(world: World, slot: int, row: np.void) -> None:
+    buffs.apply(world, slot, DROPPED, owner=int(row["owner"]))
+
+
+SKILLS: Final = {
+    "scanner_sweep": Skill(_sweep),
+    "calldown_mule": Skill(
+        _call_mule,
+        refuse=_can_call,
+        estimates=(
+            "a MULE is in the world from the moment it lands, at the free place nearest to where it was called",
+        ),
+    ),
+    "supply_drop": Skill(_drop_supplies, refuse=_is_plain_depot),
+}
+FIELDS: Final[dict[str, FieldRule]] = {"calldown_mule": _land_mule}
+ENDS: Final[dict[str, BuffRule]] = {ON_ITS_WAY: _arrive}

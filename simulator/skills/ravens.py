@@ -1,0 +1,127 @@
+"""Ravens: auto-turrets, the interference matrix and the anti-armor missile. That a Raven detects is in the tables.
+
+Point defence drones, seeker missiles and repair drones are in no melee game of the versions shipped.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs
+from simulator.columns import NOBODY
+from simulator.fields import source_slot
+from simulator.mechanics import MECHANICS
+from simulator.refusal import Refusal
+from simulator.skills import flight, sites, teleport
+from simulator.skills.skill import Skill, around, number
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.fields import Field
+    from simulator.skills.skill import FieldRule
+    from simulator.world import World
+
+# auto-turret ----------------------------------------------------------------------------------------------------------
+
+
+def _has_room(world: World, cast: Cast) -> Refusal:
+    unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
+    free = cast.point is not None and sites.is_free(world, unit, sites.centre(world, unit, cast.point))
+    return Refusal.SUCCESS if free else Refusal.CANT_BUILD_LOCATION_INVALID
+
+
+def _place_turret(world: World, cast: Cast) -> None:
+    """Put up a turret that stands for a while and fires at ground and air."""
+    assert cast.point is not None
+    unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
+    turret = world.spawn(unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
+    lasts = number(cast, "duration_loops") + world.rng.random() * number(cast, "duration_random_loops")
+    teleport.live_until(world, turret, world.loop + lasts)
+
+
+# interference matrix --------------------------------------------------------------------------------------------------
+
+MATRIX: Final = ("RavenScramblerMissile", "RavenScramblerMissileCarrier")
+MARKED: Final = "ScramblerMarker"
+
+
+def _can_be_jammed(world: World, cast: Cast) -> Refusal:
+    """Refuse what is neither mechanical nor psionic, and where markers are known, what is jammed or about to be."""
+    if cast.target == NOBODY:
+        return Refusal.MUST_TARGET_UNIT
+    if not {"mechanical", "psionic"} & set(world.unit_type(cast.target).attributes):
+        return Refusal.MUST_TARGET_MECHANICAL_UNITS
+    known = [name for name in (*MATRIX, MARKED) if name in world.catalog.buff_of_name]
+    taken = MARKED in known and any(buffs.has(world, cast.target, name) for name in known)
+    return Refusal.ALREADY_TARGETED if taken else Refusal.SUCCESS
+
+
+def _jam(world: World, cast: Cast) -> None:
+    """Send a missile that keeps a machine or a psionic unit from attacking, casting and hiding."""
+    if MARKED in world.catalog.buff_of_name:
+        buffs.apply(world, cast.target, MARKED, source=cast.slot)
+    flight.launch(world, cast, MECHANICS.matrix_speed_n)
+
+
+def _jammed(world: World, missile: Field, target: int) -> None:
+    carrier = world.unit_type(target).name == "Carrier" and MATRIX[1] in world.catalog.buff_of_name
+    loops = number(world.catalog.ability(missile.ability), "duration_loops")
+    source = source_slot(world, missile)
+    buffs.apply(world, target, MATRIX[carrier], source=source, owner=missile.owner, loops=loops)
+    buffs.remove(world, target, "MedivacSpeedBoost")
+
+
+# anti-armor missile ---------------------------------------------------------------------------------------------------
+
+SEEN_COMING: Final = "RavenShredderMissileTint"
+SHREDS: Final = (
+    "RavenShredderMissileArmorReduction",
+    "RavenShredderMissileArmorReductionUIAdd",
+    "RavenShredderMissileArmorReductionUISubtruct",
+)
+RESEARCHED_RADIUS: Final = ("effect", "RavenShredderMissileImpactSearchArea", "AreaArray[0].Radius")
+
+
+def _send_shredder(world: World, cast: Cast) -> None:
+    """Send a missile that chases its target and weakens the armor of all around it, friends as well."""
+    missile = flight.launch(world, cast, MECHANICS.shredder_speed_n)
+    missile.does = "shredder"
+
+
+def _chase(world: World, missile: Field) -> None:
+    """Fly on; the target can tell, and a missile that was led too far for too long gives up."""
+    ability = world.catalog.ability(missile.ability)
+    target = world.slot_of(missile.target)
+    spent = world.loop == missile.begun + number(ability, "patience_loops")
+    if spent and flight.flown(missile) >= number(ability, "patience_range"):
+        flight.end(world, missile)
+        return
+    if target != NOBODY:
+        buffs.apply(world, target, SEEN_COMING, owner=missile.owner)
+    flight.fly(world, missile)
+
+
+def _shred(world: World, missile: Field, _: int) -> None:
+    """Weaken the armor of everybody around, friends as well, but of no structure."""
+    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    radius = world.stats.changed(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
+    loops = number(ability, "duration_loops")
+    for slot in around(world, missile.at, radius, structures=False):
+        for name in SHREDS:
+            if name in world.catalog.buff_of_name:
+                buffs.apply(world, slot, name, source=source, owner=missile.owner, loops=loops)
+
+
+SKILLS: Final = {
+    "build_auto_turret": Skill(
+        _place_turret,
+        refuse=_has_room,
+        estimates=("an auto-turret stands and fires at once; in the game it is dropped from the Raven",),
+    ),
+    "raven_scrambler_missile": Skill(_jam, refuse=_can_be_jammed, estimates=("the interference matrix' speed",)),
+    "raven_shredder_missile": Skill(_send_shredder, estimates=("the anti-armor missile's speed",)),
+}
+FIELDS: Final[dict[str, FieldRule]] = {"shredder": _chase}
+
+flight.ARRIVALS["raven_scrambler_missile"] = _jammed
+flight.ARRIVALS["raven_shredder_missile"] = _shred

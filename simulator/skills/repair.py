@@ -1,0 +1,91 @@
+"""Repair: SCVs and MULEs mend machines and structures for a quarter of their price.
+
+One worker mends a whole unit in the time that the tables give; several add up. Every loop costs its share of the
+price, and a player who can't pay it stops the work.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.columns import NOBODY
+from simulator.refusal import Refusal
+from simulator.skills.medivacs import resume
+from simulator.skills.skill import Skill, gap, number
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+DONE: Final = 1e-9
+
+
+def _can_repair(world: World, cast: Cast) -> Refusal:
+    target = cast.target
+    if target == NOBODY:
+        return Refusal.MUST_TARGET_UNIT
+    if world.life[target] >= world.life_max[target] - DONE or _loops(world, target) <= 0.0:
+        return Refusal.REQUIRES_REPAIR_TARGET
+    return _unaffordable(world, cast)
+
+
+def _unaffordable(world: World, cast: Cast) -> Refusal:
+    """Whether the player lacks what the next loop of work costs."""
+    player = world.players[int(world.owner[cast.slot])]
+    if "free" in player.cheats:
+        return Refusal.SUCCESS
+    minerals, vespene = _price(world, cast)
+    if player.minerals < minerals:
+        return Refusal.NOT_ENOUGH_MINERALS
+    return Refusal.NOT_ENOUGH_VESPENE if player.vespene < vespene else Refusal.SUCCESS
+
+
+def _loops(world: World, slot: int) -> float:
+    """Loops in which one worker mends a unit from nothing."""
+    return world.unit_type(slot).repair_loops
+
+
+def _price(world: World, cast: Cast) -> tuple[float, float]:
+    """Minerals and vespene for one loop of work."""
+    share = number(cast, "cost_fraction_full_repair") / _loops(world, cast.target)
+    minerals, vespene = world.unit_type(cast.target).cost
+    return minerals * share, vespene * share
+
+
+def _mend(world: World, cast: Cast) -> bool:
+    """Mend for one loop; go after a unit that drives away, stop when it is whole or the money is gone."""
+    slot, target = cast.slot, cast.target
+    if target == NOBODY or not world.targetable[target] or world.life[target] >= world.life_max[target] - DONE:
+        return False
+    if gap(world, slot, target) > cast.ability.range + cast.ability.slop:
+        resume(world, slot)
+        return True
+    if _unaffordable(world, cast) is not Refusal.SUCCESS:
+        return False
+    missing = float(world.life_max[target] - world.life[target])
+    whole = float(world.life_max[target]) / _loops(world, target)
+    mended = min(whole, missing)
+    player = world.players[int(world.owner[slot])]
+    if "free" not in player.cheats:
+        minerals, vespene = _price(world, cast)
+        player.minerals -= minerals * mended / whole
+        player.vespene -= vespene * mended / whole
+    world.life[target] += mended
+    player.score.healed.life += mended
+    return missing - mended > DONE
+
+
+def _begin(world: World, cast: Cast) -> None:
+    """Mend a machine or a structure, loop by loop, for a quarter of its price and as long as it took to make it."""
+    _mend(world, cast)
+
+
+SKILLS: Final = {
+    name: Skill(
+        _begin,
+        refuse=_can_repair,
+        hold=_mend,
+        estimates=("repair is given and paid for evenly in every loop; the game's rounding is not known",),
+    )
+    for name in ("repair", "mule_repair")
+}

@@ -1,0 +1,58 @@
+"""Terran: the tables of all modules with Terran skills, joined."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.skills import (
+    buildings,
+    cloaks,
+    cyclone,
+    flight,
+    ghosts,
+    infantry,
+    landing,
+    liberators,
+    medivacs,
+    mines,
+    nukes,
+    orbital,
+    ravens,
+    repair,
+    starships,
+)
+from simulator.systems.damage import IMPACTS
+
+if TYPE_CHECKING:
+    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+
+SKILLS: Final[dict[str, Skill]] = {
+    **buildings.SKILLS,
+    **cloaks.SKILLS,
+    **cyclone.SKILLS,
+    **ghosts.SKILLS,
+    **infantry.SKILLS,
+    **landing.SKILLS,
+    **liberators.SKILLS,
+    **medivacs.SKILLS,
+    **mines.SKILLS,
+    **nukes.SKILLS,
+    **orbital.SKILLS,
+    **ravens.SKILLS,
+    **repair.SKILLS,
+    **starships.SKILLS,
+}
+FIELDS: Final[dict[str, FieldRule]] = {
+    **cyclone.FIELDS,
+    **flight.FIELDS,
+    **infantry.FIELDS,
+    **liberators.FIELDS,
+    **nukes.FIELDS,
+    **orbital.FIELDS,
+    **ravens.FIELDS,
+}
+TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts.TICKS}
+ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}
+PASSIVES: Final[dict[str, UnitRule]] = {**buildings.PASSIVES, **mines.PASSIVES}
+
+IMPACTS.update(infantry.IMPACTS)
