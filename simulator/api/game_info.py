@@ -15,6 +15,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator.api import wire
 from simulator.api.raw import write_image
 from simulator.api.sight import Alliance
+from simulator.api.viewer import Viewer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from simulator.api.seat import Seat
     from simulator.api.wire import Part
     from simulator.world import World
+
+    Structure = tuple[int, float, float]  # row of its type, and where it stands
 
 MODS = ("Core", "Liberty", "Swarm", "Void", "VoidMulti")
 _START_RAW = sc.ResponseGameInfo.DESCRIPTOR.fields_by_name["start_raw"].number
@@ -36,7 +39,7 @@ class GameInfo:
         self._world, self._seat = game.world, seat
         self._fixed = _message(game, seat).SerializeToString()
         self._map = _start_raw(seat).SerializeToString()
-        self._known: tuple[int, ...] | None = None
+        self._known: tuple[Structure, ...] | None = None
         self._paths = b""
 
     def encode(self) -> list[Part]:
@@ -64,8 +67,10 @@ def _message(game: Game, seat: Seat) -> sc.ResponseGameInfo:
         if asked.type == sc.Computer:
             player.difficulty, player.ai_build = asked.difficulty, asked.ai_build
         race = _RACES.get(game.world.players[number].race)
-        if number == seat.player and race is not None:
+        if race is not None and (number == seat.player or isinstance(seat, Viewer)):
             player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum
+    for number, asked in enumerate(game.setup.observers, start=len(game.setup.players) + 1):
+        info.player_info.add(player_id=number, type=asked.type, player_name=asked.player_name)
     return info
 
 
@@ -98,17 +103,20 @@ def _crop(seat: Seat, grid: NDArray[np.generic]) -> NDArray[np.generic]:
     return grid[y0:y1, x0:x1]
 
 
-def _known_structures(seat: Seat) -> tuple[int, ...]:
-    """Slots of the structures that the player sees: what he has not seen blocks no path that he is told of."""
+def _known_structures(seat: Seat) -> tuple[Structure, ...]:
+    """The structures and resources that the player sees or remembers: of others' he is told no obstacle."""
     sight = seat.look()
-    structures = seat.types.structure[sight.row] | (sight.alliance == Alliance.NEUTRAL)
-    slots: list[int] = sight.slot[structures].tolist()
-    return tuple(slots)
+    stays = seat.types.structure[sight.row] | (sight.alliance == Alliance.NEUTRAL.value)
+    rows, points = sight.row[stays].tolist(), sight.pos[stays].tolist()
+    return tuple((row, x, y) for row, (x, y) in zip(rows, points, strict=True))
 
 
-def _paths(world: World, structures: tuple[int, ...]) -> NDArray[np.bool_]:
-    grid = world.map.terrain.walk.copy()
-    for slot in structures:
-        cells = np.clip(world.footprint_cells(slot), 0, np.array(grid.shape[::-1]) - 1)
-        grid[cells[:, 1], cells[:, 0]] = False
+def _paths(world: World, structures: tuple[Structure, ...]) -> NDArray[np.bool_]:
+    grid, catalog = world.map.terrain.walk.copy(), world.catalog
+    for row, x, y in structures:
+        footprint = catalog.footprints.get(catalog.units[row].footprint)
+        if footprint is not None and footprint.cells:
+            cells = np.floor((x + 1e-9, y + 1e-9)).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
+            cells = np.clip(cells, 0, np.array(grid.shape[::-1]) - 1)
+            grid[cells[:, 1], cells[:, 0]] = False
     return grid
