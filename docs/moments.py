@@ -201,17 +201,18 @@ def base(stage: Stage) -> None:
 
 
 def storm(stage: Stage) -> None:
-    """Force fields hold the swarm where the storms fall."""
+    """Force fields cut the swarm in two, and storms fall on the half that is in front of them."""
     stage.step(160)
-    while stage.distance(stage.units("own", "Stalker"), stage.units("enemy", "Zergling")) > 6:
-        stage.step(8)
-    front = stage.middle(stage.units("enemy", "Zergling"))
+    while stage.distance(stage.units("own", "Stalker"), stage.units("enemy", "Zergling")) > 2:
+        stage.step(4)
+    x, y = stage.middle(stage.units("enemy", "Zergling"))
     stage.order(GUARDIAN_SHIELD, stage.units("own", "Sentry")[:1])
-    for templar, shift in zip(stage.units("own", "HighTemplar"), (-1.5, 1.5, 0.0), strict=False):
-        stage.order(STORM, [templar], (front[0] + 0.5, front[1] + shift))
-    for sentry, shift in zip(stage.units("own", "Sentry")[1:], (-2.5, 0.0, 2.5), strict=False):
-        stage.order(FORCE_FIELD, [sentry], (front[0] - 2.5, front[1] + shift))
-    stage.step(24)
+    for sentry, shift in zip(stage.units("own", "Sentry")[1:], (-3.2, 0.0, 3.2), strict=False):
+        stage.order(FORCE_FIELD, [sentry], (x + 0.5, y + shift))
+    stage.step(12)
+    for templar, shift in zip(stage.units("own", "HighTemplar"), (-4.5, -1.5, 1.5, 4.5), strict=False):
+        stage.order(STORM, [templar], (x - 1.8, y + shift))
+    stage.step(36)
     stage.watch()
 
 
