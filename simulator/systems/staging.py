@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from simulator import casting, commands, melee
-from simulator.places import Column, Grid, RandomPlace
+from simulator.places import Column, Grid, RandomPlace, kind_of_place
 from simulator.players import NEUTRAL, GameResult
 from simulator.scenario import MELEE_MINERALS
 from simulator.script import AddScore, Create, Draw, Give, Order, Regroup, Remove, Result, Select, Spawn
@@ -47,7 +47,7 @@ def set_up(world: World) -> None:
             if name in known:  # another version of the game may not have it
                 commands.grant_upgrade(world, player.id, known[name])
     for units in scenario.units:
-        create(world, units)
+        create(world, units, placed=True)
     if scenario.melee:
         melee.start(world)
 
@@ -67,12 +67,17 @@ def act(world: World, action: Action, subject: int) -> None:
 # units ----------------------------------------------------------------------------------------------------------------
 
 
-def create(world: World, spec: CreateSpec) -> None:
-    """Make the units of a specification; those of a player who is not there are left out."""
+def create(world: World, spec: CreateSpec, *, placed: bool = False) -> None:
+    """Make the units of a specification; those of a player who is not there are left out.
+
+    A single unit that is ``placed`` on the map stands exactly at its point, whoever else is there.
+    """
     if spec.player >= len(world.players):
         return
     unit = world.catalog.unit(spec.unit)
-    for x, y, facing in _places(world, unit, spec):
+    alone = placed and spec.count == 1 and not unit.structure and kind_of_place(spec.at) in {"name", "point"}
+    exact = spec.model_copy(update={"at": (point_of(world, spec.at),)}) if alone else spec
+    for x, y, facing in _places(world, unit, exact):
         slot = world.spawn(unit, spec.player, (x, y), facing)
         if spec.life is not None:
             world.life[slot] = min(spec.life, float(world.life_max[slot]))

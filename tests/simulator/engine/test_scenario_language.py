@@ -66,6 +66,16 @@ def test_units_stand_where_the_file_says(at: str, expected: list[tuple[float, fl
     assert places(world, 1) == expected
 
 
+def test_a_placed_unit_stands_on_its_point_and_a_created_one_makes_room() -> None:
+    world = world_of(
+        "units:\n  - {player: 1, unit: Marine, at: west}\n  - {player: 1, unit: Marine, at: [10.1, 24]}\n"
+        "triggers:\n  - name: go\n    when: [start]\n    do: [{create: {player: 1, unit: Marine, at: west}}]\n"
+    )
+    assert places(world, 1)[:2] == [(10, 24), (10.1, 24)]
+    x, y = places(world, 1)[2]
+    assert np.hypot(x - 10, y - 24) >= 0.75
+
+
 def test_a_column_goes_up_and_down_in_turn() -> None:
     world = world_of("units:\n  - {player: 1, unit: Marine, count: 5, at: {column: west}}\n")
     assert places(world, 1) == [(10, 24), (10, 25), (10, 23), (10, 26), (10, 22)]
