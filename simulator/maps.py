@@ -133,10 +133,12 @@ def find_map(name: str) -> str:
     exact = "/".join(parts[-2:])
     if len(parts) > 1 and exact in _sheets(parts[-2]):
         return exact
+    preferred = f"{FIRST_CHOICE}/{''.join(parts[-1:])}"
+    if preferred in _sheets(FIRST_CHOICE):
+        return preferred
     same = [known for known in map_names() if parts and known.split("/")[1] == parts[-1]]
-    preferred = [known for known in same if known.split("/")[0] == FIRST_CHOICE]
-    if len(same) == 1 or preferred:
-        return (preferred or same)[0]
+    if len(same) == 1:
+        return same[0]
     if same:
         raise MapError(f"map {name!r} is ambiguous: {', '.join(same)}")
     raise MapError(f"no map {name!r}; shipped are {', '.join(map_names())}")
