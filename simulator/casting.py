@@ -18,7 +18,7 @@ from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
 from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
-from simulator.skills import SKILLS
+from simulator.skills import SKILLS, SMARTS
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.world import NO_TAG, Mishap
 
@@ -69,15 +69,19 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
         return Refusal.NOT_SUPPORTED
     if ability.does in ORDINARY:
         return Refusal.SUCCESS if world.build_progress[slot] >= 1.0 else Refusal.BUILDING_IS_UNDER_CONSTRUCTION
+    why = _unready(world, slot, ability)
+    return why if free or why is not Refusal.SUCCESS else _unaffordable(world, slot, ability)
+
+
+def _unready(world: World, slot: int, ability: Ability) -> Refusal:
     skill = SKILLS[ability.does]
+    if not (world.powered[slot] or skill.anytime):
+        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
     if not (world.can_cast[slot] or skill.anytime) or world.hallucination[slot]:
         return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
         return Refusal.TECH_REQUIREMENTS_NOT_MET
-    why = Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
-    if why is not Refusal.SUCCESS:
-        return why
-    return Refusal.SUCCESS if free else _unaffordable(world, slot, ability)
+    return Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
 
 
 def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
@@ -87,16 +91,14 @@ def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
             return Refusal.NOT_ENOUGH_MINERALS
         if player.vespene < ability.vespene:
             return Refusal.NOT_ENOUGH_VESPENE
-    if not supply.has_room(world, player.id, ability.supply):
-        return Refusal.NOT_ENOUGH_FOOD
-    if "free" not in player.cheats:
         if world.energy[slot] < ability.energy:
             return Refusal.NOT_ENOUGH_ENERGY
         if ability.life and world.life[slot] <= ability.life:
             return Refusal.NOT_ENOUGH_LIFE
-    if "cooldown" not in player.cheats and cooldown_left(world, slot, ability) > 0.0:
-        return Refusal.COOLDOWN
-    return Refusal.SUCCESS
+    if not supply.has_room(world, player.id, ability.supply):
+        return Refusal.NOT_ENOUGH_FOOD
+    waits = "cooldown" not in player.cheats and cooldown_left(world, slot, ability) > 0.0
+    return Refusal.COOLDOWN if waits else Refusal.SUCCESS
 
 
 def cooldown_left(world: World, slot: int, ability: Ability) -> float:
@@ -241,6 +243,18 @@ def use(
             order = Order(OrderKind.CAST, ability.id, target=world.tag_of(victim), point=point)
             taken += commands.give(world, [cast.slot], order, queue=queue)
     return taken
+
+
+def smart(
+    world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
+) -> list[int]:
+    """The right click: what the skills make of it, else what ``commands`` does; returns the slots that took it."""
+    rest, taken, victim = list(slots), list[int](), world.slot_of(target)
+    for rule in SMARTS:
+        some = rule(world, rest, victim, point, queue)
+        taken += some
+        rest = [slot for slot in rest if slot not in some]
+    return taken + commands.smart(world, rest, point=point, target=target, queue=queue)
 
 
 def _busy(world: World, cast: Cast) -> bool:

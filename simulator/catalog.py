@@ -280,10 +280,17 @@ def _upgrade(raw: dict[str, Any]) -> Upgrade:
 
 def _footprint(raw: dict[str, Any]) -> Footprint:
     x0, y0, x1, y1 = raw["area"]
-    cells = tuple(
-        (x0 + column, y1 - 1 - line)
-        for line, text in enumerate(raw["rows"])
-        for column, mark in enumerate(text)
-        if mark == "x"
+    marked: dict[str, list[tuple[int, int]]] = {"x": [], "o": []}
+    for line, text in enumerate(raw["rows"]):
+        for column, mark in enumerate(text):
+            if mark in marked:
+                marked[mark].append((x0 + column, y1 - 1 - line))
+    check = raw.get("check", {}).get("x", {})
+    return Footprint(
+        id=raw["id"],
+        area=(x0, y0, x1, y1),
+        cells=tuple(marked["x"]),
+        around=tuple(marked["o"]),
+        forbids=frozenset(check.get("forbid", ())),
+        requires=frozenset(check.get("require", ())),
     )
-    return Footprint(id=raw["id"], area=(x0, y0, x1, y1), cells=cells)

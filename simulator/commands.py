@@ -260,9 +260,12 @@ ORDINARY = {
 }
 
 
+GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
+
+
 def _of_its_own(world: World, slot: int, order: Order) -> Order:
     """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
-    does = ORDINARY.get(order.kind)
+    does = ORDINARY.get(order.kind) if order.ability in GENERAL else None
     own = None if does is None else world.catalog.ordinary[int(world.type[slot])].get(does)
     return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
 

@@ -64,6 +64,7 @@ class Mechanics:
     shredder_speed_n: float
     knockback_loops: int
     high_ground_step: float
+    building_sight: float
     harvest_gap: float
     harvest_search: float
     harvest_leaving: float

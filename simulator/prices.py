@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Cost = tuple[float, float]
 
-BY_PRODUCT: Final = frozenset({"train", "build", "warp_in", "arm", "structure_morph"})
+BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "warp_in", "arm", "structure_morph"})
 """What is charged for as its product's ``made_by`` says."""
 ALL: Final = 1.0
 """Share of the price that comes back for what was only in a queue."""
@@ -29,22 +29,26 @@ CANCELLED: Final = 0.75
 def priced(
     abilities: Iterable[Ability], units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]
 ) -> tuple[Ability, ...]:
-    """The abilities with minerals, vespene, supply and time of what they make, where they have none of their own."""
+    """The abilities with price, supply and time of what they make, and a builder's reach, where they have none.
+
+    What makes nothing that the tables of the version know does nothing.
+    """
     return tuple(_priced(ability, units, upgrades) for ability in abilities)
 
 
 def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]) -> Ability:
-    upgrade = upgrades.get(ability.upgrade)
-    if ability.does == "research" and upgrade is not None and not (ability.minerals or ability.vespene):
-        minerals, vespene = upgrade.cost
-        return dataclasses.replace(ability, minerals=minerals, vespene=vespene)
+    if ability.does == "research":
+        return _priced_research(ability, upgrades.get(ability.upgrade))
     product = units.get(ability.unit)
-    if ability.does not in BY_PRODUCT or product is None:
+    if ability.does not in BY_PRODUCT:
         return ability
+    if product is None:
+        return dataclasses.replace(ability, does="")
     ways = [way for way in product.made_by if way.ability == ability.id]
     if not ways or ability.minerals or ability.vespene:
         return ability
     way = ways[0]
+    reach = product.radius if ability.does == "build" and not ability.range else ability.range
     minerals, vespene = way.cost
     return dataclasses.replace(
         ability,
@@ -53,7 +57,17 @@ def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[s
         count=way.count,
         supply=product.supply * way.count,
         loops=ability.loops or way.loops,
+        range=reach,
     )
+
+
+def _priced_research(ability: Ability, upgrade: Upgrade | None) -> Ability:
+    if upgrade is None or not ability.loops:
+        return dataclasses.replace(ability, does="")
+    if ability.minerals or ability.vespene:
+        return ability
+    minerals, vespene = upgrade.cost
+    return dataclasses.replace(ability, minerals=minerals, vespene=vespene)
 
 
 def cost_of(ability: Ability) -> Cost:

@@ -27,9 +27,9 @@ REACTOR_PARALLEL: Final = 2
 class Job:
     """One thing in the making.
 
-    ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` what comes
-    back when it is called off, ``supply`` what it uses once it is ``begun``. A job of kind ``addon`` only waits for the
-    structure with the tag ``site``.
+    ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` what
+    comes back when it is called off, ``supply`` what it uses once it is ``begun``. A job of kind ``addon`` only waits
+    for the structure with the tag ``site``.
     """
 
     ability: int

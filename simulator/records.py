@@ -308,13 +308,17 @@ class Upgrade:
 class Footprint:
     """The cells that a structure blocks, relative to its centre.
 
-    ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre; ``area`` is
-    ``(x0, y0, x1, y1)`` of the mask in the same frame.
+    ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre, ``around`` of those where no
+    town hall may stand beside a resource; ``area`` is ``(x0, y0, x1, y1)`` of the mask in the same frame. ``forbids``
+    and ``requires`` are what the ground under the cells must not and must be, in the catalog's words.
     """
 
     id: str
     area: tuple[int, int, int, int]
     cells: tuple[tuple[int, int], ...]
+    around: tuple[tuple[int, int], ...] = ()
+    forbids: frozenset[str] = frozenset()
+    requires: frozenset[str] = frozenset()
 
     @property
     def size(self) -> tuple[int, int]:

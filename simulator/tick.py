@@ -15,6 +15,7 @@ from simulator.systems import (
     buffs,
     casts,
     collision,
+    construction,
     creep,
     death,
     engagement,
@@ -27,6 +28,7 @@ from simulator.systems import (
     navigation,
     orders,
     passives,
+    power,
     production,
     regeneration,
     sweeps,
@@ -48,6 +50,8 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     acquire.choose_targets,  # whom to fight, without being told
     autocast.look_out,  # what to use, without being told
     engagement.measure,  # who is in reach of his target, who wants to walk where
+    power.run,  # which structures have power
+    construction.run,  # what is being built
     casts.carry_on,  # abilities are prepared, take effect, go on
     production.run,  # queues of structures and eggs
     harvest.run,  # workers take, carry home and come again

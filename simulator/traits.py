@@ -69,7 +69,7 @@ def body_traits(world: World, slot: int) -> None:
     _plain(world, slot)
     for kind in kinds:
         _change(world, slot, kind)
-    if kinds or world.build_progress[slot] < 1.0:
+    if kinds or world.build_progress[slot] < 1.0 or not world.powered[slot]:
         _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
     if unit.name.startswith(DISGUISE):
         world.can_attack[slot] = world.acquires[slot] = False
@@ -119,10 +119,10 @@ def _change(world: World, slot: int, buff: Buff) -> None:
     world.step_gain[slot] = world.step_gain[slot] * buff.acceleration + buff.acceleration_add_n / second**2
     world.step_loss[slot] += buff.deceleration_add_n / second**2
     world.attack_rate[slot] *= buff.attack_rate * buff.time
+    world.work_rate[slot] *= buff.work_rate * buff.time
     world.range_add[slot] += buff.range_add
     world.armor_add[slot] += buff.armor_add
     world.shield_armor_add[slot] += buff.shield_armor_add
-    world.work_rate[slot] *= buff.work_rate * buff.time
     world.sight[slot] += buff.sight_add
     world.detects[slot] = max(float(world.detects[slot]), buff.detect)
     world.life_max[slot] += buff.life_max_add
@@ -144,9 +144,9 @@ def _change(world: World, slot: int, buff: Buff) -> None:
 
 
 def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
-    """Apply what buffs, or being under construction, forbid or hide."""
+    """Apply what buffs, being under construction or being without power forbid or hide."""
     unfinished = world.build_progress[slot] < 1.0
-    helpless = unfinished or bool(flags & {"stunned", "stasis"})
+    helpless = unfinished or not world.powered[slot] or bool(flags & {"stunned", "stasis"})
     world.can_act[slot] = not (helpless or "uncommandable" in flags)
     world.can_cast[slot] = not (helpless or "silenced" in flags)
     world.can_attack[slot] = not (helpless or "disarmed" in flags)
@@ -171,5 +171,7 @@ def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
         ("no_shield_regen", world.shield_regen),
         ("no_energy_regen", world.energy_regen),
     ):
-        if name in flags:
+        if name in flags or unfinished:
             column[slot] = 0.0
+    if unfinished and world.unit_type(slot).structure:
+        world.sight[slot] = MECHANICS.building_sight

@@ -130,6 +130,8 @@ class World(UnitColumns):
         self.mishaps: list[Mishap] = []
         self.alerts: list[Alert] = []
         self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
+        self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
+        self.powered_at = -1  # the population for which ``powered`` was written
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []
         self.deaths_seen = 0  # how many of the deaths the triggers have been told about
@@ -189,12 +191,16 @@ class World(UnitColumns):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        for column in (self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home):
+        for column in (
+            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
+            self.occupant,
+        ):  # fmt: skip
             column[column == slot] = NOBODY
         self.buffs.forget(slot)
         for job in self.jobs.pop(slot, ()):
             self.players[job.owner].underway.remove(job.makes)
         self.rallies.pop(slot, None)
+        self.invested.pop(slot, None)
         self.timers.pop(slot, None)
         self.autocast.pop(slot, None)
         self.hurt = [pair for pair in self.hurt if slot not in pair]
@@ -380,7 +386,7 @@ class World(UnitColumns):
         sha.update(repr([player.counters() for player in self.players]).encode())
         sha.update(repr(self.script.content()).encode())
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
-        sha.update(repr((self.jobs, self.rallies)).encode())
+        sha.update(repr((self.jobs, self.rallies, self.invested)).encode())
         sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
         channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
         sha.update(repr(channels).encode())

@@ -235,7 +235,7 @@ def _hold(world: World, slots: list[int], command: Command) -> list[int]:
 
 
 def _smart(world: World, slots: list[int], command: Command) -> list[int]:
-    return commands.smart(world, slots, point=command.point, target=command.target, queue=command.queue)
+    return casting.smart(world, slots, point=command.point, target=command.target, queue=command.queue)
 
 
 GIVE: dict[str, Callable[[World, list[int], Command], list[int]]] = {

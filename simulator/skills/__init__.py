@@ -6,6 +6,8 @@ One module per group of units. Each offers some of these tables, and here they a
 * ``FIELDS``: a field's ``does`` → what it does at each period
 * ``TICKS`` and ``ENDS``: a buff's name → what it does at each of its periods, and when it has run out
 * ``FINALS``: a buff's name → what it does when its bearer dies, called with the slot while it is still there
+* ``SMARTS``: what a right click means to some units, called with the slots, the target's slot, the point and whether to
+  queue it; returns those that took it
 * ``PASSIVES``: a unit type's name → what units of it do in every loop without being told
 * ``DEATHS``: a unit type's name → what happens when one dies, called with the slot while it is still there
 
@@ -17,8 +19,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator.skills import (
+    addons,
     basics,
     battery,
+    construction,
     gateway,
     harvest,
     mothership,
@@ -29,18 +33,22 @@ from simulator.skills import (
     stargate,
     templar,
     terran,
+    warpgate,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+    from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
     from simulator.world import World
 
 SKILLS: Final[dict[str, Skill]] = {
     **basics.SKILLS,
     **harvest.SKILLS,
     **production.SKILLS,
+    **construction.SKILLS,
+    **addons.SKILLS,
+    **warpgate.SKILLS,
     **research.SKILLS,
     **sentry.SKILLS,
     **templar.SKILLS,
@@ -79,4 +87,5 @@ PASSIVES: Final[dict[str, UnitRule]] = {
     **mothership.PASSIVES,
     **terran.PASSIVES,
 }
+SMARTS: Final[tuple[SmartRule, ...]] = (*construction.SMARTS, *production.SMARTS)
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}

@@ -120,11 +120,33 @@ def set_rally(world: World, slot: int, kind: str, target: int, point: Point | No
         world.rallies.setdefault(slot, {})[kind] = Rally(point, NO_TAG)
 
 
+def rally_by_click(world: World, slots: list[int], target: int, point: Point | None, _: bool) -> list[int]:
+    """The right click with a structure: a rally point, for workers on a resource, else for all."""
+    taken = []
+    for slot in slots:
+        card = world.catalog.abilities_of(int(world.type[slot]))
+        kinds = {"workers" if a.general == WORKERS else "units" for a in card if a.does == "rally"}
+        if not world.unit_type(slot).structure or not kinds:
+            continue
+        resource = target != NOBODY and bool(world.unit_type(target).resource)
+        for kind in sorted({"workers"} if resource and "workers" in kinds else kinds):
+            set_rally(world, slot, kind, world.tag_of(target), point)
+        taken.append(slot)
+    return taken
+
+
+def _sends_units(world: World, slot: int, ability: Ability) -> Refusal:
+    """Whether units come of it: a structure, an egg, or a unit that is itself still in the making."""
+    finished = world.build_progress[slot] >= 1.0
+    return Refusal.ERROR if ability.link == "ProgressRally" and finished else Refusal.SUCCESS
+
+
 def _can_rally(_: World, cast: Cast) -> Refusal:
     aimed = cast.target != NOBODY or cast.point is not None
     return Refusal.SUCCESS if aimed else Refusal.MUST_TARGET_VISIBLE_LOCATION
 
 
+SMARTS: Final = (rally_by_click,)
 SKILLS: Final = {
     "train": Skill(
         give=_train,
@@ -139,5 +161,5 @@ SKILLS: Final = {
     ),
     "cancel_job": Skill(give=cancel_last, ready=has_job, anytime=True),
     "cancel_slot": Skill(give=cancel_last, ready=has_job, anytime=True),
-    "rally": Skill(give=_rally, refuse=_can_rally, anytime=True),
+    "rally": Skill(give=_rally, refuse=_can_rally, ready=_sends_units, anytime=True),
 }

@@ -27,6 +27,7 @@ Effect: TypeAlias = Callable[["World", "Cast"], None]
 FieldRule: TypeAlias = Callable[["World", "Field"], None]
 BuffRule: TypeAlias = Callable[["World", int, "np.void"], None]
 Give: TypeAlias = Callable[["World", "list[int]", "Ability", int, "Point | None", bool], "list[int]"]
+SmartRule: TypeAlias = Callable[["World", "list[int]", int, "Point | None", bool], "list[int]"]
 UnitRule: TypeAlias = Callable[["World", "list[int]"], None]
 
 

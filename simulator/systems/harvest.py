@@ -105,6 +105,9 @@ def _take(world: World, slot: int) -> None:
     gas = not _is_field(world, patch)
     if amount:
         world.contents[patch] -= amount
+        geyser = int(world.patch[patch])
+        if geyser != NOBODY:
+            world.contents[geyser] = world.contents[patch]
         harvesting.take_up(world, slot, amount, gas=gas, rich=unit.per_trip > ORDINARY_TRIP)
     world.harvest[slot] = Phase.LEAVING
     world.work_until[slot] = world.loop + MECHANICS.harvest_leaving

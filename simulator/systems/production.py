@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, production, supply
+from simulator import casting, commands, production, supply
 from simulator.columns import NOBODY
 from simulator.systems import placement
 
@@ -92,7 +92,7 @@ def _born(world: World, slot: int, job: Job) -> None:
         born.append(_put_outside(world, slot, parent, unit, rally))
     for new in born:
         if rally is not None and unit.name not in STOWED:
-            commands.smart(world, [new], point=rally.point, target=rally.target)
+            casting.smart(world, [new], point=rally.point, target=rally.target)
     name = "NukeComplete" if unit.name in STOWED else "TrainWorkerComplete" if unit.worker else "TrainUnitComplete"
     world.alert(owner, name)
 
@@ -148,4 +148,11 @@ def _changed(world: World, slot: int, job: Job) -> None:
     world.alert(owner, "MorphComplete")
 
 
-FINISH: Final = {"train": _born, "research": _researched, "structure_morph": _changed}
+def _added(world: World, slot: int, job: Job) -> None:
+    site = world.slot_of(job.site)
+    if site != NOBODY:
+        world.addon[slot] = site
+        world.alert(int(world.owner[slot]), "AddOnComplete")
+
+
+FINISH: Final = {"addon": _added, "train": _born, "research": _researched, "structure_morph": _changed}

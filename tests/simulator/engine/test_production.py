@@ -53,6 +53,7 @@ def born(field: Field, name: str, limit: int = 3000) -> list[int]:
 )
 def test_training_costs_and_lasts_what_the_tables_say(rich: Field, parent: str, name: str) -> None:
     way = next(way for way in CATALOG.unit(name).made_by if way.producer == parent)
+    rich.put("Pylon", 1, 20.0, 16.0)
     slot = rich.put(parent, 1, 16.0, 16.0)
     rich.world.players[1].minerals = 1000.0
     assert order(rich, [slot], TRAIN[name]) == [slot]

@@ -1,0 +1,165 @@
+"""Skills of builders: placing a structure, going on with one, halting, and calling one off.
+
+A Probe goes as soon as the structure is placed, a Drone becomes it, an SCV stays until it is done.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import commands, construction, prices, production, sites
+from simulator.columns import NOBODY
+from simulator.orders import Order, OrderKind
+from simulator.refusal import Refusal
+from simulator.skills.production import MORPHS
+from simulator.skills.skill import Skill
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.casts import Cast, Point
+    from simulator.records import UnitType
+    from simulator.world import World
+
+
+# placing --------------------------------------------------------------------------------------------------------------
+
+
+def _place(world: World, cast: Cast) -> None:
+    """Begin a structure where it was asked for."""
+    unit, slot = sites.product(world, cast.ability), cast.slot
+    if unit is None:
+        return
+    owner, race = int(world.owner[slot]), world.unit_type(slot).race
+    paid = (0.0, 0.0) if "free" in world.players[owner].cheats else prices.cost_of(cast.ability)
+    geyser = cast.target
+    if geyser != NOBODY:
+        unit = _rich(world, unit, geyser)
+    point = _where(world, cast, unit)
+    if race == "zerg":
+        world.remove(slot)
+    made = construction.begin(
+        world, unit, owner, point, loops=cast.ability.loops, paid=paid, by_itself=race != "terran"
+    )
+    if geyser != NOBODY:
+        world.occupant[geyser], world.patch[made] = made, geyser
+        world.contents[made] = world.contents[geyser]
+    if race == "terran":
+        order = Order(OrderKind.FOLLOW, cast.ability.id, target=world.tag_of(made))
+        commands.begin(world, slot, order)
+
+
+def _rich(world: World, unit: UnitType, geyser: int) -> UnitType:
+    """The kind of gas structure that stands on a rich geyser."""
+    name = f"{unit.name}Rich"
+    rich = world.unit_type(geyser).per_trip > unit.per_trip and name in world.catalog.row_of_name
+    return world.catalog.unit(name) if rich else unit
+
+
+def _where(world: World, cast: Cast, unit: UnitType) -> Point:
+    if cast.target != NOBODY:
+        x, y = world.pos[cast.target].tolist()
+        return x, y
+    assert cast.point is not None
+    return sites.centre(world, unit, cast.point)
+
+
+def _can_place(world: World, cast: Cast) -> Refusal:
+    unit = sites.product(world, cast.ability)
+    if unit is None:
+        return Refusal.NOT_SUPPORTED
+    owner = int(world.owner[cast.slot])
+    if cast.target != NOBODY:
+        free = sites.is_free_geyser(world, cast.target)
+        return Refusal.SUCCESS if free else Refusal.CANT_BUILD_ON_THAT
+    if cast.point is None:
+        return Refusal.CANT_FIND_PLACEMENT_LOCATION
+    return sites.refusal(world, owner, unit, cast.point)
+
+
+def _is_known(world: World, _: int, ability: Ability) -> Refusal:
+    known = bool(ability.loops) and sites.product(world, ability) is not None
+    return Refusal.SUCCESS if known else Refusal.NOT_SUPPORTED
+
+
+# going on and halting -------------------------------------------------------------------------------------------------
+
+
+def resume(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
+    """The right click of a Terran builder on an unfinished structure: go on with it."""
+    unit = world.unit_type(target) if target != NOBODY else None
+    if unit is None or world.build_progress[target] >= 1.0 or world.self_made[target]:
+        return []
+    way = next((way for way in unit.made_by if way.kind == "build"), None)
+    taken: list[int] = []
+    for slot in slots:
+        mine = world.owner[slot] == world.owner[target]
+        if way is not None and mine and world.unit_type(slot).name == way.producer:
+            order = Order(OrderKind.FOLLOW, way.ability, target=world.tag_of(target))
+            taken += commands.give(world, [slot], order, queue=queue)
+    return taken
+
+
+def _halt(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
+    """Send the builder of a structure, or a builder itself, away from the work."""
+    for slot in slots:
+        builder = slot if world.unit_type(slot).worker else construction.builder_of(world, slot)
+        if builder != NOBODY:
+            world.site[builder] = NOBODY
+            commands.stop(world, [builder])
+    return slots
+
+
+def _is_at_work(world: World, slot: int, _: Ability) -> Refusal:
+    busy = world.site[slot] != NOBODY or construction.builder_of(world, slot) != NOBODY
+    return Refusal.SUCCESS if busy else Refusal.CANT_FIND_CANCEL_ORDER
+
+
+# calling off ----------------------------------------------------------------------------------------------------------
+
+
+def _cancel(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
+    """Call off a construction, a structure's change of kind or its add-on, or a mode change that is being prepared."""
+    for slot in slots:
+        if world.build_progress[slot] < 1.0:
+            construction.call_off(world, slot)
+        elif slot in world.jobs:
+            _cancel_change(world, slot)
+        else:
+            world.bound[slot] = False
+            commands.begin_next(world, slot)
+    return slots
+
+
+def _cancel_change(world: World, slot: int) -> None:
+    site = world.slot_of(world.jobs[slot][-1].site)
+    production.call_off(world, slot)
+    if site != NOBODY:
+        construction.call_off(world, site)
+
+
+def _has_something(world: World, slot: int, ability: Ability) -> Refusal:
+    """Whether there is anything of this kind to call off."""
+    if world.build_progress[slot] < 1.0:
+        return Refusal.SUCCESS
+    jobs = world.jobs.get(slot, [])
+    if jobs:
+        begun = world.catalog.ability(jobs[-1].ability)
+        fits = jobs[-1].kind in MORPHS and begun.link in (ability.link, "")
+        return Refusal.SUCCESS if fits else Refusal.CANT_FIND_CANCEL_ORDER
+    if world.casts[slot] and world.bound[slot]:
+        begun = world.catalog.ability(int(world.order_ability[slot]))
+        return Refusal.SUCCESS if begun.link == ability.link else Refusal.CANT_FIND_CANCEL_ORDER
+    return Refusal.CANT_FIND_CANCEL_ORDER
+
+
+SMARTS: Final = (resume,)
+SKILLS: Final = {
+    "build": Skill(
+        _place,
+        refuse=_can_place,
+        ready=_is_known,
+        estimates=("A builder places a structure as soon as it touches it.", "Units of others keep one from placing."),
+    ),
+    "halt": Skill(give=_halt, ready=_is_at_work, anytime=True),
+    "cancel": Skill(give=_cancel, ready=_has_something, anytime=True),
+}

@@ -1,0 +1,81 @@
+"""The skill of Warp Gates: warping a unit into a power field, from far away.
+
+The unit is there at once, helpless and vulnerable, until it is finished: soon in a field that a Nexus, a Gateway or a
+Warp Prism is near, later in others. The gate then needs its time before the next one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from simulator import construction, power, prices
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill
+from simulator.traits import layer_of
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+    from simulator.casts import Cast, Point
+    from simulator.records import UnitType
+    from simulator.world import World
+
+FAST_LOOPS: Final = 80.0
+
+
+def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
+    """Warp a unit in from the first gate that is ready."""
+    if point is None:
+        return []
+    slot = slots[0]
+    owner, unit = int(world.owner[slot]), world.catalog.unit(ability.unit)
+    source = power.best(world, owner, point)
+    if source is None or not _is_free(world, unit, point):
+        return []
+    paid = prices.charge(world, owner, prices.cost_of(ability))
+    slow = ability.numbers.get("slow_time_loops", ability.loops)
+    loops = ability.numbers.get("fast_time_loops", FAST_LOOPS) if source.fast else slow
+    construction.begin(world, unit, owner, point, loops=loops, paid=paid)
+    if ability.charges is not None:
+        world.timers.setdefault(slot, {})[ability.timer] = world.loop + ability.charges.loops
+    return [slot]
+
+
+def _can_warp_in(world: World, cast: Cast) -> Refusal:
+    if cast.point is None:
+        return Refusal.CANT_FIND_PLACEMENT_LOCATION
+    return refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
+
+
+def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
+    """Why a player can't warp a unit in at a point, or success."""
+    if power.best(world, player, point) is None:
+        return Refusal.CANT_BUILD_TOO_FAR_FROM_POWER
+    return Refusal.SUCCESS if _is_free(world, unit, point) else Refusal.CANT_WARP_IN_UNITS_THERE
+
+
+def _is_free(world: World, unit: UnitType, point: Point) -> bool:
+    """Whether a unit's body touches nobody and no wall at a point."""
+    at = np.array([point])
+    surface = world.ground.surface(layer_of(unit))
+    if not surface.flat[surface.cell(at)][0]:
+        return False
+    live = world.live
+    bodies = live[(world.layer[live] != 2) & ~world.walled[live] & (world.separation[live] > 0.0)]
+    offset = world.pos[bodies] - at
+    apart = (world.separation[bodies] + unit.separation) * 0.98
+    return not bool((offset[:, 0] ** 2 + offset[:, 1] ** 2 < apart**2).any())
+
+
+SKILLS: Final = {
+    "warp_in": Skill(
+        give=_warp_in,
+        refuse=_can_warp_in,
+        estimates=(
+            "Of several Warp Gates the first that is ready warps in.",
+            "A unit that is being warped in has all its life and shields from the beginning.",
+            "Chrono Boost does not shorten the time between two warp-ins of a gate.",
+        ),
+    )
+}

@@ -1,0 +1,19 @@
+"""Power: looked over when somebody came or went, was finished, or changed its kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from simulator import power
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+
+def run(world: World) -> None:
+    """Say which structures have power, if anything changed since the last time."""
+    if world.powered_at == world.population:
+        return
+    world.powered_at = world.population
+    for slot in power.supply(world):
+        world.refresh(slot)
