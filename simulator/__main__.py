@@ -70,7 +70,10 @@ def main(argv: list[str] | None = None) -> None:
     """Serves one game until a client says quit, or SIGTERM does."""
     signal.signal(signal.SIGTERM, _leave)
     signal.signal(signal.SIGINT, _leave)
-    arguments = parse(sys.argv[1:] if argv is None else argv)
+    try:
+        arguments = parse(sys.argv[1:] if argv is None else argv)
+    except ValueError as error:
+        sys.exit(f"StarCraft II simulator: -port needs a number: {error}")
     try:
         sock = listen(arguments.host, arguments.port)
     except (OSError, OverflowError) as error:

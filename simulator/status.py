@@ -47,7 +47,7 @@ LEGAL: dict[Status, frozenset[str]] = {
     Status.launched: _LOBBY,
     Status.init_game: _LOBBY | {"join_game"},
     Status.in_game: _PLAY,
-    Status.in_replay: _WATCH | {"step", "obs_action", "query"},
+    Status.in_replay: _WATCH | {"step", "obs_action", "query", "leave_game"},
     Status.ended: _WATCH | {"save_replay", "restart_game", "leave_game", "quick_load"},
     Status.quit: frozenset(),
 }

@@ -19,6 +19,7 @@ from simulator.catalog import VERSION_OF_BUILD, load_catalog
 from simulator.install import BASE_BUILD
 from simulator.maps import load_map, map_names
 from simulator.mechanics import entries
+from simulator.status import AFTER, LEGAL, Status
 from simulator.tick import SYSTEMS
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 SOURCES = "SOURCES.md"
 REFUSAL = "not supported"
 """What stands in a sentence with which the simulator refuses what the game can do."""
+MOVES = {"join_lan": "`join_game` with ports"}
+"""What the table of states distinguishes and the API does not."""
 SOURCED = {"catalog": "the game's data", "replay": "recorded games"}
 
 
@@ -47,6 +50,10 @@ def page() -> str:
         _abilities(),
         "## Requests",
         f"Of the SC2 API it takes {codes(HANDLERS)}.",
+        "### Requests by state",
+        "The state is in every response. A request without a dot is refused in that state with `Response.error`. That "
+        "changes nothing, and neither does a legal request that fails, with an error of its own kind.",
+        _states(),
         "## What is an estimate",
         _chapter("What is an estimate"),
         "### Constants of the rules",
@@ -87,6 +94,29 @@ def _abilities() -> str:
         "every other one is answered with `NotSupported`.",
         table(("ability", "name"), rows),
     )
+
+
+def _states() -> str:
+    """The table by which the simulator itself goes."""
+    states = [status for status in Status if status is not Status.quit]
+    moves = sorted(set().union(*LEGAL.values()), key=lambda move: ([move not in LEGAL[s] for s in states], move))
+    rows = [
+        (MOVES.get(move, code(move)), *("●" if move in LEGAL[state] else "" for state in states), _state_after(move))
+        for move in moves
+    ]
+    return join(
+        table(("request", *map(_state_name, states), "then"), rows),
+        f"A game that is decided, and a replay at its end, turn {_state_name(Status.in_game)} and "
+        f"{_state_name(Status.in_replay)} into {_state_name(Status.ended)}.",
+    )
+
+
+def _state_after(move: str) -> str:
+    return _state_name(AFTER[move]) if move in AFTER else ""
+
+
+def _state_name(status: Status) -> str:
+    return code(status.name)
 
 
 def _constants() -> str:

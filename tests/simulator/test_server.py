@@ -11,12 +11,21 @@ from aiohttp import WSMsgType
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.__main__ import Arguments, listen, parse
+from simulator.__main__ import Arguments, listen, main, parse
 from simulator.client import interface
 from simulator.server import serve
 from simulator.session import Session
 
 Ws = aiohttp.ClientWebSocketResponse
+
+ENDLESS = b"""# A map of Khala's simulator
+name: endless
+family: test
+title: One who never stops
+terrain: agria_open
+players: {1: {race: protoss, control: agent}}
+triggers: [{name: spawn, when: [start], do: [{create: {player: 1, unit: Zealot, at: [16, 16]}}]}]
+"""
 
 
 class Running:
@@ -121,6 +130,65 @@ async def test_a_connection_that_never_says_a_word_holds_nobody_up(running: Runn
     await silent.wait_closed()
 
 
+HALVES = {
+    "a handshake": b"GET /sc2api HTTP/1.1\r\nHost: x\r\nUpgrade: webso",
+    "a frame": b"GET /sc2api HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n\x82\xff\0\0\0\0\x02\xfa\xf0",
+}
+
+
+@pytest.mark.parametrize("half", HALVES.values(), ids=HALVES.keys())
+async def test_a_connection_that_stops_in_the_middle_holds_nobody_up(running: Running, half: bytes) -> None:
+    _, silent = await asyncio.open_connection("127.0.0.1", int(running.url.rpartition(":")[2]))
+    silent.write(half)
+    await silent.drain()
+    ws = await running.connect()
+    assert (await ask(ws, PING)).HasField("ping")
+    silent.transport.abort()
+    assert (await ask(ws, PING)).HasField("ping")
+
+
+@pytest.mark.parametrize("frame", [b"\x83\x80\0\0\0\0", b"\xf2\x81\0\0\0\0x"], ids=["opcode", "reserved bits"])
+async def test_what_is_no_frame_ends_that_connection_only(running: Running, frame: bytes) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", int(running.url.rpartition(":")[2]))
+    writer.write(HALVES["a frame"][: -len(b"\x82\xff\0\0\0\0\x02\xfa\xf0")] + frame)
+    async with asyncio.timeout(5):
+        await reader.read()
+    writer.close()
+    ws = await running.connect()
+    assert (await ask(ws, PING)).HasField("ping")
+
+
+async def test_a_client_that_vanishes_in_a_long_step_makes_room_for_the_next(running: Running) -> None:
+    ws = await running.connect()
+    create = sc.RequestCreateGame(
+        local_map=sc.LocalMap(map_data=ENDLESS), player_setup=[sc.PlayerSetup(type=sc.Participant)]
+    )
+    await ask(ws, sc.Request(create_game=create))
+    await ask(ws, sc.Request(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0))))
+    await ws.send_bytes(sc.Request(step=sc.RequestStep(count=2**31)).SerializeToString())
+    await asyncio.sleep(0)
+    ws._response.connection.transport.abort()  # type: ignore[union-attr]  # as if the client had been killed
+    async with asyncio.timeout(5):
+        ws = await running.connect()
+        seen = (await ask(ws, sc.Request(observation=sc.RequestObservation()))).observation.observation
+        assert 0 < seen.game_loop < 2**31
+        step = (await ask(ws, sc.Request(step=sc.RequestStep(count=2)))).step
+    assert step.simulation_loop >= seen.game_loop + 2
+
+
+async def test_a_client_that_vanishes_while_it_joins_over_lan_makes_room_for_the_next(running: Running) -> None:
+    ws = await running.connect()
+    join = sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0))
+    join.server_ports.game_port = join.server_ports.base_port = 1
+    await ws.send_bytes(sc.Request(join_game=join).SerializeToString())
+    with pytest.raises(TimeoutError):
+        await ws.receive_bytes(timeout=0.1)
+    async with asyncio.timeout(5):
+        ws = await running.connect()
+        assert (await ask(ws, PING)).status == sc.launched
+
+
 async def test_only_the_endpoint_exists(running: Running) -> None:
     async with running.http.get(f"{running.url}/") as response:
         assert response.status == 404
@@ -162,6 +230,12 @@ PYSC2 = "-listen 127.0.0.1 -port 15555 -dataDir /sc2/ -tempDir /tmp/sc-x/"
 )  # fmt: skip
 def test_the_command_lines_of_clients_are_understood(argv: str, arguments: Arguments) -> None:
     assert parse(argv.split()) == arguments
+
+
+def test_a_port_that_is_no_number_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    with pytest.raises(SystemExit, match="StarCraft II simulator: -port needs a number: "):
+        main(["-port", "x"])
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
