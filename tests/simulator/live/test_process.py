@@ -19,10 +19,15 @@ from simulator.client import interface
 pytestmark = pytest.mark.game
 
 Launch = Callable[..., subprocess.Popen[bytes]]
+PARTICIPANT = sc.PlayerSetup(type=sc.Participant)
 
 
 @pytest.fixture
 def port() -> int:
+    return free_port()
+
+
+def free_port() -> int:
     with socket.socket() as sock:
         sock.bind(("127.0.0.1", 0))
         number: int = sock.getsockname()[1]
@@ -63,13 +68,15 @@ async def test_the_data_version_of_the_command_line_is_told(launch: Launch, port
         assert (await ask(ws, ping=sc.RequestPing())).ping.data_version == "B89B5D6FA7CBF6452E721311BFBC6CB2"
 
 
-@pytest.mark.parametrize("how", ["quit", "SIGTERM", "SIGTERM in a step"])
+@pytest.mark.parametrize("how", ["quit", "SIGTERM", "SIGTERM in a step", "SIGTERM in a LAN wait"])
 async def test_the_process_ends_at_once(launch: Launch, port: int, how: str) -> None:
     process = launch(port)
     async with connect(port) as ws:
         await ask(ws, ping=sc.RequestPing())
         if how == "SIGTERM in a step":
             await start_long_step(ws)
+        if how == "SIGTERM in a LAN wait":
+            await start(ws, join_game=lan_join(1))
         started_s = time.monotonic()
         if how == "quit":
             await ws.send_bytes(sc.Request(quit=sc.RequestQuit()).SerializeToString())
@@ -101,9 +108,53 @@ async def start_long_step(ws: aiohttp.ClientWebSocketResponse) -> None:
     )
     await ask(ws, create_game=create)
     await ask(ws, join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface()))
-    await ws.send_bytes(sc.Request(step=sc.RequestStep(count=2**31)).SerializeToString())
+    await start(ws, step=sc.RequestStep(count=2**31))
+
+
+async def start(ws: aiohttp.ClientWebSocketResponse, **request: object) -> None:
+    """Sends a request that takes long."""
+    await ws.send_bytes(sc.Request(**request).SerializeToString())  # type: ignore[arg-type]  # one field
     with pytest.raises(TimeoutError):  # it is at work
         await ws.receive_bytes(timeout=0.3)
+
+
+def lan_join(port: int) -> sc.RequestJoinGame:
+    ports = sc.PortSet(game_port=port, base_port=port)
+    return sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0), server_ports=ports)
+
+
+@pytest.mark.parametrize("killed", ["host", "guest"])
+async def test_a_kill_ends_the_game_over_lan_and_not_the_other_process(launch: Launch, killed: str) -> None:
+    ports = [free_port() for _ in range(3)]
+    processes = [launch(number) for number in ports[:2]]
+    async with connect(ports[0]) as host, connect(ports[1]) as guest:
+        create = sc.RequestCreateGame(local_map=sc.LocalMap(map_path="2s3z"), player_setup=[PARTICIPANT] * 2)
+        await ask(host, create_game=create)
+        joins = await asyncio.gather(*(ask(ws, join_game=lan_join(ports[2])) for ws in (host, guest)))
+        assert [answer.join_game.player_id for answer in joins] == [1, 2]
+        victim, survivor = (0, guest) if killed == "host" else (1, host)
+        await start(survivor, step=sc.RequestStep(count=8))
+        processes[victim].kill()
+        async with asyncio.timeout(5):
+            answer = sc.Response.FromString(await survivor.receive_bytes())
+        assert (answer.status, answer.step.simulation_loop) == (sc.ended, 0)
+        seen = await ask(survivor, observation=sc.RequestObservation())
+        assert {r.player_id: r.result for r in seen.observation.player_result}[victim + 1] == sc.Defeat
+        assert (await ask(survivor, leave_game=sc.RequestLeaveGame())).status == sc.launched
+
+
+async def test_a_process_whose_client_is_killed_in_a_step_ends_when_told(launch: Launch, port: int) -> None:
+    process = launch(port)
+    async with connect(port) as ws:
+        await start_long_step(ws)
+        connection = ws._response.connection
+        assert connection is not None
+        assert connection.transport is not None
+        connection.transport.abort()
+    async with connect(port) as ws:
+        assert (await ask(ws, ping=sc.RequestPing())).status == sc.in_game
+        assert (await ask(ws, quit=sc.RequestQuit())).status == sc.quit
+    assert await asyncio.to_thread(process.wait, 5) == 0
 
 
 async def test_a_port_that_is_taken_is_told(launch: Launch, port: int, capfd: pytest.CaptureFixture[str]) -> None:
