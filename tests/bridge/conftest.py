@@ -11,7 +11,9 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.knowledge import knowledge
+from bridge.maps import known_maps
 from bridge.snapshot import Snapshot
+from bridge.standard import standard_task
 from bridge.task import TaskConfig
 from protocol.configfile import load
 
@@ -92,10 +94,12 @@ def snapshot() -> Callable[..., Snapshot]:
 
 @pytest.fixture
 def task() -> Callable[..., TaskConfig]:
-    """A shipped task by name, with other fields where some are given."""
+    """A shipped task by name, or the one that is made for a map, with other fields where some are given."""
 
     def get(name: str = "2s3z", **changed: Any) -> TaskConfig:
-        return load(TASKS / "llm_smac" / f"{name}.yaml", TaskConfig).model_copy(update=changed)
+        file = TASKS / "llm_smac" / f"{name}.yaml"
+        found = load(file, TaskConfig) if file.exists() else standard_task(known_maps()[name])
+        return found.model_copy(update=changed)
 
     return get
 

@@ -103,6 +103,23 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
     assert battle.reasons == []
 
 
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [
+        ("MoveToBeacon", {"Marine": 1}),
+        ("smac_MMM", {"Marine": 7, "Marauder": 2, "Medivac": 1}),
+        ("pvz_task4_level1", {"Stalker": 12}),
+        ("Simple64", {"Probe": 12}),
+    ],
+)
+def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name: str, units: dict[str, int]) -> None:
+    battle = start("raw", name)
+    (agent,) = battle.observer.observe(battle.now).agents.values()
+    assert {team.view.name: len(team.view.units) for team in agent.teams} == units
+    battle.turn(lambda _: "")
+    assert battle.now.outcome is None
+
+
 @pytest.mark.parametrize("executor", ["raw", "screen"])
 def test_a_battle_is_played_to_its_end(executor: str, start: Play) -> None:
     battle = start(executor).to_the_end()

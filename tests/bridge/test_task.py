@@ -59,6 +59,18 @@ def test_a_task_may_change_who_the_opponent_is() -> None:
     assert (config.map_spec.difficulty, config.map_spec.opponent) == ("easy", "protoss")
 
 
+def test_a_task_may_bring_its_own_map() -> None:
+    own = GOOD.replace("map: 2s3z", "own_map: {file: mine/ramp.SC2Map, race: protoss, opponent: null}")
+    spec = loads(own, TaskConfig, source="t").map_spec
+    assert (spec.name, spec.file, spec.opponent) == ("ramp", "mine/ramp.SC2Map", None)
+
+
+@pytest.mark.parametrize("maps", ["", "map: 2s3z\nown_map: {file: a/b.SC2Map, race: zerg, opponent: zerg}\n"])
+def test_a_task_has_exactly_one_map(maps: str) -> None:
+    with pytest.raises(ConfigError, match="give either map or own_map"):
+        loads(GOOD.replace("map: 2s3z\n", maps), TaskConfig, source="t")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "text"),
     [
