@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 Number = TypeVar("Number", float, "NDArray[np.float64]")
 
 MAX_PIXELS = 4096
+MAX_WIDTH, MAX_SCALE = 1000.0, 256.0
+"""World units that a screen may show, and pixels that one of them may have."""
 DEFAULT_WIDTH = 24.0
 """World units that the screen shows along its shorter side when a client does not say."""
 
@@ -113,4 +115,8 @@ def size_problem(options: sc.InterfaceOptions) -> str | None:
         for size in (setup.resolution, setup.minimap_resolution) if wanted else ():
             if not (0 < size.x <= MAX_PIXELS and 0 < size.y <= MAX_PIXELS):
                 return f"{name} of {size.x} x {size.y} pixels; between 1 and {MAX_PIXELS} are possible"
+        shorter, width = min(setup.resolution.x, setup.resolution.y), setup.width or DEFAULT_WIDTH
+        if wanted and not shorter / MAX_SCALE <= width <= MAX_WIDTH:
+            least = shorter / MAX_SCALE
+            return f"{name} of {width:g} world units; between {least:g} and {MAX_WIDTH:g} are possible in this size"
     return None

@@ -200,6 +200,11 @@ def test_a_game_that_cannot_be_created(client: Client, request_: dict[str, Any],
     assert response.status == sc.launched
 
 
+def _wide(width: float) -> sc.InterfaceOptions:
+    size = common_pb2.Size2DI(x=128, y=128)
+    return sc.InterfaceOptions(render=sc.SpatialCameraSetup(resolution=size, minimap_resolution=size, width=width))
+
+
 @pytest.mark.parametrize(
     ("request_", "error", "details"),
     [
@@ -211,6 +216,10 @@ def test_a_game_that_cannot_be_created(client: Client, request_: dict[str, Any],
          "Rendered images of 0 x 0 pixels; between 1 and 4096 are possible"),
         ({"race": 1, "options": sc.InterfaceOptions(feature_layer=sc.SpatialCameraSetup())}, "OtherError",
          "Feature layers of 0 x 0 pixels; between 1 and 4096 are possible"),
+        ({"race": 1, "options": _wide(-3.0)}, "OtherError",
+         "Rendered images of -3 world units; between 0.5 and 1000 are possible in this size"),
+        ({"race": 1, "options": _wide(float("nan"))}, "OtherError",
+         "Rendered images of nan world units; between 0.5 and 1000 are possible in this size"),
     ],
 )  # fmt: skip
 def test_a_game_that_cannot_be_joined(client: Client, request_: dict[str, Any], error: str, details: str) -> None:

@@ -65,10 +65,11 @@ class Ground:
         return np.asarray(cv2.multiply(self._covered, shade, scale=1 / 255), np.uint8)
 
     def _cut(self, terrain: Terrain, view: Rect) -> Image:
-        tiles = Cells(*(math.floor(v / TILE) for v in view[:2]), *(math.ceil(v / TILE) for v in view[2:]))
-        image = cut(
-            _mosaic(terrain, tiles, self._density), (tiles.x0 * TILE, tiles.y1 * TILE), self._density, view, self._size
-        )
+        tiles = _tiles(terrain, view)
+        if tiles is None:
+            return np.zeros((self._size[1], self._size[0], 3), np.uint8)
+        corner = (tiles.x0 * TILE, tiles.y1 * TILE)
+        image = cut(_mosaic(terrain, tiles, self._density), corner, self._density, view, self._size)
         if self._grid:
             colour = image.astype(np.float32)
             blend(colour, palette.GRID, GRID_OPACITY * (_lines(view, self._size) & (image.max(axis=2) > DARK)))
@@ -86,6 +87,14 @@ class Ground:
         return image
 
 
+def _tiles(terrain: Terrain, view: Rect) -> Cells | None:
+    """The tiles of the map that a view shows something of, counted in tiles; None if it shows none."""
+    columns, rows = (math.ceil(cells / TILE) for cells in terrain.size)
+    x0, y0 = max(0, math.floor(view.x0 / TILE)), max(0, math.floor(view.y0 / TILE))
+    x1, y1 = min(columns, math.ceil(view.x1 / TILE)), min(rows, math.ceil(view.y1 / TILE))
+    return Cells(x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+
+
 def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
     """Tiles side by side."""
     rows = [
@@ -97,19 +106,9 @@ def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
 
 @functools.lru_cache(maxsize=128)
 def _tile(terrain: Terrain, x: int, y: int, density: int) -> Image:
-    """One tile; those off the map are one and the same."""
-    cells = Cells(x * TILE, y * TILE, (x + 1) * TILE, (y + 1) * TILE)
-    width, height = terrain.size
-    if cells.x1 <= 0 or cells.y1 <= 0 or cells.x0 >= width or cells.y0 >= height:
-        return _nowhere(density)
-    image = paint_block(terrain, cells, density)
+    image = paint_block(terrain, Cells(x * TILE, y * TILE, (x + 1) * TILE, (y + 1) * TILE), density)
     image.setflags(write=False)
     return image
-
-
-@functools.lru_cache(maxsize=4)
-def _nowhere(density: int) -> Image:
-    return np.zeros((TILE * density, TILE * density, 3), np.uint8)
 
 
 def _lines(view: Rect, size: tuple[int, int]) -> Mask:
@@ -127,12 +126,14 @@ def cut(
 
     `corner` is the world point at the image's upper left, `density` its pixels per cell.
     """
+    across = down = density
     step = (view.x1 - view.x0) / size[0] * density
     if step > MOST_STEP:
         rows, columns = max(1, round(image.shape[0] / step)), max(1, round(image.shape[1] / step))
-        small = np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
-        return cut(small, corner, density * columns / image.shape[1], view, size)
-    left, top = (view.x0 - corner[0]) * density, (corner[1] - view.y1) * density
-    inverse = np.array([[step, 0, left + step / 2 - 0.5], [0, step, top + step / 2 - 0.5]], np.float32)
+        across, down = density * columns / image.shape[1], density * rows / image.shape[0]
+        image = np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+    step_x, step_y = (view.x1 - view.x0) / size[0] * across, (view.y1 - view.y0) / size[1] * down
+    left, top = (view.x0 - corner[0]) * across, (corner[1] - view.y1) * down
+    inverse = np.array([[step_x, 0, left + step_x / 2 - 0.5], [0, step_y, top + step_y / 2 - 0.5]], np.float32)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, inverse, size, flags=flags, borderMode=cv2.BORDER_CONSTANT), np.uint8)

@@ -33,6 +33,8 @@ DIRECTIONS = 16
 """Directions in which a unit is drawn facing."""
 FINER = 2
 """How many times larger a body is drawn than it is shown."""
+MAX_RADIUS = 320.0
+"""Pixels; on larger images units are drawn smaller than they are."""
 REACH = 1.8
 """Half of a sprite's size in radii of its unit: the longest outline and its shadow."""
 ONE_LETTER, ALL_LETTERS = 4.6, 7.5
@@ -106,6 +108,7 @@ class Wardrobe:
     def _make(self, look: Look) -> Sprite:
         unit = self._units[look.row]
         livery, radius = palette.livery_of(unit, look.side), max(unit.radius_shown, 0.1) * self._scale
+        radius = min(radius, MAX_RADIUS)
         key = (look.row, look.side, look.unfinished)
         body = self._bodies.get(key)
         if body is None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
@@ -91,6 +93,26 @@ def test_the_same_moment_is_painted_the_same(make_table: Any) -> None:
         table.game.step(40)
     assert (one.picture() == other.picture()).all()
     assert (one.overview() == other.overview()).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    screen=st.tuples(st.integers(1, 90), st.integers(1, 90)),
+    minimap=st.tuples(st.integers(1, 40), st.integers(1, 40)),
+    width=st.floats(1.0, 300.0),
+    camera=st.tuples(st.floats(-60, 100), st.floats(-60, 100)),
+)
+def test_images_of_every_size_can_be_painted_from_everywhere(
+    make_table: Any, screen: tuple[int, int], minimap: tuple[int, int], width: float, camera: tuple[float, float]
+) -> None:
+    table = make_table(sc.InterfaceOptions(render=setup(screen, minimap, width)), "braxis_ledge")
+    for k, name in enumerate(("Nexus", "Zergling", "Carrier", "ForceField", "MineralField", "Larva")):
+        table.put(name, k % 3, 5.0 * k + 1, 16.0)
+    table.world.fields += [Field("any", 2, [(9.0, 9.0), (40.0, 9.0)], 2.0, 0, 9, effect=k) for k in range(1, 14)]
+    table.seat.hands.camera = camera  # farther off than a client can point it
+    sent = table.observe().render_data
+    assert len(sent.map.data) == 3 * screen[0] * screen[1]
+    assert len(sent.minimap.data) == 3 * minimap[0] * minimap[1]
 
 
 # what is on them ------------------------------------------------------------------------------------------------------
