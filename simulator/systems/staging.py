@@ -272,13 +272,15 @@ def _select(world: World, who: Who) -> None:
 
 def _score(world: World, added: dict[int, float]) -> None:
     for player, amount in added.items():
-        world.players[player].score.curriculum += amount
+        if player < len(world.players):
+            world.players[player].score.curriculum += amount
 
 
 def _give(world: World, given: dict[int, Any]) -> None:
     for player, purse in given.items():
-        world.players[player].minerals += purse.minerals
-        world.players[player].vespene += purse.vespene
+        if player < len(world.players):
+            world.players[player].minerals += purse.minerals
+            world.players[player].vespene += purse.vespene
 
 
 _ACTIONS: Final[dict[type, Callable[[World, Any], None]]] = {

@@ -154,9 +154,14 @@ def _holds(world: World, condition: Condition | None) -> bool:
         all((len(world.units_of(player)) > 0) == (wanted == "some") for player, wanted in alive)
         and _counts(world, condition.count.items(), FINISHED)
         and _counts(world, condition.count_unfinished.items(), 0.0)
-        and all(asked.holds(world.players[p].score.curriculum) for p, asked in condition.score.items())
+        and all(asked.holds(_score(world, player)) for player, asked in condition.score.items())
         and (not condition.any or any(_holds(world, other) for other in condition.any))
     )
+
+
+def _score(world: World, player: int) -> float:
+    """The curriculum score of a player; who is not there has none."""
+    return world.players[player].score.curriculum if player < len(world.players) else 0.0
 
 
 def _counts(world: World, asked: Iterable[tuple[int, dict[str, Comparison]]], least: float) -> bool:
