@@ -16,6 +16,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.orders import OrderKind
+from simulator.systems.vision import detected
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
@@ -108,7 +109,9 @@ def look(world: World, types: Types, player: int, *, show_cloaked: bool, through
     order = np.argsort(types.flying[world.type[world.live]], kind="stable")
     keep = order[told[order]]
     hidden = (~seen | undetected)[keep]
-    sight = _columns(world, types, keep, hidden, own[keep], np.where(seen, cloak, Cloak.UNKNOWN.value)[keep])
+    known = np.where(seen, cloak, Cloak.UNKNOWN.value)[keep]
+    fakes = _fakes(world, player, world.live[keep], own[keep])
+    sight = _columns(world, types, keep, hidden, own[keep], known, fakes)
     shown = [] if through_fog else world.memories[player].shown
     return _with_snapshots(sight, world, types, player, shown) if shown else sight
 
@@ -143,7 +146,16 @@ def _with_snapshots(sight: Sight, world: World, types: Types, player: int, shown
     return Sight(**columns)
 
 
-def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, cloak: Ints) -> Sight:
+def _fakes(world: World, player: int, slots: Ints, own: Bools) -> Bools:
+    """(k,) which units the player knows to be hallucinations: his own, and others' under his detectors."""
+    fakes: Bools = world.hallucination[slots]
+    foreign = np.flatnonzero(fakes & ~own)
+    if foreign.size and player != OBSERVER:
+        fakes[foreign] = detected(world, player, slots[foreign])
+    return fakes
+
+
+def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, cloak: Ints, fakes: Bools) -> Sight:
     slot = world.live[keep]
     row, owner = world.type[slot], world.owner[slot]
     clear = ~hidden
@@ -171,9 +183,17 @@ def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, 
         build_progress=world.build_progress[slot],
         flying=types.flying[row],
         burrowed=world.burrowed[slot],
-        hallucination=world.hallucination[slot] & (own | (cloak == Cloak.DETECTED.value)),
-        active=((world.order_kind[slot] != OrderKind.IDLE.value) | (world.target[slot] != NOBODY)) & clear,
+        hallucination=fakes,
+        active=_active(world)[slot] & clear,
     )
+
+
+def _active(world: World) -> Bools:
+    """(capacity,) who has an order, fights by itself, or makes something."""
+    active: Bools = (world.order_kind != OrderKind.IDLE.value) | (world.target != NOBODY)
+    if world.jobs:
+        active[list(world.jobs)] = True
+    return active
 
 
 def _alliance(owner: Ints, own: Bools) -> Ints:

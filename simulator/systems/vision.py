@@ -54,12 +54,12 @@ def _seen_units(world: World, player: int) -> NDArray[np.bool_]:
     hidden = world.cloaked[slots] & ~own  # whatever burrows is cloaked until something uncovers it
     if hidden.any():
         found = np.flatnonzero(hidden)
-        hidden[found[_detected(world, player, slots[found])]] = False
+        hidden[found[detected(world, player, slots[found])]] = False
     seen &= ~hidden
     return seen
 
 
-def _detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
+def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(k,) whether a detector or a scan of the player's reaches each unit's edge."""
     eyes = world.units_of(player)
     eyes = eyes[world.detects[eyes] > 0.0]
