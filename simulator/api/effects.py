@@ -34,6 +34,7 @@ class Worn(NamedTuple):
     id: Ints  # of the API
     remain: Floats  # loops, 0 for one without an end
     total: Floats  # loops that it lasts, 0 for one without an end
+    foreign: NDArray[np.bool_]  # somebody else's unit cast it
 
 
 class Spots(NamedTuple):
@@ -71,7 +72,8 @@ def seen_buffs(world: World, sight: Sight) -> Worn | None:
     rows, end = rows[told], rows["end"][told]
     ends = end < FOREVER
     remain, total = np.where(ends, end - world.loop, 0.0), np.where(ends, end - rows["begun"], 0.0)
-    return Worn(row_of[rows["slot"]], ids[told], np.maximum(remain, 0.0), total)
+    foreign = rows["owner"] != world.owner[rows["slot"]]
+    return Worn(row_of[rows["slot"]], ids[told], np.maximum(remain, 0.0), total, foreign)
 
 
 def power(sight: Sight, types: Types) -> Power | None:

@@ -55,6 +55,18 @@ def bars(
         top += height
 
 
+def pips(image: Image, left: int, top: int, size: int, colours: Sequence[Colour]) -> None:
+    """Small squares side by side on a dark ground."""
+    rows, columns = image.shape[:2]
+    width = (size + 1) * len(colours)
+    if left < 1 or top < 1 or left + width >= columns or top + size >= rows:
+        return
+    image[top - 1 : top + size + 1, left - 1 : left + width] = palette.BAR
+    for k, colour in enumerate(colours):
+        x = left + k * (size + 1)
+        image[top : top + size, x : x + size] = colour
+
+
 def ring(image: Image, centre: Point, radius: float, colour: Colour, width: int = 1) -> None:
     """A circle with soft edges."""
     at = (fixed(centre[0]), fixed(centre[1]))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from simulator.api.effects import seen_buffs
 from simulator.api.painting import marks, palette, weather
 from simulator.api.painting.ground import Ground
 from simulator.api.painting.silhouettes import Class, class_of
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 GRID_FROM = 5.0
 """Pixels per cell from which the cells are shown."""
 SPARK_LOOPS = 2
+MOST_PIPS = 4
 TAIL = 0.6
 """World units that a missile draws behind it."""
 SMALL, TALL = 6.0, 30.0
@@ -71,6 +73,7 @@ class ScenePainter:
         self._shots(image, frame)
         weather.paint_above(image, frame, screen, sky)
         self._bars(image, frame, actors)
+        self._buffs(image, frame, actors)
         return image
 
     def _actors(self, frame: Frame) -> list[Actor]:
@@ -176,6 +179,20 @@ class ScenePainter:
             bottom = int(actor.y - actor.radius * 1.12) - 1
             height = 1 if actor.radius < SMALL else 2 if actor.radius < TALL else 3
             marks.bars(image, int(actor.x), bottom, width, height, shares)
+
+    def _buffs(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+        """A pip for each buff, below the unit."""
+        worn = seen_buffs(frame.world, frame.sight)
+        if worn is None:
+            return
+        colours: dict[int, list[Colour]] = {}
+        for row, foreign in zip(worn.row.tolist(), worn.foreign.tolist(), strict=True):
+            colours.setdefault(row, []).append(palette.BANE if foreign else palette.BOON)
+        size = 2 if self._scale < GRID_FROM * 3 else 3
+        for actor in actors:
+            if some := colours.get(actor.row):
+                left = int(actor.x) - (size + 1) * len(some[:MOST_PIPS]) // 2
+                marks.pips(image, left, int(actor.y + actor.radius) + 1, size, some[:MOST_PIPS])
 
 
 def _level(unit: UnitType) -> int:

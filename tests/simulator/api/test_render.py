@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import buffs
 from simulator.api.painting import palette, sprites
 from simulator.api.painting.silhouettes import CODES, OUTLINES, code_of, outline_of
 from simulator.api.sight import OBSERVER, Alliance
@@ -179,6 +180,18 @@ def test_an_attack_is_a_line_between_the_two(make_table: Any) -> None:
         bright.append(int((between.sum(axis=2) > 400).sum()))
     assert max(bright) > 4
     assert min(bright) == 0
+
+
+@pytest.mark.parametrize(("caster", "colour"), [(1, palette.BOON), (2, palette.BANE)])
+def test_a_buff_is_a_pip_below_its_bearer(make_table: Any, caster: int, colour: tuple[int, int, int]) -> None:
+    table = make_table(options())
+    marine = table.put("Marine", 1, 16, 16)
+    assert near(table.picture(), colour, 10) == 0
+    buffs.apply(table.world, marine, "Stimpack", owner=caster)
+    rows, columns = np.nonzero((table.picture() == colour).all(axis=2))
+    assert len(rows) == 4
+    assert rows.min() > 96
+    assert abs(columns.mean() - 95.5) < 3
 
 
 def test_an_effect_is_painted_in_its_radius(make_table: Any) -> None:
