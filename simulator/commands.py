@@ -235,6 +235,8 @@ def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[i
     taken = []
     wanted = order
     for slot in slots:
+        if world.carrier[slot] != NOBODY:
+            continue  # a passenger takes no orders
         order = _of_its_own(world, slot, wanted)
         if queue and world.order_kind[slot] != OrderKind.IDLE:
             if len(world.queue[slot]) >= QUEUE_LIMIT:

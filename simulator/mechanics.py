@@ -57,6 +57,7 @@ class Mechanics:
     crowd_near: float
     crowd_patience: int
     vision_period: int
+    bunker_range: float
     emp_speed_n: float
     yamato_speed_n: float
     mine_missile_speed_n: float

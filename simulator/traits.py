@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 from simulator.armament import weapon_traits
 from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
 from simulator.targets import measure_reach
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 INSTANT_TURN_DEG: Final = 180.0
+BUNKER: Final = "Bunker"
 DISGUISE: Final = "Changeling"  # types that look armed and are not
 
 
@@ -73,8 +75,22 @@ def body_traits(world: World, slot: int) -> None:
         _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
     if unit.name.startswith(DISGUISE):
         world.can_attack[slot] = world.acquires[slot] = False
+    if world.carrier[slot] != NOBODY:
+        _sheltered(world, slot)
     if world.weapon[slot] >= 0:
         measure_reach(world, slot)
+
+
+def _sheltered(world: World, slot: int) -> None:
+    """Who sits in a Bunker fires from its edge, one farther; nobody else fires from inside."""
+    carrier = int(world.carrier[slot])
+    if world.unit_type(carrier).name == BUNKER:
+        world.radius[slot] = world.radius[carrier]
+        world.range_add[slot] += MECHANICS.bunker_range
+        for scan in (world.ground_scan, world.air_scan):
+            scan[slot] += MECHANICS.bunker_range * (scan[slot] >= 0.0)
+    else:
+        world.can_attack[slot] = world.acquires[slot] = False
 
 
 def _turning(world: World, slot: int, unit: UnitType) -> None:
@@ -143,6 +159,14 @@ def _change(world: World, slot: int, buff: Buff) -> None:
         world.taken_factor[slot] *= response.factor
 
 
+def _unground(world: World, slot: int, flags: frozenset[str]) -> None:
+    """Take a unit's body out of the way, or the unit off the ground, where buffs do that."""
+    if "bodiless" in flags:
+        world.layer_bits[slot] = 0
+    if "lifted" in flags:
+        world.plane_bits[slot] = AIR_PLANE
+
+
 def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
     """Apply what buffs, being under construction or being without power forbid or hide."""
     unfinished = world.build_progress[slot] < 1.0
@@ -162,10 +186,7 @@ def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
     world.cloaked[slot] = (world.cloaked[slot] or "cloak" in flags) and not (unfinished or "uncloaked" in flags)
     if "blind" in flags or unfinished:
         world.detects[slot] = 0.0
-    if "bodiless" in flags:
-        world.layer_bits[slot] = 0
-    if "lifted" in flags:
-        world.plane_bits[slot] = AIR_PLANE
+    _unground(world, slot, flags)
     for name, column in (
         ("no_life_regen", world.life_regen),
         ("no_shield_regen", world.shield_regen),

@@ -33,6 +33,7 @@ from simulator.skills import (
     stargate,
     templar,
     terran,
+    transports,
     warpgate,
 )
 
@@ -58,6 +59,7 @@ SKILLS: Final[dict[str, Skill]] = {
     **mothership.SKILLS,
     **battery.SKILLS,
     **terran.SKILLS,
+    **transports.SKILLS,
 }
 FIELDS: Final[dict[str, FieldRule]] = {
     **sentry.FIELDS,
@@ -86,6 +88,9 @@ PASSIVES: Final[dict[str, UnitRule]] = {
     **stargate.PASSIVES,
     **mothership.PASSIVES,
     **terran.PASSIVES,
+    **transports.PASSIVES,
 }
-SMARTS: Final[tuple[SmartRule, ...]] = (*construction.SMARTS, *production.SMARTS)
-DEATHS: Final[dict[str, Callable[[World, int], None]]] = {}
+SMARTS: Final[tuple[SmartRule, ...]] = (*construction.SMARTS, *transports.SMARTS, *production.SMARTS)
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
+    **transports.DEATHS,
+}
