@@ -1,5 +1,7 @@
 """Requests made at random from the API's own descriptors: the session answers them all."""
 
+import asyncio
+import socket
 from typing import Any
 
 import pytest
@@ -8,9 +10,12 @@ from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator.api.lan import HOST
 from simulator.client import Client, interface
+from simulator.session import Session
 from simulator.status import Status
 
 KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
@@ -76,7 +81,11 @@ def prepare(state: Status) -> Client:
 
 
 def tame(kind: str, body: Any) -> None:
-    """Leaves out what is legal and only takes long: endless steps, huge images, real time."""
+    """Leaves out what is legal and only takes long: endless steps, huge images, real time, waiting for others."""
+    if kind == "join_game":
+        body.ClearField("server_ports")
+    if kind == "observation":
+        body.ClearField("game_loop")
     if kind == "step":
         body.count = min(body.count, LONG)
     if kind == "create_game":
@@ -102,3 +111,47 @@ def test_no_request_breaks_a_session(state: Status, data: st.DataObject) -> None
         assert Status(response.status) is client.session.status
         assert bool(response.error) != response.HasField(kind)  # type: ignore[arg-type]  # kind is a field's name
         assert not any(error.startswith("The simulator failed") for error in response.error)
+
+
+async def answer(session: Session, kind: str, body: Message) -> sc.Response:
+    request = sc.Request(id=3, **{kind: body})  # type: ignore[arg-type]  # kind is a field's name
+    async with asyncio.timeout(20):
+        response = sc.Response.FromString(await session.answer(request.SerializeToString()))
+    assert not any(error.startswith("The simulator failed") for error in response.error)
+    return response
+
+
+async def begin_over_lan() -> list[Session]:
+    sessions = [Session("."), Session(".")]
+    with socket.socket() as sock:
+        sock.bind((HOST, 0))
+        ports = sc.PortSet(game_port=sock.getsockname()[1], base_port=1)
+    participant = sc.PlayerSetup(type=sc.Participant)
+    create = sc.RequestCreateGame(local_map=sc.LocalMap(map_path="llm_smac/2s3z"), player_setup=[participant] * 2)
+    join = sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=32, minimap=32), server_ports=ports)
+    await answer(sessions[0], "create_game", create)
+    await asyncio.gather(*(answer(session, "join_game", join) for session in sessions))
+    assert [session.status for session in sessions] == [Status.in_game] * 2
+    return sessions
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@given(data=st.data())
+def test_no_request_breaks_a_game_over_lan(data: st.DataObject) -> None:
+    async def play() -> None:
+        sessions = await begin_over_lan()
+        for _ in range(8):
+            kind = data.draw(st.sampled_from([k for k in KINDS if k not in {"quit", "step"}]))
+            body = data.draw(REQUESTS[kind])
+            tame(kind, body)
+            await answer(data.draw(st.sampled_from(sessions)), kind, body)
+            await asyncio.gather(*(answer(session, "step", sc.RequestStep(count=4)) for session in sessions))
+        worlds = [session._process.playing for session in sessions]
+        if all(playing is not None and playing.peers is not None for playing in worlds):
+            first, second = (playing.game.world for playing in worlds if playing is not None)
+            assert first.loop != second.loop or first.digest() == second.digest()
+        for session in sessions:
+            await answer(session, "quit", sc.RequestQuit())
+        await asyncio.sleep(0.01)  # a link is closed when the event loop has said so to both ends
+
+    asyncio.run(play())
