@@ -182,6 +182,24 @@ def debug_set_value(world: World, tag: int, *, life: float | None = None, shield
         world.energy[slot] = min(energy, world.stats.energy_max[at])
 
 
+def debug_switch(world: World, player: int, name: str) -> None:
+    """Switch a debug state of a player's on, or off again."""
+    cheats = world.players[player].cheats
+    if name in cheats:
+        cheats.remove(name)
+    else:
+        cheats.append(name)
+    for slot in world.units_of(player).tolist():
+        world.refresh(slot)
+
+
+def debug_upgrade(world: World, player: int) -> None:
+    """Give a player every upgrade that can be researched."""
+    for ability in world.catalog.abilities:
+        if ability.does == "research":
+            grant_upgrade(world, player, world.catalog.upgrade(ability.upgrade).id)
+
+
 def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
     """Give a player a finished upgrade; its numbers count from now on, and more life is there at once."""
     owned = world.players[player].upgrades

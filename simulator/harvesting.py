@@ -136,6 +136,28 @@ def assigned(world: World) -> Ints:
     return np.bincount(patches, minlength=world.capacity)
 
 
+def staffing(world: World, player: int) -> dict[int, tuple[int, int]]:
+    """How many workers a player's town halls and gas structures have (assigned, ideal), by slot.
+
+    A town hall counts the workers on the mineral fields around it, and wants two for each.
+    """
+    takes, fields, halls = kinds(world.catalog)
+    workers, live = assigned(world), world.live
+    rows = world.type[live]
+    found: dict[int, tuple[int, int]] = {}
+    mine = (world.owner[live] == player) & (world.build_progress[live] >= 1.0)
+    for slot in live[mine & takes[rows]].tolist():
+        left = world.contents[slot] > 0
+        found[slot] = int(workers[slot]), world.unit_type(slot).ideal_harvesters if left else 0
+    patches = live[fields[rows]]
+    for slot in live[mine & halls[rows]].tolist():
+        offset = world.pos[patches] - world.pos[slot]
+        near = patches[offset[:, 0] ** 2 + offset[:, 1] ** 2 <= MECHANICS.harvest_search**2]
+        ideal = sum(world.unit_type(patch).ideal_harvesters for patch in near.tolist())
+        found[slot] = int(workers[near].sum()), ideal
+    return found
+
+
 def another_field(world: World, slot: int, near: Floats, *, waiting: int = NOBODY) -> int:
     """Which mineral field near a point a worker changes to, or NOBODY.
 

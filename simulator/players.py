@@ -54,6 +54,7 @@ class Score:
     damage_dealt: Vitals = field(default_factory=Vitals)
     damage_taken: Vitals = field(default_factory=Vitals)
     healed: Vitals = field(default_factory=Vitals)
+    deliveries: list[tuple[int, float, float]] = field(default_factory=list)  # loop, minerals, vespene: the last ones
     spent: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were charged
     curriculum: float = 0.0  # what the map's script gives
     collected: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were brought home

@@ -118,6 +118,8 @@ def _plain(world: World, slot: int) -> None:
     ):  # fmt: skip
         column[slot] = 0.0
     world.work_rate[slot] = 1.0
+    if "god" in world.players[int(world.owner[slot])].cheats:
+        world.taken_factor[slot] = 0.0
     world.can_act[slot] = world.can_attack[slot] = world.can_cast[slot] = True
     world.bonus_bits[slot], world.bonus_add[slot] = 0, 0.0
     if world.hallucination[slot]:

@@ -103,7 +103,8 @@ def judge(world: World, player: int, command: Command) -> Outcome:
     """How a command would go now, without giving it."""
     command = _without_snapshot(world, player, command)
     slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
-    own = [slot for slot in slots if world.owner[slot] == player]
+    all_obey = "control_enemy" in world.players[player].cheats
+    own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
     if not own:
         return _refused(Refusal.YOU_CANT_CONTROL_THAT_UNIT if slots else Refusal.ERROR)
     if command.point is not None and not all(map(math.isfinite, command.point)):

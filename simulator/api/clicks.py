@@ -17,6 +17,7 @@ from simulator.api.abilities import meant
 from simulator.api.selection import GROUPS, panel_order
 from simulator.api.sight import Alliance
 from simulator.columns import NOBODY
+from simulator.skills import production
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,6 +62,10 @@ def press(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
             done = toggle_autocast(seat.world, seat.player, ui.toggle_autocast.ability_id, seat.selection.tags)
         case "cargo_panel":
             done = _unload(seat, ui.cargo_panel.unit_index)
+        case "production_panel":
+            done = is_possible(seat, ui) and production.cancel_at(
+                seat.world, seat.selection.slots(seat.world)[0], ui.production_panel.unit_index
+            )
         case _:
             done = False
     return done
@@ -77,7 +82,9 @@ def is_possible(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
         return 0 <= ui.cargo_panel.unit_index < len(_cargo(seat))
     if kind == "toggle_autocast":
         return bool(_autocasters(seat.world, seat.player, ui.toggle_autocast.ability_id, seat.selection.tags))
-    return kind != "production_panel"
+    if kind == "production_panel":
+        return 0 <= ui.production_panel.unit_index < _queued(seat)
+    return True
 
 
 def toggle_autocast(world: World, player: int, requested: int, tags: Iterable[int]) -> bool:
@@ -104,6 +111,13 @@ def _cargo(seat: Seat) -> list[int]:
     """Tags of what is inside the selected transport, in the order of the panel."""
     slots = seat.selection.slots(seat.world)
     return [seat.world.tag_of(s) for s in seat.world.passengers(slots[0])] if len(slots) == 1 else []
+
+
+def _queued(seat: Seat) -> int:
+    """How many jobs the selected structure has in its queue."""
+    slots = seat.selection.slots(seat.world)
+    own = len(slots) == 1 and seat.world.owner[slots[0]] == seat.player
+    return len(seat.world.jobs.get(slots[0], ())) if own else 0
 
 
 def _unload(seat: Seat, index: int) -> bool:

@@ -22,6 +22,10 @@ MAX_UNITS = 400
 """Units that one command makes at most: more would not fit on any map."""
 
 _RESOURCES = 5000
+_SWITCHES = {
+    getattr(debug_pb2, name): name
+    for name in ("control_enemy", "food", "free", "god", "cooldown", "tech_tree", "fast_build")
+}
 
 
 def execute(world: World, player: int, command: debug_pb2.DebugCommand) -> None:
@@ -37,6 +41,8 @@ def execute(world: World, player: int, command: debug_pb2.DebugCommand) -> None:
             _end(world, player, command.end_game.end_result)
         case "game_state":
             _change_state(world, player, command.game_state)
+        case "score":
+            world.players[player].score.curriculum = command.score.score
 
 
 def _create(world: World, order: debug_pb2.DebugCreateUnit) -> None:
@@ -78,3 +84,7 @@ def _change_state(world: World, player: int, state: debug_pb2.DebugGameState.Val
         purse.vespene += _RESOURCES
     if state == debug_pb2.show_map:
         world.visibility[player] = 2
+    if state in _SWITCHES:
+        commands.debug_switch(world, player, _SWITCHES[state])
+    if state == debug_pb2.upgrade:
+        commands.debug_upgrade(world, player)

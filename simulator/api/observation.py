@@ -16,7 +16,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import ui, wire
 from simulator.api.abilities import result_of, usable
-from simulator.api.effects import seen_buffs, write_effects, write_power
+from simulator.api.effects import seen_buffs, write_effects, write_power, write_radar
 from simulator.api.layers import Frame
 from simulator.api.raw import Units, write_image
 from simulator.api.score import Holdings
@@ -60,6 +60,7 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
         _write_raw(observation.raw_data, seat, sight, selected)
         write_effects(observation.raw_data, seat, through_fog=disable_fog or seat.sees_all)
         write_power(observation.raw_data, seat, sight)
+        write_radar(observation.raw_data, seat)
     images: list[Part] = []
     if seat.views:
         fogged = world.fog and not (disable_fog or seat.sees_all)
@@ -76,6 +77,7 @@ def _told(seat: Seat, sight: Sight) -> None:
     seat.hands.forget()
     seat.deaths_told = len(seat.world.deaths)
     seat.mishaps_told = len(seat.world.mishaps)
+    seat.alerts_told = len(seat.world.alerts)
     seat.known = frozenset(sight.tag.tolist())
     seat.observed_loop = seat.world.loop
 
@@ -112,7 +114,9 @@ def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
 
 def _alerts(seat: Seat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Alert.ValueType]:
     structures = seat.types.structure[sight.row[attacked]]
-    alerts = [sc.BuildingUnderAttack] if structures.any() else []
+    told = seat.world.alerts[seat.alerts_told :]
+    alerts = [sc.Alert.Value(alert.name) for alert in told if alert.player == seat.player]
+    alerts += [sc.BuildingUnderAttack] if structures.any() else []
     return [*alerts, sc.UnitUnderAttack] if (~structures).any() else alerts
 
 
@@ -123,7 +127,9 @@ def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: 
     camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
     camera.z = seat.camera_z
     raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
-    Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight)).write(raw)
+    Units(
+        world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight), seat.player
+    ).write(raw)
     visibility, creep = world.visibility[seat.player], world.creep
     if seat.options.raw_crop_to_playable_area:
         x0, y0, x1, y1 = terrain.playable

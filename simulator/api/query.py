@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import error_pb2, query_pb2
 
-from simulator.api.abilities import usable
+from simulator import sites
+from simulator.api.abilities import result_of, usable
+from simulator.skills import warpgate
 from simulator.traits import Layer
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
     from simulator.api.seat import Seat
-    from simulator.catalog import Footprint
     from simulator.world import World
 
 
@@ -76,24 +77,14 @@ def _on_map(world: World, x: float, y: float) -> bool:
 
 
 def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> error_pb2.ActionResult.ValueType:
-    """Whether what an ability builds may stand at a point; the unit that would build it is not looked at."""
+    """Whether what an ability builds, lands or warps in may stand at a point; who would do it is not looked at."""
     world = seat.world
-    footprint = _footprint(world, question.ability_id)
-    if footprint is None:
+    ability = world.catalog.ability_of_id.get(question.ability_id)
+    unit = None if ability is None else sites.product(world, ability)
+    if unit is None or ability is None:
         return error_pb2.NotSupported
-    x, y = question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1]
-    if not _on_map(world, x, y):
+    point = (question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1])
+    if not (all(map(math.isfinite, point)) and _on_map(world, *point)):
         return error_pb2.CantBuildLocationInvalid
-    cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
-    terrain = world.map.terrain
-    if not ((cells >= 0) & (cells < terrain.size)).all() or not terrain.build[cells[:, 1], cells[:, 0]].all():
-        return error_pb2.CantBuildLocationInvalid
-    taken = terrain.walk[cells[:, 1], cells[:, 0]] & ~world.ground.walk[cells[:, 1], cells[:, 0]]
-    return error_pb2.CantBuildOnThat if taken.any() else error_pb2.Success
-
-
-def _footprint(world: World, ability: int) -> Footprint | None:
-    for unit in world.catalog.units:
-        if unit.structure and unit.ability == ability and ability:
-            return world.catalog.footprints.get(unit.placement or unit.footprint)
-    return None
+    rule = warpgate.refusal if ability.does == "warp_in" else sites.refusal
+    return result_of(rule(world, seat.player, unit, point))

@@ -7,11 +7,13 @@ real observations. Above: `observation.py`. Below: `sight.py`.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from s2clientprotocol import raw_pb2
 
+from simulator import harvesting
 from simulator.api.sight import Alliance
 from simulator.buffs import FOREVER
 from simulator.columns import NOBODY
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     from simulator.api.sight import Sight
     from simulator.api.types import Types
     from simulator.orders import Order
-    from simulator.world import World
+    from simulator.world import Rally, World
 
     Bools = NDArray[np.bool_]
 
@@ -42,6 +44,12 @@ class Units:
     on_screen: Bools
     origin: tuple[float, float]  # world point that is (0, 0) for the client
     worn: Worn | None = None  # buffs on them
+    player: int = 0  # whose observation it is
+
+    @functools.cached_property
+    def harvesters(self) -> dict[int, tuple[int, int]]:
+        """How many workers own town halls and gas structures (slots) have, and how many would be best."""
+        return harvesting.staffing(self.world, self.player)
 
     def write(self, raw: raw_pb2.ObservationRaw) -> None:
         """Adds all units to an observation."""
@@ -82,12 +90,16 @@ class Units:
         tables = np.stack([types.levels(tuple(player.upgrades)) for player in self.world.players])
         attack, armor, shield = tables[self.world.owner[s.slot], :, row].T
         fixed = types.structure[row] | (s.alliance == Alliance.NEUTRAL.value)
-        minerals, vespene = types.resource[row] * types.minerals_in[row], types.resource[row] * types.vespene_in[row]
-        return _rows(attack, armor, shield, ~fixed | types.armed[row], fixed, minerals, vespene)
+        contents = self.world.contents[s.slot]
+        minerals, vespene = contents * types.minerals_in[row], contents * types.vespene_in[row]
+        powered = types.needs_power[row] & self.world.powered[s.slot] & (self.world.build_progress[s.slot] >= 1.0)
+        return _rows(attack, armor, shield, ~fixed | types.armed[row], fixed, powered, minerals, vespene)
 
     def _write_own(self, unit: raw_pb2.Unit, slot: int) -> None:
         world, types, row = self.world, self.types, int(self.world.type[slot])
-        unit.assigned_harvesters = unit.ideal_harvesters = 0
+        unit.assigned_harvesters, unit.ideal_harvesters = self.harvesters.get(slot, (0, 0))
+        for rally in dict.fromkeys(world.rallies.get(slot, {}).values()):
+            self._write_rally(unit.rally_targets.add(), rally)
         if types.armed[row]:
             unit.weapon_cooldown = max(0.0, float(world.cooldown[slot]))
             if target := world.tag_of(int(world.target[slot])):
@@ -99,6 +111,13 @@ class Units:
         if types.cargo[row]:
             self._write_cargo(unit, slot)
         self._write_durations(unit, slot)
+
+    def _write_rally(self, message: raw_pb2.RallyTarget, rally: Rally) -> None:
+        x, y = rally.point
+        z = float(self.world.map.terrain.ground_z(np.array([rally.point]))[0])
+        message.point.x, message.point.y, message.point.z = x - self.origin[0], y - self.origin[1], z
+        if rally.target:
+            message.tag = rally.target
 
     def _write_cargo(self, unit: raw_pb2.Unit, slot: int) -> None:
         """Who is inside, and how much room that takes."""
@@ -195,14 +214,15 @@ def _write_vitals(  # a row of the table, in the order of its columns
     unit.is_selected = selected
 
 
-def _write_side(
-    unit: raw_pb2.Unit, attack: int, armor: int, shield: int, fights: bool, fixed: bool, minerals: int, vespene: int
-) -> None:
+def _write_side(  # a row of the table, in the order of its columns
+    unit: raw_pb2.Unit, attack: int, armor: int, shield: int, fights: bool, fixed: bool, powered: bool, minerals: int,
+    vespene: int,
+) -> None:  # fmt: skip
     unit.armor_upgrade_level, unit.shield_upgrade_level = armor, shield
     if fights:
         unit.attack_upgrade_level = attack
     if fixed:
-        unit.is_powered = False
+        unit.is_powered = powered
     if minerals:
         unit.mineral_contents = minerals
     if vespene:

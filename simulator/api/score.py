@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import sc2api_pb2, score_pb2
 
+from simulator import supply
+from simulator.arrays import which
 from simulator.orders import OrderKind
 
 if TYPE_CHECKING:
@@ -23,7 +25,9 @@ if TYPE_CHECKING:
     from simulator.players import Player, Spent, Vitals
     from simulator.world import World
 
-FOOD_LIMIT = 200
+RATE_LOOPS = 160
+"""Loops over which the rates of collection are told, as recorded games show."""
+FASTER_LOOPS = 22.4
 TOWN_HALL_MINERALS = 300
 """From this price on, a structure that provides supply is a town hall: no Pylon, depot or extractor is."""
 
@@ -36,13 +40,20 @@ class Holdings:
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.player: Player = world.players[player]
         self.kind = world.map.scenario.score
-        slots = world.units_of(player)
+        slots = which(world.alive & (world.owner == player))  # those inside others count, too
         rows = world.type[slots]
         names, columns = _columns(types)
         totals = np.bincount(rows, minlength=len(columns)) @ columns
         self.totals: dict[str, float] = dict(zip(names, totals.tolist(), strict=True))
         idle = (world.order_kind[slots] == OrderKind.IDLE.value) & types.worker[rows]
         self.idle_workers = int(idle.sum())
+        self.food = supply.used(world, player), supply.cap(world, player)
+        self.lately = [60.0 * FASTER_LOOPS / RATE_LOOPS * sum(amounts) for amounts in self._recent(world.loop)]
+
+    def _recent(self, loop: int) -> tuple[list[float], list[float]]:
+        """Minerals and vespene that were brought home in the last loops."""
+        rows = [row for row in self.player.score.deliveries if row[0] > loop - RATE_LOOPS]
+        return [minerals for _, minerals, __ in rows], [vespene for _, __, vespene in rows]
 
     def common(self) -> sc2api_pb2.PlayerCommon:
         """The counters at the top of the player's screen; supply in whole points."""
@@ -51,9 +62,9 @@ class Holdings:
             player_id=player.id,
             minerals=int(player.minerals),
             vespene=int(player.vespene),
-            food_cap=min(FOOD_LIMIT, int(totals["provides"])),
-            food_used=int(totals["supply"]),
-            food_army=int(totals["supply"] - totals["supply of workers"]),
+            food_cap=int(self.food[1]),
+            food_used=int(self.food[0]),
+            food_army=int(self.food[0] - totals["supply of workers"]),
             food_workers=int(totals["supply of workers"]),
             idle_worker_count=self.idle_workers,
             army_count=int(totals["army"]),
@@ -75,10 +86,10 @@ class Holdings:
             killed_value_structures=counted.killed_value_structures,
             collected_minerals=counted.collected[0],
             collected_vespene=counted.collected[1],
-            collection_rate_minerals=0,
-            collection_rate_vespene=0,
-            spent_minerals=0,
-            spent_vespene=0,
+            collection_rate_minerals=self.lately[0],
+            collection_rate_vespene=self.lately[1],
+            spent_minerals=counted.spent[0],
+            spent_vespene=counted.spent[1],
             killed_minerals=_spent(counted.killed, 0),
             killed_vespene=_spent(counted.killed, 1),
             lost_minerals=_spent(counted.lost, 0),
@@ -121,7 +132,6 @@ def _columns(types: Types) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     columns: dict[str, NDArray[np.float64]] = {
         "supply": types.supply,
         "supply of workers": types.supply * types.worker,
-        "provides": types.provides,
         "army": types.army.astype(np.float64),
         "warp gates": types.warp_gate.astype(np.float64),
         "larvae": types.larva.astype(np.float64),

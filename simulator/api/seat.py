@@ -75,13 +75,10 @@ class Seat:
         self.follow_script()
         self.deaths_told = 0
         self.mishaps_told = 0
+        self.alerts_told = 0
         self.known: frozenset[int] = frozenset()  # tags in the last observation
         self.observed_loop = -1
         self.alarm_loop = -(1 << 30)  # when an attack was last reported
-
-    def share(self, other: Seat) -> None:
-        """Has the camera, the selection and the reports of another seat from now on."""
-        self.hands = other.hands
 
     @property
     def screen(self) -> Screen:

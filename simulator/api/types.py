@@ -54,6 +54,7 @@ class Types:
         self.selectable: Bools = self._column(lambda unit: not unit.unselectable, np.bool_)
         self.warp_gate: Bools = self._column(lambda unit: unit.name == "WarpGate", np.bool_)
         self.larva: Bools = self._column(lambda unit: unit.name == "Larva", np.bool_)
+        self.needs_power: Bools = self._column(lambda unit: unit.needs_power, np.bool_)
         self.minerals_in: Bools = self._column(lambda unit: unit.resource == "minerals", np.bool_)
         self.vespene_in: Bools = self._column(lambda unit: unit.resource == "vespene", np.bool_)
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 NO_KILLER: Final = -1
+REMEMBERED_LOOPS: Final = 160  # how long deliveries count for the rate of collection
 RETRY_LOOPS: Final = 8  # how often a worker before a taken field looks for another one
 
 
@@ -143,12 +144,16 @@ def deliver(world: World, slot: int) -> None:
     """Enter what a worker carries into its owner's resources."""
     player = world.players[int(world.owner[slot])]
     amount = float(world.load[slot])
-    if harvesting.carries_gas(world, slot):
-        player.vespene += amount
-        player.score.collected[1] += amount
-    else:
-        player.minerals += amount
-        player.score.collected[0] += amount
+    gas = harvesting.carries_gas(world, slot)
+    minerals, vespene = (0.0, amount) if gas else (amount, 0.0)
+    player.minerals += minerals
+    player.vespene += vespene
+    score = player.score
+    score.collected[0] += minerals
+    score.collected[1] += vespene
+    score.deliveries.append((world.loop, minerals, vespene))
+    while score.deliveries[0][0] <= world.loop - REMEMBERED_LOOPS:
+        score.deliveries.pop(0)
     harvesting.put_down(world, slot)
 
 

@@ -7,7 +7,7 @@ from s2clientprotocol import common_pb2, error_pb2, query_pb2, raw_pb2
 
 from simulator.client import Client, interface
 
-PYLON, GATEWAY = 881, 883
+PYLON, GATEWAY, NEXUS, WARP_ZEALOT, REFINERY, SPAWNING_POOL = 881, 883, 880, 1413, 320, 1155
 
 
 @pytest.fixture
@@ -67,7 +67,11 @@ def place(client: Client, ability: int, x: float, y: float) -> str:
     ("ability", "point", "result"),
     [
         (PYLON, (9.0, 16.0), "Success"),
-        (GATEWAY, (9.5, 16.5), "Success"),
+        (GATEWAY, (9.5, 16.5), "CantBuildTooFarFromBuildPowerSource"),
+        (NEXUS, (9.5, 16.5), "Success"),
+        (WARP_ZEALOT, (9.5, 16.5), "CantBuildTooFarFromBuildPowerSource"),
+        (REFINERY, (9.5, 16.5), "CantBuildLocationInvalid"),
+        (SPAWNING_POOL, (9.5, 16.5), "CantBuildTooFarFromCreepSource"),
         (PYLON, (0.0, 0.0), "CantBuildLocationInvalid"),
         (PYLON, (-50.0, 900.0), "CantBuildLocationInvalid"),
         (PYLON, (float("nan"), 5.0), "CantBuildLocationInvalid"),
