@@ -72,11 +72,11 @@ def info(as_json: Json = False) -> None:
     typer.echo(f"StarCraft II 4.10.0 (build {facts['build']}), simulated")
     typer.echo(f"SC2PATH: {facts['sc2path'] or 'not set'} ({facts['sc2path_is']})")
     for entry in facts["maps"]:
-        typer.echo(f"  {entry['name']:<24} {entry['title']}")
+        typer.echo(f"  {entry['name']:<40} {entry['title']}")
 
 
 def _facts() -> dict[str, Any]:
-    from simulator.maps import load_map, map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
+    from simulator.maps import map_names, map_title  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     path = os.environ.get("SC2PATH")
     if not path:
@@ -87,7 +87,7 @@ def _facts() -> dict[str, Any]:
         kind = "not an install of this simulator"
     else:
         kind = "no such directory"
-    maps = [{"name": name, "title": load_map(name).scenario.title} for name in map_names()]
+    maps = [{"name": name, "title": map_title(name)} for name in map_names()]
     return {"build": BASE_BUILD, "sc2path": path, "sc2path_is": kind, "maps": maps}
 
 

@@ -123,6 +123,11 @@ def map_names() -> tuple[str, ...]:
     return tuple(sorted(name for family in _families() for name in _sheets(family)))
 
 
+def map_title(name: str) -> str:
+    """What the shipped map ``family/name`` is about."""
+    return _sheets(name.partition("/")[0])[name].title
+
+
 def find_map(name: str) -> str:
     """The shipped map that ``name`` means: ``family/name``, a bare name, or a path to an .SC2Map file of that name.
 

@@ -16,6 +16,8 @@ class ScriptMemory:
     """Where the named points are that were drawn by chance."""
     inside: dict[int, frozenset[int]] = field(default_factory=dict)
     """By trigger, the units that were in its region when it was last looked at."""
+    groups: dict[str, list[int]] = field(default_factory=dict)
+    """Units that were made as a named group, each time anew."""
     made: set[int] = field(default_factory=set)
     """Units whose making has been noticed, or that were there from the start."""
     selections: list[tuple[int, tuple[int, ...]]] = field(default_factory=list)
@@ -24,4 +26,4 @@ class ScriptMemory:
     def content(self) -> tuple[object, ...]:
         """Everything in a fixed order, for the digest of the world."""
         inside = [(trigger, sorted(tags)) for trigger, tags in sorted(self.inside.items())]
-        return sorted(self.points.items()), inside, sorted(self.made), self.selections
+        return sorted(self.points.items()), inside, sorted(self.groups.items()), sorted(self.made), self.selections

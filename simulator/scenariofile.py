@@ -62,6 +62,11 @@ class Sheet:
             message = first["msg"].removeprefix("Value error, ")
             raise ScenarioError(f"{mark.name}:{mark.line + 1}: {field or 'the file'}: {message}") from error
 
+    @property
+    def title(self) -> str:
+        """What the map is called, without looking at the rest."""
+        return _scalar(self.node, "title")
+
     def data(self) -> Any:
         """The plain data."""
         try:

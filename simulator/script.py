@@ -218,7 +218,7 @@ ORDERS: Final = ("attack_move", "move", "attack_units_of", "unload_at", "gather_
 
 
 class OrderSpec(Model):
-    """One order to a player's units; which of them is narrowed by ``unit``, ``inside`` and ``unless``.
+    """One order to a player's units; which of them is narrowed by ``unit``, ``group``, ``inside`` and ``unless``.
 
     ``gather_near`` is for the mineral field nearest to the place, ``unload_at`` for transports. ``queue`` says whether
     it replaces what they do, goes before that, or after it.
@@ -226,6 +226,7 @@ class OrderSpec(Model):
 
     player: Owner
     unit: UnitName | None = None
+    group: GroupName | None = None
     inside: RegionName | None = None
     unless: tuple[Trait, ...] = ()
     attack_move: Place | None = None

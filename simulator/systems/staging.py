@@ -67,18 +67,20 @@ def act(world: World, action: Action, subject: int) -> None:
 # units ----------------------------------------------------------------------------------------------------------------
 
 
-def create(world: World, spec: CreateSpec, *, placed: bool = False) -> None:
-    """Make the units of a specification; those of a player who is not there are left out.
+def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]:
+    """Make the units of a specification, and return their slots; nobody is made for a player who is not there.
 
     A single unit that is ``placed`` on the map stands exactly at its point, whoever else is there.
     """
     if spec.player >= len(world.players):
-        return
+        return []
+    slots = []
     unit = world.catalog.unit(spec.unit)
     alone = placed and spec.count == 1 and not unit.structure and kind_of_place(spec.at) in {"name", "point"}
     exact = spec.model_copy(update={"at": (point_of(world, spec.at),)}) if alone else spec
     for x, y, facing in _places(world, unit, exact):
         slot = world.spawn(unit, spec.player, (x, y), facing)
+        slots.append(slot)
         if spec.life is not None:
             world.life[slot] = min(spec.life, float(world.life_max[slot]))
         if spec.energy is not None:
@@ -86,6 +88,7 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> None:
         for name, count in spec.cargo.items():
             for _ in range(count):
                 world.stow(world.spawn(world.catalog.unit(name), spec.player, (x, y), facing), slot)
+    return slots
 
 
 def _places(world: World, unit: UnitType, spec: CreateSpec) -> Iterator[tuple[float, float, float]]:
@@ -196,8 +199,9 @@ def _addressed(world: World, spec: OrderSpec) -> list[int]:
     slots = world.units_of(spec.player)
     if spec.inside is not None:
         slots = slots[world.map.scenario.regions[spec.inside].covers(world.pos[slots])]
-    unit = spec.unit
-    return [s for s in slots.tolist() if _fits(world.unit_type(s), unit, spec.unless)]
+    if spec.group is not None:
+        slots = slots[np.isin(world.tag[slots], world.script.groups.get(spec.group, []))]
+    return [s for s in slots.tolist() if _fits(world.unit_type(s), spec.unit, spec.unless)]
 
 
 def _fits(unit: UnitType, name: str | None, unless: tuple[str, ...]) -> bool:
@@ -252,8 +256,8 @@ def point_of(world: World, place: Any) -> Point:
 
 def _spawn(world: World, names: tuple[str, ...]) -> None:
     for name in names:
-        for spec in world.map.scenario.groups[name]:
-            create(world, spec)
+        made = [slot for spec in world.map.scenario.groups[name] for slot in create(world, spec)]
+        world.script.groups[name] = [world.tag_of(slot) for slot in made]
 
 
 def _draw(world: World, options: tuple[dict[str, Any], ...]) -> None:
@@ -283,7 +287,7 @@ def _give(world: World, given: dict[int, Any]) -> None:
             world.players[player].vespene += purse.vespene
 
 
-_ACTIONS: Final[dict[type, Callable[[World, Any], None]]] = {
+_ACTIONS: Final[dict[type, Callable[[World, Any], object]]] = {
     Create: lambda world, action: create(world, action.create),
     Spawn: lambda world, action: _spawn(world, action.spawn),
     Regroup: lambda world, action: _regroup(world, action.regroup),

@@ -186,6 +186,18 @@ def test_an_order_goes_to_those_it_is_for() -> None:
     assert [o.point for s in world.units_of(2).tolist() for o in world.orders_of(s)] == [(10, 24)]
 
 
+def test_an_order_to_a_group_is_for_those_who_were_made_as_it_last() -> None:
+    world = world_of(
+        "groups:\n  wave: [{player: 2, unit: Zergling, at: east}]\n"
+        "triggers:\n  - name: go\n    when: [start, {at_loop: 2}]\n    do:\n"
+        "      - spawn: [wave]\n      - order: {player: 2, group: wave, move: west}\n"
+        "  - name: back\n    when: [{at_loop: 2}]\n    do: [{order: {player: 2, group: wave, move: east}}]\n"
+    )
+    advance(world, 2)
+    orders = {int(world.born_loop[s]): world.orders_of(s)[0].point for s in world.units_of(2).tolist()}
+    assert orders == {0: (10, 24), 2: (38, 24)}
+
+
 @pytest.mark.parametrize(
     ("queue", "points"),
     [("replace", [(38, 24)]), ("append", [(10, 24), (38, 24)]), ("front", [(38, 24), (10, 24)])],
