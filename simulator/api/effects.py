@@ -1,4 +1,4 @@
-"""What lies on the ground and on units for a time, as a player perceives it: effects, buffs, the power of pylons.
+"""What a player perceives besides units: effects on the ground, buffs, the power of pylons, what radar tells.
 
 The one place that decides which are told; raw data, feature layers and rendered images show the same. Below:
 `sight.py`, the world's fields and buffs.
@@ -6,12 +6,16 @@ The one place that decides which are told; raw data, feature layers and rendered
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from simulator.api.sight import API_NEUTRAL, Alliance, Display, alliance_of, sees
 from simulator.buffs import FOREVER
+from simulator.catalog import load_catalog
+from simulator.players import NEUTRAL
+from simulator.skills.buildings import RADAR, radars
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     from simulator.api.sight import Sight
     from simulator.api.types import Types
     from simulator.fields import Field
+    from simulator.skills.buildings import Radar
     from simulator.world import World
 
     Ints = NDArray[np.int64]
@@ -84,6 +89,47 @@ def power(sight: Sight, types: Types) -> Power | None:
     gives = (reach > 0) & (sight.alliance == Alliance.SELF.value) & (sight.build_progress >= 1) & ~sight.hallucination
     rows = np.flatnonzero(gives)
     return Power(rows, reach[rows])
+
+
+def seen_radars(world: World, player: int) -> list[Radar]:
+    """The radars that the player knows of: his own, and those of others where he sees the tower."""
+    if not np.count_nonzero(np.isin(world.type[: world.top], _towers(world.catalog.version))):
+        return []
+    known = [radar for radar in radars(world) if radar.owner == player]
+    others = [radar for radar in radars(world) if radar.owner != player]
+    if others:
+        seen = sees(world, player, np.array([radar.point for radar in others])).tolist()
+        known += [radar for radar, visible in zip(others, seen, strict=True) if visible]
+    return known
+
+
+def blips(world: World, types: Types, player: int) -> Floats:
+    """[n, 2] where own radar tells of others' units that the player does not see; structures do not move."""
+    own = [radar for radar in seen_radars(world, player) if radar.owner == player]
+    if not own:
+        return np.zeros((0, 2))
+    live = world.live
+    foreign = (world.owner[live] != player) & (world.owner[live] != NEUTRAL) & ~types.structure[world.type[live]]
+    pos = world.pos[live[foreign & ~world.is_visible(player)]]
+    near = np.zeros(len(pos), np.bool_)
+    for radar in own:
+        near |= ((pos - radar.point) ** 2).sum(axis=1) <= radar.radius**2
+    found: Floats = pos[near]
+    return found
+
+
+@functools.cache
+def _towers(version: str) -> list[int]:
+    catalog = load_catalog(version)
+    return [catalog.row_of_name[name] for name in RADAR if name in catalog.row_of_name]
+
+
+def write_radar(raw: raw_pb2.ObservationRaw, seat: Seat) -> None:
+    """Adds the radars that the player knows of to the raw data."""
+    for radar in seen_radars(seat.world, seat.player):
+        ring = raw.radar.add(radius=radar.radius)
+        x, y = radar.point
+        ring.pos.x, ring.pos.y, ring.pos.z = x - seat.origin[0], y - seat.origin[1], seat.ground_z(x, y)
 
 
 def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool) -> None:
