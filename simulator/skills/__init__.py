@@ -22,6 +22,7 @@ from simulator.skills import (
     addons,
     basics,
     battery,
+    carrier,
     construction,
     gateway,
     harvest,
@@ -60,6 +61,7 @@ SKILLS: Final[dict[str, Skill]] = {
     **battery.SKILLS,
     **terran.SKILLS,
     **transports.SKILLS,
+    **carrier.SKILLS,
 }
 FIELDS: Final[dict[str, FieldRule]] = {
     **sentry.FIELDS,
@@ -89,8 +91,10 @@ PASSIVES: Final[dict[str, UnitRule]] = {
     **mothership.PASSIVES,
     **terran.PASSIVES,
     **transports.PASSIVES,
+    **carrier.PASSIVES,
 }
 SMARTS: Final[tuple[SmartRule, ...]] = (*construction.SMARTS, *transports.SMARTS, *production.SMARTS)
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
     **transports.DEATHS,
+    **carrier.DEATHS,
 }

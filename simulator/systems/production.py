@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import casting, commands, production, supply
 from simulator.columns import NOBODY
+from simulator.skills import carrier
 from simulator.systems import placement
 
 if TYPE_CHECKING:
@@ -133,6 +134,11 @@ def _nearest_parent(world: World, slot: int) -> int:
 # everything else ------------------------------------------------------------------------------------------------------
 
 
+def _armed(world: World, slot: int, _: Job) -> None:
+    """A Carrier's new Interceptor is in its hangar at once."""
+    carrier.add_interceptor(world, slot)
+
+
 def _researched(world: World, slot: int, job: Job) -> None:
     owner = int(world.owner[slot])
     commands.grant_upgrade(world, owner, world.catalog.upgrade(job.makes).id)
@@ -155,4 +161,10 @@ def _added(world: World, slot: int, job: Job) -> None:
         world.alert(int(world.owner[slot]), "AddOnComplete")
 
 
-FINISH: Final = {"addon": _added, "train": _born, "research": _researched, "structure_morph": _changed}
+FINISH: Final = {
+    "addon": _added,
+    "arm": _armed,
+    "train": _born,
+    "research": _researched,
+    "structure_morph": _changed,
+}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -151,9 +152,7 @@ def test_without_workers_there_is_nobody_to_load(field: Any) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", UNLOAD_AT)
-def test_a_carrier_flies_to_a_point_and_lets_one_out_per_second_there(
-    make_field: Any, version: str, name: str
-) -> None:
+def test_a_carrier_flies_to_a_point_and_lets_one_out_per_second_there(make_field: Any, version: str, name: str) -> None:
     field = make_field(version=version)
     carrier = put(field, name, 1, 8.0, 8.0)
     units = fill(field, carrier, *["Zergling"] * 3)
@@ -164,7 +163,7 @@ def test_a_carrier_flies_to_a_point_and_lets_one_out_per_second_there(
             came.append(loop)
         if len(came) == 3:
             break
-    assert [b - a for a, b in zip(came, came[1:], strict=False)] == [16, 16]
+    assert [b - a for a, b in pairwise(came)] == [16, 16]
     for slot in units:
         assert math.dist(field.world.pos[slot], field.world.pos[carrier]) < 2.0
         assert field.world.looks_around[slot]
@@ -231,7 +230,7 @@ def test_nydus_entrances_share_what_is_inside_and_let_out_four_a_second(field: A
     for loop in field.loops(30):
         came += [loop] * (len(out(field, units)) - len(came))
     period = 16 * field.world.unit_type(exit_).unload_period_n
-    assert [b - a for a, b in zip(came, came[1:], strict=False)] == [period, period]
+    assert [b - a for a, b in pairwise(came)] == [period, period]
     assert all(math.dist(field.world.pos[s], (24.5, 24.5)) < 5.0 for s in units)
 
 
