@@ -220,3 +220,15 @@ def test_a_wave_brings_two_transports_with_four_banelings_each() -> None:
         assert len(new) == 2
         assert [len(world.passengers(slot)) for slot in new] == [4, 4]
         assert names.count("Baneling") <= 8 * wave
+
+
+def test_a_transport_that_comes_into_the_base_unloads_at_the_minerals() -> None:
+    world = new_game(load_map("pvz_task3_level2"), seed=1)
+    (first, *_) = [s for s in of_type(world, 2, "OverlordTransport") if world.pos[s][1] == 72]
+    while not world.ended and len(world.passengers(first)) == 4:
+        advance(world, 1)
+    x, y = world.pos[first].tolist()
+    assert np.hypot(x - 21.5, y - 48.5) < 3
+    advance(world, 80)
+    assert len(world.passengers(first)) == 0 or not world.alive[first]
+    assert len(of_type(world, 1, "Probe")) < 12
