@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import simulator.api
 from docs.pages.markdown import code, codes, head, join, prose, table
-from simulator.api import layers
 from simulator.api.data import rows as api_rows
 from simulator.api.requests import HANDLERS
 from simulator.casting import is_modelled
@@ -68,7 +67,6 @@ def page() -> str:
         _chapter("Not modelled by the rules yet"),
         "Refused with a sentence that says so:",
         "\n".join(f"* {text}" for text in _refusals()),
-        f"Screen layers that are sent empty: {codes(layers.BLANK)}.",
     )
 
 

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+BLIP_RADIUS = 0.5
+"""World units of the disc that stands for a unit of which radar tells nothing but its place."""
+
+
 class Worn(NamedTuple):
     """Buffs on units of a sight, one row each, in the order in which they came."""
 

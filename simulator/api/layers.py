@@ -16,7 +16,7 @@ import numpy as np
 from s2clientprotocol import spatial_pb2
 
 from simulator.api import wire
-from simulator.api.effects import Spots, power, seen_buffs, seen_fields
+from simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_buffs, seen_fields
 from simulator.api.raster import Layer, draw_discs, sample
 from simulator.api.sight import Cloak, Display
 
@@ -55,9 +55,6 @@ VALUES = (
     "build_progress", "placeholder", "buffs", "buff_duration",
 )  # fmt: skip
 """Layers that show a value of the topmost unit at each pixel."""
-
-BLANK = ("blip",)
-"""Screen layers of things that the world does not have yet."""
 
 CHEATING = frozenset({"unit_type"})
 """Minimap layers that are sent only when the client asks for cheating ones."""
@@ -108,8 +105,7 @@ class FeatureLayers:
         layers = image.layers
         parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
         parts += layers["unit_density"].encode(discs.density) + layers["unit_density_aa"].encode(discs.smooth)
-        parts += self._effects(frame) + self._power(frame)
-        return parts + [part for name in BLANK for part in layers[name].blank]
+        return parts + self._effects(frame) + self._power(frame) + self._blips(frame)
 
     def _effects(self, frame: Frame) -> list[Part]:
         """Effect ids at their places; of two at one pixel the younger one."""
@@ -127,6 +123,13 @@ class FeatureLayers:
             return layer.blank
         spots = Spots(frame.sight.pos[sources.row], sources.radius)
         return self._spots(layer, spots, np.ones(len(sources.row), np.int32), frame)
+
+    def _blips(self, frame: Frame) -> list[Part]:
+        layer, places = self._screen.layers["blip"], blips(frame.world, frame.types, frame.player)
+        if not len(places):
+            return layer.blank
+        spots = Spots(places, np.full(len(places), BLIP_RADIUS))
+        return self._spots(layer, spots, np.ones(len(places), np.int32), frame)
 
     def _spots(self, layer: Layer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
         """Discs of the world with a value each."""

@@ -73,6 +73,12 @@ def ring(image: Image, centre: Point, radius: float, colour: Colour, width: int 
     cv2.circle(image, at, round(radius * _ONE), colour, width, cv2.LINE_AA, SHIFT)
 
 
+def dot(image: Image, centre: Point, radius: float, colour: Colour) -> None:
+    """A disc with soft edges."""
+    at = (fixed(centre[0]), fixed(centre[1]))
+    cv2.circle(image, at, round(radius * _ONE), colour, -1, cv2.LINE_AA, SHIFT)
+
+
 def line(image: Image, start: Point, end: Point, colour: Colour, width: int = 1) -> None:
     """A line with soft edges."""
     one, other = (fixed(start[0]), fixed(start[1])), (fixed(end[0]), fixed(end[1]))
@@ -108,4 +114,4 @@ def spark(image: Image, at: Point, size: float, turn: int) -> None:
 def missile(image: Image, at: Point, tail: Point, colour: Colour, size: float) -> None:
     """A bright head with a short tail."""
     line(image, tail, at, colour, 1)
-    cv2.circle(image, (fixed(at[0]), fixed(at[1])), round(size * _ONE), (255, 255, 255), -1, cv2.LINE_AA, SHIFT)
+    dot(image, at, size, (255, 255, 255))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from simulator.api.effects import blips
 from simulator.api.painting import marks, palette
 from simulator.api.painting.ground import Ground
 from simulator.api.projection import Rect
@@ -43,6 +44,8 @@ class OverviewPainter:
         """The image of this frame."""
         image = self._ground.paint(frame.world, frame.player, self._shown, fog=frame.fogged)
         self._dots(image, frame)
+        for x, y in blips(frame.world, self._types, frame.player).tolist():
+            marks.dot(image, self._minimap.to_pixels(x, y), LEAST, palette.BLIP)
         image[self._rest[1] :] = 0
         image[:, self._rest[0] :] = 0
         self._camera(image, frame)
@@ -69,8 +72,7 @@ class OverviewPainter:
                 x0, y0 = max(0, round(column - size)), max(0, round(line - size))
                 image[y0 : max(0, round(line + size)), x0 : max(0, round(column + size))] = colour
             else:
-                at = (marks.fixed(column), marks.fixed(line))
-                cv2.circle(image, at, round(size * (1 << marks.SHIFT)), colour, -1, cv2.LINE_AA, marks.SHIFT)
+                marks.dot(image, (column, line), size, colour)
 
     def _camera(self, image: Image, frame: Frame) -> None:
         view = self._screen.view(frame.camera)

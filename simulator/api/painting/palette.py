@@ -76,6 +76,7 @@ HEALTH: tuple[Colour, Colour, Colour] = ((232, 58, 48), (240, 196, 48), (84, 214
 SHIELD: Colour = (120, 200, 255)
 ENERGY: Colour = (206, 118, 255)
 PROGRESS: Colour = (250, 226, 120)
+BLIP: Colour = (150, 30, 40)
 BOON: Colour = (255, 214, 92)
 """A buff that somebody has from his own side, and one from another."""
 BANE: Colour = (232, 92, 255)

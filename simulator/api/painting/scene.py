@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from simulator.api.effects import seen_buffs
+from simulator.api.effects import BLIP_RADIUS, blips, seen_buffs
 from simulator.api.painting import marks, palette, weather
 from simulator.api.painting.ground import Ground
 from simulator.api.painting.silhouettes import Class, class_of
@@ -70,6 +70,7 @@ class ScenePainter:
         actors = self._actors(frame)
         sky = weather.paint_below(image, frame, screen)
         self._units(image, frame, actors)
+        self._blips(image, frame)
         self._shots(image, frame)
         weather.paint_above(image, frame, screen, sky)
         self._bars(image, frame, actors)
@@ -110,6 +111,12 @@ class ScenePainter:
         sides = palette.sides(sight.owner, sight.alliance, frame.player)
         columns = (sight.row, sides, turn, veiled, sight.build_progress < 1)
         return list(map(Look._make, zip(*(column.tolist() for column in columns), strict=True)))
+
+    def _blips(self, image: Image, frame: Frame) -> None:
+        """Where radar tells of somebody: dark discs without a type."""
+        for point in blips(frame.world, self._types, frame.player):
+            x, y = self._pixel(frame, point)
+            marks.dot(image, (x, y), BLIP_RADIUS * self._scale, palette.BLIP)
 
     # shots ------------------------------------------------------------------------------------------------------------
 

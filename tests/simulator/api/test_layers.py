@@ -1,5 +1,6 @@
 """The feature layers against the contract of the API: which there are, their depth and length, and what they show."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator import buffs
 from simulator.api import layers
+from simulator.api.layers import Frame
+from simulator.api.sight import Display
 from simulator.fields import Field
 
 SCREEN = {
@@ -176,8 +179,29 @@ def test_power_surrounds_a_finished_pylon(make_table: Any) -> None:
     assert table.screen("build_progress")[64, 64] == 127
 
 
-@pytest.mark.parametrize("name", layers.BLANK)
-def test_layers_of_what_the_world_does_not_have_are_zero(make_table: Any, name: str) -> None:
+def test_radar_tells_where_unseen_units_are_and_nothing_else(make_table: Any) -> None:
+    table = make_table(options((128, 128)), fog=True)
+    tower = table.put("SensorTower", 1, 4, 4)
+    table.put("Roach", 2, 24, 20)
+    table.put("SpawningPool", 2, 28, 28)
+    table.game.step(8)
+    assert np.argwhere(table.screen("blip")).mean(axis=0) == pytest.approx((128 - 20 * 4 - 0.5, 24 * 4 - 0.5), abs=2)
+    assert not table.screen("unit_type")[30:60, 80:110].any()
+    (ring,) = table.observe().raw_data.radar
+    assert (ring.pos.x, ring.pos.y, ring.radius) == (4, 4, 30)
+    table.world.build_progress[tower] = 0.5
+    assert not table.screen("blip").any()
+    assert not table.observe().raw_data.radar
+
+
+def test_a_placeholder_is_a_unit_that_is_to_be_built(make_table: Any) -> None:
     table = make_table(options())
-    table.put("Stalker", 1, 16, 16)
-    assert not table.screen(name).any()
+    table.put("Pylon", 1, 16, 16)
+    sight = table.seat.look()
+    planned = dataclasses.replace(sight, display=np.full(len(sight), Display.PLACEHOLDER.value))
+    frame = Frame(
+        table.world, table.game.types, 1, planned, np.zeros(1, np.bool_), (16, 16), np.zeros((0, 2)), fogged=False
+    )
+    values = dict(zip(layers.VALUES, layers.unit_values(frame)[:, 0].tolist(), strict=True))
+    assert (values["placeholder"], values["unit_type"]) == (1, table.world.catalog.unit("Pylon").id)
+    assert not table.screen("placeholder").any()
