@@ -97,7 +97,8 @@ def power(sight: Sight, types: Types) -> Power | None:
 
 def seen_radars(world: World, player: int) -> list[Radar]:
     """The radars that the player knows of: his own, and those of others where he sees the tower."""
-    if not np.count_nonzero(np.isin(world.type[: world.top], _towers(world.catalog.version))):
+    types = world.type[: world.top]
+    if not any(np.count_nonzero(types == row) for row in _towers(world.catalog.version)):
         return []
     known = [radar for radar in radars(world) if radar.owner == player]
     others = [radar for radar in radars(world) if radar.owner != player]
