@@ -20,10 +20,6 @@ OVERCHARGE = "BatteryOvercharge"
 OVERCHARGE_ABILITY = 4107
 
 
-def _begin(world: World, cast: Cast) -> None:
-    """Nothing yet: the shields come loop by loop."""
-
-
 def _recharge(world: World, cast: Cast) -> bool:
     """Give one loop's shields; over when they are full, the energy is used up, or the unit has gone too far away."""
     slot, target = cast.slot, int(world.order_target[cast.slot])
@@ -41,6 +37,11 @@ def _recharge(world: World, cast: Cast) -> bool:
     world.energy[slot] -= given * price
     world.players[int(world.owner[target])].score.healed.shields += given
     return given > 0.0 and world.shields[target] < world.shields_max[target]
+
+
+def _begin(world: World, cast: Cast) -> None:
+    """Fill a unit's shields, loop by loop, with the battery's energy."""
+    _recharge(world, cast)
 
 
 def _boost(world: World, slot: int) -> float:
@@ -64,6 +65,7 @@ def _cant_recharge(world: World, cast: Cast) -> Refusal:
 
 
 def _stop(world: World, cast: Cast) -> None:
+    """End the recharging."""
     commands.begin_next(world, cast.slot)
 
 
@@ -72,6 +74,7 @@ def _cant_stop(world: World, cast: Cast) -> Refusal:
 
 
 def _overcharge(world: World, cast: Cast) -> None:
+    """Let a battery work faster and for nothing for a while."""
     buffs.apply(world, cast.target, OVERCHARGE, source=cast.slot, loops=number(cast, "duration_loops"))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from simulator.abilities import Ability
-    from simulator.casts import Point
+    from simulator.casts import Cast, Point
     from simulator.columns import Ints
     from simulator.skills.skill import UnitRule
     from simulator.world import World
@@ -142,8 +142,13 @@ def _take_along(world: World, carrier: int) -> None:
             world.attacker[slot] = world.attacker[carrier]
 
 
+def _build(world: World, cast: Cast) -> None:
+    """Build an Interceptor in the Carrier's hangar."""
+
+
 SKILLS: Final = {
     "arm": Skill(
+        _build,
         give=_arm,
         ready=_has_place,
         estimates=(

@@ -43,6 +43,7 @@ def _landing(world: World, cast: Cast) -> Point | None:
 
 
 def _blink(world: World, cast: Cast) -> None:
+    """Be at a place in sight, no farther away than it reaches, at once."""
     point = _landing(world, cast)
     if point is not None:
         teleport.turn(world, cast.slot, point)
@@ -50,6 +51,7 @@ def _blink(world: World, cast: Cast) -> None:
 
 
 def _stride(world: World, cast: Cast) -> None:
+    """Be at a place in sight at once; since 5.0.13 no attack follows for a second."""
     _blink(world, cast)
     if STRIDE_DELAY in world.catalog.buff_of_name:
         buffs.apply(world, cast.slot, STRIDE_DELAY, source=cast.slot)
@@ -75,6 +77,7 @@ def _prey(world: World, slot: int, ability: Ability) -> int:
 
 
 def _charge(world: World, cast: Cast) -> None:
+    """Run at a unit, and deal extra damage with the first blow where the version has that."""
     if world.target[cast.slot] != cast.target:
         commands.attack_unit(world, [cast.slot], world.tag_of(cast.target))
     buffs.apply(world, cast.slot, CHARGING, source=cast.slot)
@@ -115,6 +118,7 @@ CHARGE = 1819
 
 
 def _phase_shift(world: World, cast: Cast) -> None:
+    """Send out a shade, and stand where it is when its time is over."""
     slot = cast.slot
     x, y = world.pos[slot].tolist()
     lasts = number(cast, "duration_loops")

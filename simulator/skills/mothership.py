@@ -115,6 +115,7 @@ def _nobody_to_recall(world: World, cast: Cast) -> Refusal:
 
 
 def _time_warp(world: World, cast: Cast) -> None:
+    """Slow the enemies around a place, as soon as the bubble has grown."""
     grown = world.loop + number(cast, "growing_loops")
     world.fields.append(
         Field(
@@ -163,6 +164,7 @@ def _cloak_around(world: World, slot: int, _: np.void) -> None:
 
 
 def _cloak(world: World, cast: Cast) -> None:
+    """Cloak the owner's units and structures around the Mothership for a while."""
     buffs.apply(world, cast.slot, CLOAK_FIELD, source=cast.slot, loops=number(cast, "duration_loops"))
 
 
@@ -170,6 +172,7 @@ def _cloak(world: World, cast: Cast) -> None:
 
 
 def _chrono_boost(world: World, cast: Cast) -> None:
+    """Let a structure work faster for a while."""
     buffs.apply(world, cast.target, str(cast.ability.numbers["buff"]), source=cast.slot)
 
 

@@ -37,6 +37,7 @@ BARRIER_ABILITY = 2328
 
 
 def _nova(world: World, cast: Cast) -> None:
+    """Send out a ball that can be steered and bursts when its time is over."""
     slot, lasts = cast.slot, number(cast, "duration_loops")
     x, y = world.pos[slot].tolist()
     nova = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
@@ -136,6 +137,11 @@ def _raise(world: World, slot: int) -> None:
     world.barrier[slot] = response.limit
 
 
+def _raise_by_order(world: World, cast: Cast) -> None:
+    """Raise a barrier that takes damage in its bearer's stead; Immortals do it by themselves."""
+    _raise(world, cast.slot)
+
+
 def _lower(world: World, slot: int) -> None:
     buffs.remove(world, slot, BARRIER)
     world.barrier[slot] = 0.0
@@ -152,7 +158,7 @@ def _active_over(world: World, slot: int, _: np.void) -> None:
 SKILLS: Final = {
     "purification_nova_targeted": Skill(_nova, estimates=("The nova touches a unit whose edge is within its radius.",)),
     "immortal_overload": Skill(
-        lambda world, cast: _raise(world, cast.slot),
+        _raise_by_order,
         estimates=("Hits in the same loop as the first one get past a barrier that they raise.",),
     ),
 }

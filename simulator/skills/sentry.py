@@ -34,6 +34,7 @@ MASSIVE: Final = 1 << ATTRIBUTES.index("massive")
 
 
 def _guardian_shield(world: World, cast: Cast) -> None:
+    """Surround the Sentry with a shield that follows it and takes damage from ranged hits on friends."""
     world.fields.append(
         Field(
             does="guardian_shield",
@@ -74,6 +75,7 @@ def _place(world: World, slot: int) -> tuple[float, float]:
 
 
 def _force_field(world: World, cast: Cast) -> None:
+    """Put up a wall that nobody on the ground can pass until it ends, or somebody massive breaks it."""
     unit = world.catalog.unit("ForceField")
     point = place_of(world, cast)
     slot = world.spawn(unit, 0, point)
@@ -124,6 +126,7 @@ def shatter(world: World, slot: int) -> None:
 
 
 def _hallucinate(world: World, cast: Cast) -> None:
+    """Make images that deal no damage, take double and last a while."""
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     for slot in teleport.beside(world, cast.slot, unit, int(number(cast, "count"))):
         make_hallucination(world, slot, number(cast, "duration_loops"))

@@ -44,6 +44,7 @@ RECALLED: Final = ("NexusMassRecallWarpOut", "MothershipStrategicWarpOut", "Moth
 
 
 def _lift(world: World, cast: Cast) -> None:
+    """Lift a unit off the ground, where it can do nothing, for as long as the beam holds."""
     for name in LIFTER:
         buffs.apply(world, cast.slot, name, source=cast.slot)
     world.burrowed[cast.target] = False
@@ -90,6 +91,7 @@ def _cant_lift(world: World, cast: Cast) -> Refusal:
 
 
 def _let_go(world: World, cast: Cast) -> None:
+    """End the beam."""
     commands.begin_next(world, cast.slot)
 
 
@@ -101,11 +103,13 @@ def _cant_let_go(world: World, cast: Cast) -> Refusal:
 
 
 def _pulsar_on(world: World, cast: Cast) -> None:
+    """Switch on the beam, which spends energy until it is switched off or there is none."""
     buffs.apply(world, cast.slot, PULSAR, source=cast.slot)
     world.scan_now = True
 
 
 def _pulsar_off(world: World, cast: Cast) -> None:
+    """Switch off the beam."""
     _disarm(world, cast.slot)
 
 
@@ -130,6 +134,7 @@ def _mind_energy(world: World, slots: list[int]) -> None:
 
 
 def _reveal(world: World, cast: Cast) -> None:
+    """Let the owner see the enemies around a place for a while, cloaked ones too."""
     owner = int(world.owner[cast.slot])
     near = around(world, place_of(world, cast), number(cast, "radius"))
     for slot in foes(world, near, owner):
@@ -223,10 +228,12 @@ def _catch(world: World, field: Field) -> None:
 
 
 def _align(world: World, cast: Cast) -> None:
+    """Deal more damage to armored units for a while, and be slower."""
     buffs.apply(world, cast.slot, PRISM, source=cast.slot, loops=number(cast, "duration_loops"))
 
 
 def _unalign(world: World, cast: Cast) -> None:
+    """End the alignment."""
     buffs.remove(world, cast.slot, PRISM)
 
 

@@ -37,6 +37,7 @@ SPARED_BY_FEEDBACK: Final = frozenset({"OrbitalCommand", "OrbitalCommandFlying",
 
 
 def _psi_storm(world: World, cast: Cast) -> None:
+    """Let a storm rage at a place that hurts everybody in it but structures."""
     period = number(cast, "search_period_loops")
     world.fields.append(
         Field(
@@ -77,6 +78,7 @@ def _hurt(world: World, slot: int, source: int, owner: int) -> None:
 
 
 def _feedback(world: World, cast: Cast) -> None:
+    """Drain all energy of a unit and hurt it by half of that."""
     energy = float(world.energy[cast.target])
     amount = energy * number(cast, "damage_per_energy")
     world.energy[cast.target] = energy * (1.0 - number(cast, "energy_drained_fraction"))
@@ -89,14 +91,6 @@ def _cant_feed_back(world: World, cast: Cast) -> Refusal:
 
 
 # Archons --------------------------------------------------------------------------------------------------------------
-
-
-def _merge(world: World, cast: Cast) -> None:
-    """Begin to walk to a partner; or, beside the partner that the order names, become an Archon in the making."""
-    if cast.target == NOBODY:
-        _pair(world, cast)
-    else:
-        _fuse(world, cast)
 
 
 def _pair(world: World, cast: Cast) -> None:
@@ -113,7 +107,7 @@ def _pair(world: World, cast: Cast) -> None:
 
 
 def _fuse(world: World, cast: Cast) -> None:
-    """Put an Archon between the two, which takes its time to form, and take the two out of the world."""
+    """Become an Archon with another Templar, beside it; it takes its time to form."""
     one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
     x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
     archon = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
@@ -147,12 +141,12 @@ SKILLS: Final = {
     "psi_storm": Skill(_psi_storm),
     "feedback": Skill(_feedback, refuse=_cant_feed_back),
     "merge": Skill(
-        _merge,
+        _pair, estimates=("Of several Templars told to merge each takes the nearest other one as its partner.",)
+    ),
+    "merge_with": Skill(
+        _fuse,
         refuse=_cant_merge,
-        estimates=(
-            "Of several Templars told to merge each takes the nearest other one as its partner.",
-            "An Archon in the making has full life and shields and can be attacked.",
-        ),
+        estimates=("An Archon in the making has full life and shields and can be attacked.",),
     ),
 }
 FIELDS: Final = {"psi_storm": _search, "archon_merge": _form}

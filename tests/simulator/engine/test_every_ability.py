@@ -116,6 +116,54 @@ def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], Non
     return prepare
 
 
+def _fill(world: World, slot: int) -> None:
+    """Put a passenger into a carrier."""
+    passenger = world.spawn(world.catalog.unit("SCV"), 1, CENTRE)
+    world.stow(passenger, slot)
+
+
+def _worker(world: World, slot: int) -> None:
+    """Put a worker beside a structure that calls workers in."""
+    x, y = world.pos[slot].tolist()
+    world.spawn(world.catalog.unit("SCV"), 1, (x, y - 5.0))
+
+
+def _pair(world: World, slot: int) -> None:
+    """Tell a second Templar to merge, too."""
+    partner = world.spawn(world.unit_type(slot), 1, (31.0, 33.0))
+    casting.use(world, [partner], world.catalog.ability(1766))
+
+
+def _split(world: World, slot: int) -> None:
+    """Have an Adept shift its phase; a shade becomes that of another Adept."""
+    adept = slot if world.unit_type(slot).name == "Adept" else world.spawn(world.catalog.unit("Adept"), 1, CENTRE)
+    casting.use(world, [adept], world.catalog.ability(2544), point=(36.0, 32.0))
+    if adept != slot:
+        world.fields[-1].target = world.tag_of(slot)
+
+
+def _power(world: World, slot: int) -> None:
+    """Put a Pylon and a Stalker that lacks shields beside a battery."""
+    x, y = world.pos[slot].tolist()
+    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    stalker = world.spawn(world.catalog.unit("Stalker"), 1, (x, y + 4.0))
+    world.shields[stalker] = 10.0
+    world.damaged_loop[stalker] = LONGEST
+    advance(world, 2)
+
+
+def _recharge(world: World, slot: int) -> None:
+    """Have a battery recharge somebody."""
+    _power(world, slot)
+    advance(world, 6)
+
+
+def _battery(world: World, slot: int) -> None:
+    """Put a Shield Battery with power beside a Nexus."""
+    x, y = world.pos[slot].tolist()
+    _power(world, world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
+
+
 PREPARE: dict[str, Callable[[World, int], None]] = {
     "ghost_weapons_free": _bear("GhostHoldFireB"),
     "ghost_cloak_off": _bear("GhostCloak"),
@@ -123,6 +171,16 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
     "cancel_lock_on_cancel": _use(2350),
     "cancel_channel_snipe": _use(2714),
     "cancel_tac_nuke_strike": _use(1622),
+    "cancel_graviton_beam": _use(173),
+    "pulsar_beam_off": _use(2375),
+    "cancel_prismatic_alignment": _use(2393),
+    "cancel_phase_shift": _split,
+    "merge": _pair,
+    "recharge_shields": _power,
+    "stop_recharging": _recharge,
+    "battery_overcharge": _battery,
+    "load_all": _worker,
+    **dict.fromkeys(("unload_all", "unload_all_at", "unload_unit"), _fill),
 }
 """By a skill's name: what has to be the case before a unit can use it."""
 

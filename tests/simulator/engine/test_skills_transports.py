@@ -157,7 +157,7 @@ def test_a_carrier_flies_to_a_point_and_lets_one_out_per_second_there(make_field
     carrier = put(field, name, 1, 8.0, 8.0)
     units = fill(field, carrier, *["Zergling"] * 3)
     assert field.order(carrier, UNLOAD_AT[name], point=(14.0, 8.0))
-    came = []
+    came: list[int] = []
     for loop in field.loops(400):
         if len(out(field, units)) > len(came):
             came.append(loop)
@@ -226,7 +226,7 @@ def test_nydus_entrances_share_what_is_inside_and_let_out_four_a_second(field: A
     entrance, exit_ = put(field, "NydusNetwork", 1, 6.5, 6.5), put(field, "NydusCanal", 1, 24.5, 24.5)
     units = fill(field, entrance, *["Zergling"] * 3)
     assert field.order(exit_, 2371)
-    came = []
+    came: list[int] = []
     for loop in field.loops(30):
         came += [loop] * (len(out(field, units)) - len(came))
     period = 16 * field.world.unit_type(exit_).unload_period_n
