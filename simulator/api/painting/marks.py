@@ -39,15 +39,16 @@ def health_colour(share: float) -> Colour:
 
 
 def bars(
-    image: Image, middle: int, bottom: int, width: int, height: int, shares: Sequence[tuple[float, Colour]]
+    image: Image, middle: int, bottom: int, size: tuple[int, int], shares: Sequence[tuple[float, Colour]], border: int
 ) -> None:
-    """Bars of one width above each other, the first on top, on a dark ground; `bottom` is the row below them."""
+    """Bars above each other, the first on top, on a dark ground; `bottom` is the row below them, `size` of each one."""
+    width, height = size
     rows, columns = image.shape[:2]
     left, top = middle - width // 2, bottom - height * len(shares)
     x0, x1 = max(0, left), min(columns, left + width)
     if x0 >= x1 or bottom <= 0 or top >= rows:
         return
-    image[max(0, top - 1) : bottom + 1, max(0, left - 1) : x1 + 1] = palette.BAR
+    image[max(0, top - border) : bottom + border, max(0, left - border) : x1 + border] = palette.BAR
     for share, colour in shares:
         filled = min(x1, left + max(round(width * share), 1 if share > 0 else 0))
         if filled > x0 and top + height > 0:

@@ -37,8 +37,9 @@ SPARK_LOOPS = 2
 MOST_PIPS = 4
 TAIL = 0.6
 """World units that a missile draws behind it."""
-SMALL, TALL = 6.0, 30.0
-"""Radius in pixels below which bars are one pixel high, and from which they are three."""
+TINY, SMALL, TALL = 4.2, 6.0, 30.0
+"""Radius in pixels below which only damage and construction are told, by bars without a border; below which bars are
+one pixel high; and from which they are three."""
 BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 """What has no bars until it is damaged."""
 
@@ -178,14 +179,16 @@ class ScenePainter:
             if shields_max > 0:
                 shares.append((shields / shields_max, palette.SHIELD))
             shares.append((life / life_max, marks.health_colour(life / life_max)))
-            if energy_max > 0:
+            if energy_max > 0 and actor.radius >= TINY:
                 shares.append((energy / energy_max, palette.ENERGY))
             if progress < 1:
                 shares.append((progress, palette.PROGRESS))
-            width = max(7, round(actor.radius * 1.7))
-            bottom = int(actor.y - actor.radius * 1.12) - 1
+            if actor.radius < TINY and all(share >= 1 for share, _ in shares):
+                continue
             height = 1 if actor.radius < SMALL else 2 if actor.radius < TALL else 3
-            marks.bars(image, int(actor.x), bottom, width, height, shares)
+            size = (max(5 if actor.radius < TINY else 7, round(actor.radius * 1.7)), height)
+            bottom = int(actor.y - actor.radius * 1.12) - 1
+            marks.bars(image, int(actor.x), bottom, size, shares, border=int(actor.radius >= TINY))
 
     def _buffs(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
         """A pip for each buff, below the unit."""

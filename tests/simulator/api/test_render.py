@@ -145,9 +145,8 @@ def test_units_face_where_they_face(make_table: Any, facing: float, axis: int, a
 
 
 def test_bars_tell_life_and_shields(make_table: Any) -> None:
-    table = make_table(options())
+    table = make_table(options((384, 384)))
     slot = table.put("Zealot", 1, 16, 16)
-    table.world.life[slot] = table.world.life_max[slot]
     assert near(table.picture(), palette.HEALTH[2], 5) > 4
     full = near(table.picture(), palette.SHIELD, 5)
     table.world.life[slot], table.world.shields[slot] = 10.0, table.world.shields_max[slot] / 2
@@ -155,6 +154,14 @@ def test_bars_tell_life_and_shields(make_table: Any) -> None:
     assert near(hurt, palette.HEALTH[2], 5) == 0
     assert near(hurt, palette.HEALTH[0], 5) > 0
     assert 0 < near(hurt, palette.SHIELD, 5) < full
+
+
+def test_small_units_have_bars_only_when_hurt(make_table: Any) -> None:
+    table = make_table(options((96, 96)))
+    slot = table.put("Zealot", 1, 16, 16)
+    assert near(table.picture(), palette.HEALTH[2], 5) == 0
+    table.world.life[slot] *= 0.9
+    assert near(table.picture(), palette.HEALTH[2], 5) > 2
 
 
 def test_a_selected_unit_has_a_ring(make_table: Any) -> None:
