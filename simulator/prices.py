@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Cost = tuple[float, float]
 
-BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "warp_in", "arm", "structure_morph"})
+BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "summon", "warp_in", "arm", "structure_morph"})
 """What is charged for as its product's ``made_by`` says."""
 ALL: Final = 1.0
 """Share of the price that comes back for what was only in a queue."""

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 
+IN_PROGRESS: Final = frozenset({"BuildInProgress", "BuildinProgressNydusCanal", "Warpable"})
+"""The groups of abilities that call off what is being built or warped in itself."""
+
+
 # placing --------------------------------------------------------------------------------------------------------------
 
 
@@ -79,6 +83,18 @@ def _can_place(world: World, cast: Cast) -> Refusal:
 def _is_known(world: World, _: int, ability: Ability) -> Refusal:
     known = bool(ability.loops) and sites.product(world, ability) is not None
     return Refusal.SUCCESS if known else Refusal.NOT_SUPPORTED
+
+
+def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
+    """Begin a structure far away, as a Nydus Network does its worms."""
+    unit = sites.product(world, ability)
+    if unit is None or point is None:
+        return []
+    owner = int(world.owner[slots[0]])
+    paid = prices.charge(world, owner, prices.cost_of(ability))
+    construction.begin(world, unit, owner, sites.centre(world, unit, point), loops=ability.loops, paid=paid)
+    world.timers.setdefault(slots[0], {})[ability.timer] = world.loop + ability.cooldown_loops
+    return slots[:1]
 
 
 # going on and halting -------------------------------------------------------------------------------------------------
@@ -140,7 +156,9 @@ def _cancel_change(world: World, slot: int) -> None:
 def _has_something(world: World, slot: int, ability: Ability) -> Refusal:
     """Whether there is anything of this kind to call off."""
     if world.build_progress[slot] < 1.0:
-        return Refusal.SUCCESS
+        return Refusal.SUCCESS if ability.link in IN_PROGRESS else Refusal.CANT_FIND_CANCEL_ORDER
+    if ability.link in IN_PROGRESS:
+        return Refusal.CANT_FIND_CANCEL_ORDER
     jobs = world.jobs.get(slot, [])
     if jobs:
         begun = world.catalog.ability(jobs[-1].ability)
@@ -160,6 +178,7 @@ SKILLS: Final = {
         ready=_is_known,
         estimates=("A builder places a structure as soon as it touches it.", "Units of others keep one from placing."),
     ),
+    "summon": Skill(give=_summon, refuse=_can_place, ready=_is_known),
     "halt": Skill(give=_halt, ready=_is_at_work, anytime=True),
     "cancel": Skill(give=_cancel, ready=_has_something, anytime=True),
 }

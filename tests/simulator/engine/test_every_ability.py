@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting
+from simulator import buffs, casting, harvesting, production
 from simulator.abilities import Aim
 from simulator.casts import Cast
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
@@ -164,6 +164,53 @@ def _battery(world: World, slot: int) -> None:
     _power(world, world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
 
 
+def _queue(world: World, slot: int) -> None:
+    """Have a structure or an egg make something."""
+    production.enqueue(world, slot, world.catalog.ability(1006), makes="Probe", loops=100.0)
+
+
+def _in_the_making(world: World, slot: int) -> None:
+    world.build_progress[slot], world.build_loops[slot] = 0.5, 100.0
+    world.refresh(slot)
+
+
+def _at_work(world: World, slot: int) -> None:
+    """Have an SCV build the structure, or the SCV build another one."""
+    worker = world.unit_type(slot).worker
+    site = world.spawn(world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
+    _in_the_making(world, site)
+    world.site[slot if worker else world.spawn(world.catalog.unit("SCV"), 1, (34.0, 42.0))] = site
+
+
+def _load_up(world: World, slot: int) -> None:
+    harvesting.take_up(world, slot, 5, gas=False, rich=False)
+
+
+def _to_creep(world: World, slot: int) -> None:
+    """Take a Drone to where its structures can stand."""
+    if world.unit_type(slot).race == "zerg":
+        world.pos[slot] = (20.0, 18.0)
+        advance(world, 300)
+
+
+def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
+    """Have the unit begin the morph or add-on that an ability calls off, or else be in the making itself."""
+    x, y = world.pos[slot].tolist()
+    if world.unit_type(slot).structure:
+        world.spawn(world.catalog.unit("Pylon"), 1, (x - 4.0, y))
+        advance(world, 1)
+    card = world.catalog.abilities_of(int(world.type[slot]))
+    if not any(a.link == cancel.link and a.does != "cancel" and casting.use(world, [slot], a) for a in card):
+        _in_the_making(world, slot)
+    advance(world, 2)
+
+
+def _near_power(world: World, slot: int) -> None:
+    x, y = world.pos[slot].tolist()
+    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    advance(world, 1)
+
+
 PREPARE: dict[str, Callable[[World, int], None]] = {
     "ghost_weapons_free": _bear("GhostHoldFireB"),
     "ghost_cloak_off": _bear("GhostCloak"),
@@ -171,6 +218,13 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
     "cancel_lock_on_cancel": _use(2350),
     "cancel_channel_snipe": _use(2714),
     "cancel_tac_nuke_strike": _use(1622),
+    "cancel_job": _queue,
+    "cancel_slot": _queue,
+    "halt": _at_work,
+    "rally": _in_the_making,
+    "return": _load_up,
+    "build": _to_creep,
+    "warp_in": _near_power,
     "cancel_graviton_beam": _use(173),
     "pulsar_beam_off": _use(2375),
     "cancel_prismatic_alignment": _use(2393),
@@ -188,6 +242,8 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
 def attempt(world: World, ability: Ability) -> list[int]:
     """Give the order to the first caster and at the first aim that takes it; returns who did."""
     for slot in casters(world, ability):
+        if ability.does == "cancel":
+            begin_what_it_cancels(world, slot, ability)
         if ability.does in PREPARE:
             PREPARE[ability.does](world, slot)
         if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
