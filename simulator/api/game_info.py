@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 MODS = ("Core", "Liberty", "Swarm", "Void", "VoidMulti")
 _START_RAW = sc.ResponseGameInfo.DESCRIPTOR.fields_by_name["start_raw"].number
-_RACES = {"terran": 1, "zerg": 2, "protoss": 3}
+RACES = {"terran": 1, "zerg": 2, "protoss": 3}
+"""The API's numbers of races."""
 
 
 class GameInfo:
@@ -66,7 +67,7 @@ def _message(game: Game, seat: Seat) -> sc.ResponseGameInfo:
             player.player_name = asked.player_name
         if asked.type == sc.Computer:
             player.difficulty, player.ai_build = asked.difficulty, asked.ai_build
-        race = _RACES.get(game.world.players[number].race)
+        race = RACES.get(game.world.players[number].race)
         if race is not None and (number == seat.player or isinstance(seat, Viewer)):
             player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum
     for number, asked in enumerate(game.setup.observers, start=len(game.setup.players) + 1):

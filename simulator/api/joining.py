@@ -196,7 +196,7 @@ def _share(playing: Playing, me: int, members: list[int], links: dict[Link, froz
 
 def _invitation(table: Seating, me: int) -> bytes:
     party = table.party(me)
-    return Replay(party.setup, party.interfaces, loops=0, results={}, log=()).encode()
+    return Replay(party.setup, party.interfaces, loops=0, results={}, races={}, log=()).encode()
 
 
 async def _visit(process: Process, request: sc.RequestJoinGame) -> sc.ResponseJoinGame:

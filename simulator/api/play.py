@@ -106,7 +106,7 @@ def save_replay(process: Process, _: sc.RequestSaveReplay) -> sc.ResponseSaveRep
     table = process.table
     if table.replay:
         raise UsageError("A replay of a replay cannot be saved")
-    return sc.ResponseSaveReplay(data=replay.record(table.game).encode())
+    return sc.ResponseSaveReplay(data=replay.record(table.game).file(process.about))
 
 
 def quick_save(process: Process, _: sc.RequestQuickSave) -> sc.ResponseQuickSave:

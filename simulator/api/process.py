@@ -73,6 +73,16 @@ class Process:
         self.setup: Setup | None = None  # of the game that is created and not yet joined
         self.playing: Playing | None = None
 
+    @property
+    def about(self) -> dict[str, str]:
+        """The version, as the game's own replays tell it."""
+        return {
+            "GameVersion": self.game_version,
+            "DataBuild": str(self.base_build),
+            "DataVersion": self.data_version,
+            "BaseBuild": f"Base{self.base_build}",
+        }
+
     def play(self, playing: Playing | None) -> None:
         """Turns to another game, or to none; the other processes of the one before are left."""
         before, self.playing = self.playing, playing

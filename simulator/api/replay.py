@@ -1,7 +1,8 @@
 """Replays: the setup of a game and all that was done to it, to be simulated again.
 
 The format is ours: a line that marks it, one line of JSON with the setup, then for each entry of the log its loop,
-player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside.
+player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside. In a file it
+is the member of an archive like the game's, because clients look there for the version of the game.
 
 Above: `viewing.py`, `lockstep.py`. Below: `game.py`.
 """
@@ -18,13 +19,19 @@ from google.protobuf.message import DecodeError, Message
 from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import mpq
+from simulator.api.clock import LOOPS_PER_SECOND
 from simulator.api.game import Entry, Game, Setup
 from simulator.mapfile import read_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-_MARK = b"Khala replay 2\n"
+METADATA = "replay.gamemetadata.json"
+"""The member of a replay file in which clients look for the version."""
+
+_MEMBER = "khala.replay"
+_MARK = b"Khala replay 3\n"
 _ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
 _KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
 
@@ -41,10 +48,18 @@ class Replay:
     interfaces: dict[int, sc.InterfaceOptions]  # with which the players clicked
     loops: int
     results: dict[int, int]
+    races: dict[int, str]
     log: tuple[Entry, ...]
 
+    def file(self, version: dict[str, str]) -> bytes:
+        """The file; `version` is what it says of the game in the words of the game's own files."""
+        title, duration_s = self.setup.game_map.name, int(self.loops / LOOPS_PER_SECOND)
+        players = [{"PlayerID": player} for player in self.results]
+        about = {"Title": title, **version, "Duration": duration_s, "Players": players}
+        return mpq.pack({METADATA: json.dumps(about).encode(), _MEMBER: self.encode()})
+
     def encode(self) -> bytes:
-        """The file."""
+        """The replay without the archive around it."""
         setup = self.setup
         head = {
             "path": setup.path,
@@ -57,12 +72,18 @@ class Replay:
             "observers": [_hex(observer) for observer in setup.observers],
             "loops": self.loops,
             "results": self.results,
+            "races": self.races,
         }
         return _MARK + zlib.compress(json.dumps(head).encode() + b"\n" + pack(self.log))
 
     @classmethod
     def decode(cls, data: bytes) -> Replay:
-        """The replay in a file's bytes; raises ReplayError if there is none."""
+        """The replay in the bytes of a file, or without the archive around it; raises ReplayError if there is none."""
+        if data.startswith(mpq.MAGIC):
+            try:
+                data = mpq.member(data, _MEMBER) or b""
+            except mpq.MpqError as error:
+                raise ReplayError(f"The replay is damaged: {error}") from error
         if not data.startswith(_MARK):
             raise ReplayError("The data is not a replay of this simulator")
         try:
@@ -90,7 +111,8 @@ class Replay:
             for player, options in fields["interfaces"].items()
         }
         results = {int(player): result for player, result in fields["results"].items()}
-        return cls(setup, interfaces, fields["loops"], results, tuple(unpack(log)))
+        races = {int(player): str(race) for player, race in fields["races"].items()}
+        return cls(setup, interfaces, fields["loops"], results, races, tuple(unpack(log)))
 
 
 def _hex(message: Message) -> str:
@@ -128,6 +150,7 @@ def record(game: Game) -> Replay:
         interfaces={player: seat.options for player, seat in game.seats.items()},
         loops=game.world.loop,
         results={player: int(game.world.players[player].result) for player in players},
+        races={player: game.world.players[player].race for player in players},
         log=game.past,
     )
 

@@ -5,13 +5,14 @@ Above: `requests.py`. Below: `replay.py`, `game.py`.
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api.clock import LOOPS_PER_SECOND, Clock
-from simulator.api.game_info import GameInfo
+from simulator.api.game_info import RACES, GameInfo
 from simulator.api.process import Failure, Playing
 from simulator.api.projection import size_problem
 from simulator.api.replay import Replay, ReplayError, rerun
@@ -81,13 +82,25 @@ def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseR
         base_build=process.base_build,
     )
     for number, setup in enumerate(replay.setup.players, start=1):
-        extra = info.player_info.add(player_mmr=0, player_apm=0)
+        extra = info.player_info.add(player_mmr=0, player_apm=_actions_per_minute(replay, number))
         player = extra.player_info
         player.player_id, player.type, player.race_requested = number, setup.type, setup.race
         player.player_name = setup.player_name
+        if (race := RACES.get(replay.races[number])) is not None:
+            player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum
         extra.player_result.player_id = number
         extra.player_result.result = sc.Result.Value(sc.Result.Name(replay.results[number]))  # type: ignore[arg-type]  # same numbers
     return info
+
+
+def _actions_per_minute(replay: Replay, player: int) -> int:
+    actions = sum(entry.player == player and isinstance(entry.act, sc.Action) for entry in replay.log)
+    return round(actions * 60 * LOOPS_PER_SECOND / max(replay.loops, 1))
+
+
+def _places(process: Process, path: str) -> list[Path]:
+    """Where a replay may be: in the install, or where the game itself looks on Linux."""
+    return [process.data_dir / "Replays" / path, Path.home() / "Documents/StarCraft II/Replays" / path]
 
 
 def _read(process: Process, request: sc.RequestStartReplay | sc.RequestReplayInfo) -> Replay:
@@ -96,10 +109,12 @@ def _read(process: Process, request: sc.RequestStartReplay | sc.RequestReplayInf
         raise _Unreadable("MissingReplay", "Name a replay by its path or send its data")
     data = request.replay_data
     if kind == "replay_path":
-        try:
-            data = (process.data_dir / "Replays" / Path(request.replay_path)).read_bytes()
-        except (OSError, ValueError) as error:
-            raise _Unreadable("InvalidReplayPath", f"No replay {request.replay_path}") from error
+        for place in _places(process, request.replay_path):
+            with contextlib.suppress(OSError, ValueError):  # not there, or no possible name at all
+                data = place.read_bytes()
+                break
+        else:
+            raise _Unreadable("InvalidReplayPath", f"No replay {request.replay_path}")
     try:
         return Replay.decode(data)
     except ReplayError as error:

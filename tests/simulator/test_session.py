@@ -185,7 +185,7 @@ def at(path: str = "", data: bytes = b"") -> sc.LocalMap:
         ({"local_map": at("x.SC2Map", b"zzz")}, "InvalidMapData",
          "x.SC2Map holds neither a map of the simulator nor a StarCraft II archive"),
         ({"local_map": at("x.SC2Map", b"MPQ\x1b")}, "InvalidMapData",
-         "x.SC2Map is an archive that the simulator cannot read: no map 'x.SC2Map'"),
+         "x.SC2Map is an archive that the simulator cannot read: the archive is damaged: "),
         ({"local_map": at("2s3z")}, "MissingPlayerSetup", "Name the players"),
         ({"local_map": at("2s3z"), "player_setup": [PARTICIPANT] * 3}, "InvalidPlayerSetup",
          "TooManyPlayers: 2s3z has 2 places, not 3"),

@@ -1,11 +1,13 @@
 """A replay is the game again: the same units, camera, selection, actions and pixels, at the same loops."""
 
+import json
 from typing import Any
 
 import pytest
 from s2clientprotocol import common_pb2, debug_pb2, raw_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import mpq
 from simulator.client import Client, ResponseError, command, interface
 from simulator.status import Status
 
@@ -97,6 +99,19 @@ def test_a_finished_game_has_its_results_in_the_replay() -> None:
     assert client.observe().player_result == results
 
 
+def test_a_replay_tells_who_played_and_how_busily(played: tuple[list[sc.ResponseObservation], bytes]) -> None:
+    own, other = client_info(played[1]).player_info
+    assert own.player_info.race_actual == common_pb2.Protoss
+    assert own.player_apm == round(4 * 60 * 22.4 / LOOPS)  # the script of `play` has four actions
+    assert other.player_apm == 0
+
+
+def test_other_tools_find_the_version_in_a_replay(played: tuple[list[sc.ResponseObservation], bytes]) -> None:
+    about = json.loads(mpq.member(played[1], "replay.gamemetadata.json") or b"")
+    assert (about["Title"], about["BaseBuild"], about["GameVersion"]) == ("2s3z", "Base75689", "4.10.0.75689")
+    assert about["DataVersion"] == "B89B5D6FA7CBF6452E721311BFBC6CB2"
+
+
 def client_info(data: bytes) -> sc.ResponseReplayInfo:
     return Client().ask(replay_info=sc.RequestReplayInfo(replay_data=data)).replay_info
 
@@ -118,7 +133,7 @@ def test_a_viewer_may_have_a_larger_screen(played: tuple[list[sc.ResponseObserva
         ({}, "MissingReplay", "Name a replay by its path or send its data"),
         ({"replay_path": "none.SC2Replay"}, "InvalidReplayPath", "No replay none.SC2Replay"),
         ({"replay_data": b"MPQ"}, "InvalidReplayData", "The data is not a replay of this simulator"),
-        ({"replay_data": b"Khala replay 2\nzz"}, "InvalidReplayData", "The replay is damaged: "),
+        ({"replay_data": b"Khala replay 3\nzz"}, "InvalidReplayData", "The replay is damaged: "),
     ],
 )
 def test_what_is_no_replay_says_so(request_: dict[str, Any], error: str, details: str) -> None:

@@ -4,6 +4,7 @@ python-sc2 writes its log to the standard output and changes signal handlers; so
 what the bots saw goes to a file as JSON.
 """
 
+import contextlib
 import json
 import os
 import sys
@@ -15,7 +16,8 @@ from sc2.bot_ai import BotAI
 from sc2.data import Difficulty, Race, Result
 from sc2.ids.ability_id import AbilityId
 from sc2.ids.unit_typeid import UnitTypeId
-from sc2.main import run_game
+from sc2.main import run_game, run_replay
+from sc2.observer_ai import ObserverAI
 from sc2.player import Bot, Computer
 
 SEEN: dict[str, Any] = {}
@@ -84,6 +86,19 @@ class Waiter(BotAI):
         SEEN["types"] = sorted({unit.type_id.name for unit in self.units if unit.type_id in UnitTypeId})
 
 
+class Watcher(ObserverAI, BotAI):
+    """Watches a replay; python-sc2's own observer lacks some of the methods that it calls, which bots have."""
+
+    async def on_start(self) -> None:
+        """Called by python-sc2."""
+        SEEN["map"] = self.game_info.map_name
+
+    async def on_step(self, iteration: int) -> None:
+        """Called by python-sc2."""
+        SEEN["loop"] = self.state.game_loop
+        SEEN["units"] = max(SEEN.get("units", 0), len(self.state.observation_raw.units))
+
+
 def _play(path: str, *players: Bot | Computer, realtime: bool = False, replay: str | None = None) -> Any:
     return run_game(
         maps.Map(MAPS / path),
@@ -104,16 +119,20 @@ def main(game: str, out: Path) -> None:
     computer = Computer(Race.Protoss, Difficulty.VeryEasy)
     match game:
         case "melee":
-            replay = str(out.with_suffix(".SC2Replay"))
-            result = _play("Melee/Simple64.SC2Map", _bot(Settler(), "settler"), computer, replay=replay)
+            result = _play("Melee/Simple64.SC2Map", _bot(Settler(), "settler"), computer)
         case "combat":
-            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "fighter"), computer)
+            replay = str(out.with_suffix(".SC2Replay"))
+            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "fighter"), computer, replay=replay)
         case "two bots":
             result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "fighter"), _bot(Waiter(), "waiter"))
         case "a quitter":
             result = _play("Melee/Simple64.SC2Map", _bot(Waiter(), "waiter"), _bot(Quitter(), "quitter"))
         case "real time":
             result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "f"), _bot(Quitter(), "q"), realtime=True)
+        case "replay":
+            with contextlib.suppress(KeyError):  # at the end it looks for the result of a player 0
+                run_replay(Watcher(), str(out.with_suffix(".SC2Replay")), observed_id=1)
+            result = []
         case _:
             raise ValueError(game)
     SEEN["result"] = [r.name for r in ([result] if isinstance(result, Result) else result)]
