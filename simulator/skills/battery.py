@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs, commands
+from simulator.casts import Cast
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
+from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
-    from simulator.casts import Cast
+    from simulator.casts import Point
+    from simulator.skills.skill import SmartRule
     from simulator.world import World
 
 OVERCHARGE = "BatteryOvercharge"
@@ -92,6 +95,22 @@ def _cant_overcharge(world: World, cast: Cast) -> Refusal:
     return Refusal.SUCCESS if near else Refusal.TARGET_IS_OUT_OF_RANGE
 
 
+def recharge_by_click(
+    world: World, slots: list[int], target: int, _: Point | None, queue: bool
+) -> list[int]:  # fmt: skip
+    """The right click of a battery on a unit: recharge it, if that is possible now."""
+    taken: list[int] = []
+    for slot in slots if target != NOBODY else ():
+        card = world.catalog.abilities_of(int(world.type[slot]))
+        ability = next((a for a in card if a.does == "recharge_shields"), None)
+        if ability is None or world.owner[target] != world.owner[slot] or gap(world, slot, target) > ability.range:
+            continue
+        if _cant_recharge(world, Cast(slot, ability, target)) is Refusal.SUCCESS:
+            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
+            taken += commands.give(world, [slot], order, queue=queue)
+    return taken
+
+
 SKILLS: Final = {
     "recharge_shields": Skill(_begin, refuse=_cant_recharge, hold=_recharge),
     "stop_recharging": Skill(_stop, refuse=_cant_stop),
@@ -99,3 +118,4 @@ SKILLS: Final = {
         _overcharge, refuse=_cant_overcharge, estimates=("An overcharged battery spends no energy.",)
     ),
 }
+SMARTS: Final[tuple[SmartRule, ...]] = (recharge_by_click,)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SHIELD_EFFECT = 2
 SHIELD_BUFF = "GuardianShield"
+SCRAMBLED = "RavenScramblerMissile"
 PUSHED_OUT_RADIUS = 4.0
 SHATTER_GAP = 1.0  # range of the force field's own ability "Shatter"
 MASSIVE: Final = 1 << ATTRIBUTES.index("massive")
@@ -54,7 +55,7 @@ def _guardian_shield(world: World, cast: Cast) -> None:
 def _cover(world: World, field: Field) -> None:
     """Follow the Sentry, and every period cover its owner's units around it; structures are not covered."""
     sentry = source_slot(world, field)
-    if sentry == NOBODY:
+    if sentry == NOBODY or buffs.has(world, sentry, SCRAMBLED):
         field.end = world.loop
         return
     field.points = [_place(world, sentry)]

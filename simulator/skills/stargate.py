@@ -47,12 +47,20 @@ def _lift(world: World, cast: Cast) -> None:
     """Lift a unit off the ground, where it can do nothing, for as long as the beam holds."""
     for name in LIFTER:
         buffs.apply(world, cast.slot, name, source=cast.slot)
-    world.burrowed[cast.target] = False
+    _unearth(world, cast.target)
     buffs.apply(world, cast.target, LIFT_HEIGHT, source=cast.slot)
     buffs.apply(world, cast.target, LIFT, source=cast.slot)
     targets.disengage(world, cast.target)
     targets.disengage(world, cast.slot)
     _retarget(world, cast.target)
+
+
+def _unearth(world: World, slot: int) -> None:
+    """Make a burrowed unit the one that it is above the ground."""
+    unit = world.unit_type(slot)
+    above = unit.name.replace("Burrowed", "")
+    if unit.burrowed and above in world.catalog.row_of_name:
+        world.become(slot, world.catalog.unit(above))
 
 
 def _keep_lifted(world: World, cast: Cast) -> bool:

@@ -168,6 +168,16 @@ def _told_to_unload(
     return ([own] if own in slots else []) + commands.give(world, rest, order, queue=queue)
 
 
+def _no_place(world: World, cast: Cast) -> Refusal:
+    """Whether nobody could stand at the point that is named."""
+    if cast.point is None or cast.target != NOBODY:
+        return Refusal.SUCCESS
+    unit = world.unit_type(inside(world, cast.slot)[0])
+    reach = UNLOAD_REACH + float(world.radius[cast.slot])
+    free = len(placement.candidates(world, unit, cast.point, reach)) > 0
+    return Refusal.SUCCESS if free else Refusal.CANT_UNLOAD_UNITS_THERE
+
+
 def _is_empty(world: World, slot: int, _: Ability) -> Refusal:
     return Refusal.SUCCESS if inside(world, slot) else Refusal.NO_CARGO_TO_UNLOAD
 
@@ -306,7 +316,7 @@ SKILLS: Final = {
     ),
     "load_all": Skill(_load_all, refuse=_nobody_to_load),
     "unload_all": Skill(_unload_all, ready=_is_empty),
-    "unload_all_at": Skill(_unload_all, give=_told_to_unload, ready=_is_empty, hold=_unload_there),
+    "unload_all_at": Skill(_unload_all, give=_told_to_unload, refuse=_no_place, ready=_is_empty, hold=_unload_there),
     "unload_unit": Skill(_unload_unit, ready=_is_empty),
 }
 PASSIVES: Final[dict[str, UnitRule]] = dict.fromkeys(CARRIERS, _carry)

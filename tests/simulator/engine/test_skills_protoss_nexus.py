@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
+from simulator import buffs, casting, commands
 from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
@@ -228,6 +228,20 @@ def test_what_a_battery_refuses(make_field: Any, version: str) -> None:
     assert field.why_not(battery, number, enemy) is Refusal.CANT_TARGET_ENEMY_UNITS
     field.world.energy[battery] = 9.0 if version == "5.0.13" else 0.0
     assert field.why_not(battery, number, stalker) is Refusal.NOT_ENOUGH_ENERGY
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_battery_is_sent_to_a_unit_with_the_right_click(make_field: Any, version: str) -> None:
+    field = make_field(version=version)
+    put(field, "Pylon", 1, 8.0, 14.0)
+    battery = put(field, "ShieldBattery", 1, 8.0, 8.0, 90.0)
+    hurt, whole = put(field, "Stalker", 1, 12.0, 8.0), put(field, "Stalker", 1, 8.0, 12.0)
+    field.world.shields[hurt] = 10.0
+    assert casting.smart(field.world, [battery], target=field.world.tag_of(hurt)) == [battery]
+    assert field.world.orders_of(battery)[0].ability == RECHARGE[version]
+    commands.stop(field.world, [battery])
+    casting.smart(field.world, [battery], target=field.world.tag_of(whole))
+    assert not field.world.orders_of(battery)
 
 
 def test_an_overcharged_battery_works_half_again_as_fast_and_for_nothing(make_field: Any) -> None:

@@ -106,12 +106,16 @@ def test_a_guardian_shield_costs_75_energy_and_cools_down(make_field: Any, versi
     assert field.why_not(slot, GUARDIAN_SHIELD) is Refusal.NOT_ENOUGH_ENERGY
 
 
-def test_a_guardian_shield_ends_with_its_sentry(field: Any) -> None:
+@pytest.mark.parametrize("how", ["dead", "scrambled"])
+def test_a_guardian_shield_ends_with_its_sentry(field: Any, how: str) -> None:
     slot = sentry(field)
     friend = field.put("Zealot", 1, 11.0, 11.0)
     field.order(slot, GUARDIAN_SHIELD)
     field.play(10)
-    field.world.life[slot] = 0.0
+    if how == "dead":
+        field.world.life[slot] = 0.0
+    else:
+        buffs.apply(field.world, slot, "RavenScramblerMissile")
     field.play(12)
     assert not field.world.fields
     assert not buffs.has(field.world, friend, "GuardianShield")

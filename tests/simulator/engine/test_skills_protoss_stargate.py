@@ -107,6 +107,16 @@ def test_what_can_be_lifted(field: Any, name: str, owner: int, why: Refusal) -> 
     assert field.why_not(phoenix, LIFT, still(field, name, owner, 12.0, 8.0)) is why
 
 
+def test_what_is_burrowed_and_seen_comes_out_of_the_ground_when_lifted(field: Any) -> None:
+    phoenix, roach = put(field, "Phoenix", 1, 8.0, 8.0), still(field, "RoachBurrowed", 2, 12.0, 8.0)
+    put(field, "Observer", 1, 10.0, 8.0)
+    field.play(4)
+    assert field.order(phoenix, LIFT, roach)
+    field.play(1)
+    assert field.world.unit_type(roach).name == "Roach"
+    assert not field.world.cloaked[roach]
+
+
 def test_nobody_is_lifted_twice_and_nothing_is_let_go_that_is_not_held(field: Any) -> None:
     one, other = put(field, "Phoenix", 1, 8.0, 8.0), put(field, "Phoenix", 1, 8.0, 11.0)
     stalker = still(field, "Stalker", 2, 12.0, 9.0)

@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 
 from simulator import buffs, casting, commands
@@ -220,6 +221,14 @@ def test_one_passenger_can_be_named(field: Any, name: str) -> None:
 def test_an_empty_carrier_has_nothing_to_unload(field: Any, name: str, number: int) -> None:
     carrier = put(field, name, 1, 10.5, 10.5)
     assert field.why_not(carrier, number, point=(9.0, 9.0)) is Refusal.NO_CARGO_TO_UNLOAD
+
+
+def test_nobody_is_let_out_where_nobody_can_stand(field: Any) -> None:
+    carrier = put(field, "Medivac", 1, 8.0, 8.0)
+    fill(field, carrier, "Marine")
+    field.world.ground.block(63, np.array([(x, y) for x in range(16, 32) for y in range(32)]))
+    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(26.0, 8.0)) is Refusal.CANT_UNLOAD_UNITS_THERE
+    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(17.0, 8.0)) is Refusal.SUCCESS
 
 
 def test_nydus_entrances_share_what_is_inside_and_let_out_four_a_second(field: Any) -> None:
