@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 DIRECTIONS = 16
 """Directions in which a unit is drawn facing."""
-FINER = 2
-"""How many times larger a body is drawn than it is shown."""
+FINER, LARGE = 2, 24.0
+"""How many times larger a body is drawn than it is shown, unless its radius in pixels is large."""
 MAX_RADIUS = 320.0
 """Pixels; on larger images units are drawn smaller than they are."""
 REACH = 1.8
@@ -115,7 +115,7 @@ class Wardrobe:
             body = self._bodies[key] = draw_body(unit, livery, radius, unfinished=look.unfinished)
             self._bytes += body.nbytes
         upright = class_of(unit) in UPRIGHT
-        image = _turned(body, 0.0 if upright else 2 * math.pi * look.direction / DIRECTIONS)
+        image = _turned(body, 0.0 if upright else 2 * math.pi * look.direction / DIRECTIONS, _finer(radius))
         image[..., :3] *= _light(len(image))
         if unit.flying:
             image = _over(_shadow(image[..., 3], radius), image)
@@ -136,10 +136,10 @@ def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
 
 
 def draw_body(unit: UnitType, livery: Livery, radius: float, *, unfinished: bool) -> Floats:
-    """A unit facing right, `FINER` times larger than it is shown: its rim, its body, what is on it."""
+    """A unit facing right, `_finer` times larger than it is shown: its rim, its body, what is on it."""
     kind, easel = class_of(unit), _Easel(radius)
     body = easel.outline(outline_of(unit))
-    easel.lay(cv2.dilate(body, _disc(max(FINER * 3 // 4, round(easel.radius * 0.1)))), livery.rim)
+    easel.lay(cv2.dilate(body, _disc(max(1, round(easel.radius * 0.1)))), livery.rim)
     easel.lay(body, livery.body)
     if kind is Class.STRUCTURE:
         easel.lay(easel.inside(body, 0.16), livery.dark, 0.35 if unfinished else 0.8)
@@ -161,8 +161,9 @@ class _Easel:
     """A body in the making: masks laid over each other in their colours."""
 
     def __init__(self, radius: float) -> None:
-        self.radius = radius * FINER
-        self.size = (2 * _half(radius) + 1) * FINER
+        self.finer = _finer(radius)
+        self.radius = radius * self.finer
+        self.size = (2 * _half(radius) + 1) * self.finer
         self.image = np.zeros((self.size, self.size, 4), np.float32)
 
     def outline(self, half: tuple[tuple[float, float], ...], scale: float = 1.0) -> Mask:
@@ -175,11 +176,11 @@ class _Easel:
 
     def inside(self, mask: Mask, margin: float) -> Mask:
         """A mask without a margin, given in radii."""
-        return cv2.erode(mask, _disc(max(FINER, round(self.radius * margin))))
+        return cv2.erode(mask, _disc(max(self.finer, round(self.radius * margin))))
 
     def stripes(self, mask: Mask) -> Mask:
         """Every other diagonal stripe of a mask."""
-        line = np.arange(self.size) // (2 * FINER)
+        line = np.arange(self.size) // (2 * self.finer)
         return mask * ((line[:, None] + line) % 2).astype(np.uint8)
 
     def lay(self, mask: Mask, colour: Colour, part: float = 1.0) -> None:
@@ -189,13 +190,17 @@ class _Easel:
         self.image += cover * np.array([*colour, 255], np.float32)
 
 
+def _finer(radius: float) -> int:
+    return FINER if radius < LARGE else 1
+
+
 def _half(radius: float) -> int:
     return math.ceil(radius * REACH) + 2
 
 
-def _turned(body: Floats, angle: float) -> Floats:
+def _turned(body: Floats, angle: float, finer: int) -> Floats:
     """A body turned counter-clockwise and shrunk to the size in which it is shown."""
-    side, cos, sin = len(body) // FINER, math.cos(angle) * FINER, math.sin(angle) * FINER
+    side, cos, sin = len(body) // finer, math.cos(angle) * finer, math.sin(angle) * finer
     middle, large = (side - 1) / 2, (len(body) - 1) / 2
     inverse = np.array(
         [[cos, -sin, large - (cos - sin) * middle], [sin, cos, large - (sin + cos) * middle]], np.float32
