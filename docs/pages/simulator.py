@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
 import sys
 from importlib import resources
 from pathlib import Path
@@ -141,8 +142,21 @@ def _maps() -> str:
     for name in map_names():
         for text in load_map(name).scenario.estimates:
             found.setdefault(text, []).append(name)
-    rows = [(text, "every map" if names == list(map_names()) else codes(names)) for text, names in found.items()]
+    rows = [(text, codes(_short(names))) for text, names in found.items()]
     return table(("what a map's file does not say", "maps"), rows)
+
+
+def _short(names: list[str]) -> list[str]:
+    """Names of maps, where all that begin alike are told as one."""
+    families: dict[str, list[str]] = {}
+    for name in names:
+        families.setdefault(name.partition("/")[0], []).append(name)
+    told: list[str] = []
+    for some in families.values():
+        prefix = os.path.commonprefix(some)
+        whole = len(some) > 1 and some == [name for name in map_names() if name.startswith(prefix)]
+        told += [f"{prefix}*"] if whole else some
+    return told
 
 
 def _chapter(title: str) -> str:
