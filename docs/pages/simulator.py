@@ -153,7 +153,7 @@ def _short(names: list[str]) -> list[str]:
         families.setdefault(name.partition("/")[0], []).append(name)
     told: list[str] = []
     for some in families.values():
-        prefix = os.path.commonprefix(some)
+        prefix = os.path.commonprefix(some)  # noqa: RUF071  # of names, not of paths: letter by letter is meant
         whole = len(some) > 1 and some == [name for name in map_names() if name.startswith(prefix)]
         told += [f"{prefix}*"] if whole else some
     return told
