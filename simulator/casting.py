@@ -19,6 +19,7 @@ from simulator.needs import met
 from simulator.orders import Order, OrderKind
 from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
 from simulator.skills import SKILLS, SMARTS
+from simulator.skills.skill import touching
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.world import NO_TAG, Mishap
 
@@ -205,6 +206,8 @@ def reach(world: World, cast: Cast) -> float:
     """From centre to centre, how near a caster must come."""
     if cast.ability.overhead:
         return 0.0
+    if cast.target != NOBODY and cast.ability.range == 0.0:
+        return touching(world, cast.slot, cast.target) + cast.ability.slop
     body = float(world.radius[cast.target]) if cast.target != NOBODY else 0.0
     return cast.ability.range + float(world.radius[cast.slot]) + body
 

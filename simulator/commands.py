@@ -44,12 +44,12 @@ Point = tuple[float, float]
 def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
     """Walk to a point and look at nobody on the way."""
     order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
-    return give(world, [s for s in slots if can_move(world.unit_type(s))], order, queue=queue)
+    return give(world, [s for s in slots if can_move(_soon(world, s))], order, queue=queue)
 
 
 def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
     """Walk after another unit (a tag)."""
-    takers = [s for s in slots if can_move(world.unit_type(s)) and world.tag_of(s) != target]
+    takers = [s for s in slots if can_move(_soon(world, s)) and world.tag_of(s) != target]
     return give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
 
 
@@ -57,7 +57,7 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
     """Walk to a point and fight what is met; a unit without a weapon scan-moves."""
     taken: list[int] = []
     for slot in slots:
-        unit = world.unit_type(slot)
+        unit = _soon(world, slot)
         if can_attack(world, slot):
             order = Order(OrderKind.ATTACK_MOVE, ATTACK, point=_inside(world, point))
         elif can_move(unit):
@@ -81,7 +81,7 @@ def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = Fa
     """Go back and forth between here and a point, fighting what is met."""
     taken: list[int] = []
     for slot in slots:
-        if can_move(world.unit_type(slot)):
+        if can_move(_soon(world, slot)):
             x, y = world.pos[slot]
             order = Order(OrderKind.PATROL, PATROL, point=_inside(world, point), origin=(float(x), float(y)))
             taken += give(world, [slot], order, queue=queue)
@@ -101,7 +101,7 @@ def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 
 def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
     """Stay on the spot and fight only what is in reach."""
-    takers = [s for s in slots if can_move(world.unit_type(s))]
+    takers = [s for s in slots if can_move(_soon(world, s))]
     return give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
 
 
@@ -214,6 +214,15 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
 
 
 # what a unit can do ---------------------------------------------------------------------------------------------------
+
+
+def _soon(world: World, slot: int) -> UnitType:
+    """The type of a unit, or the one that it is about to be of when it is in the midst of a morph."""
+    if world.bound[slot] and world.casts[slot]:
+        row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
+        if row is not None:
+            return world.catalog.units[row]
+    return world.unit_type(slot)
 
 
 def can_move(unit: UnitType) -> bool:

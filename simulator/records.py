@@ -268,6 +268,11 @@ class UnitType:
         return self.radius if self.radius_api is None else self.radius_api
 
     @property
+    def underfoot(self) -> bool:
+        """Whether units walk over it though it keeps others from building there: a lowered depot."""
+        return self.footprint.endswith("Underground")
+
+    @property
     def repair_loops(self) -> float:
         """Loops in which one worker mends all its life; as long as it takes to make where the data says nothing."""
         return self.repair_n * 16.0 or self.build_loops

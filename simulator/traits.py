@@ -48,7 +48,7 @@ def body_traits(world: World, slot: int) -> None:
     world.separation[slot] = unit.separation
     world.clearance[slot] = min(unit.separation if unit.inner is None else unit.inner, MECHANICS.body_clearance)
     world.layer[slot] = layer_of(unit)
-    world.layer_bits[slot] = 0 if world.harvest[slot] else world.stats.layer_bits[unit.row]
+    world.layer_bits[slot] = 0 if world.harvest[slot] or unit.underfoot else world.stats.layer_bits[unit.row]
     world.plane_bits[slot] = world.stats.plane_bits[unit.row]
     world.step_max[slot] = world.stats.step[at]
     world.step_gain[slot] = world.stats.step_gain[at]

@@ -182,7 +182,7 @@ class World(UnitColumns):
         self.visible[:, slot] = not (self.fog or unit.cloaked or unit.burrowed)  # vision looks closer
         self.visible[owner, slot] = True
         self.refresh(slot)
-        self.ground.block(slot, self.footprint_cells(slot))
+        self._stand(slot)
         self._population_changed()
         return slot
 
@@ -225,7 +225,7 @@ class World(UnitColumns):
         self.burrowed[slot] = unit.burrowed
         self.ground.unblock(slot)
         self.refresh(slot)
-        self.ground.block(slot, self.footprint_cells(slot))
+        self._stand(slot)
         self.life[slot] = min(float(self.life[slot]) * float(self.life_max[slot]) / before, float(self.life_max[slot]))
         self.shields[slot] = min(float(self.shields[slot]), float(self.stats.shields_max[owner, unit.row]))
         energy = float(self.energy[slot] if had_energy else self.stats.energy_start[owner, unit.row])
@@ -263,7 +263,7 @@ class World(UnitColumns):
         self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
         self.looks_around[slot] = True
         self.visible[self.owner[slot], slot] = True
-        self.ground.block(slot, self.footprint_cells(slot))
+        self._stand(slot)
         self._population_changed()
 
     def alert(self, player: int, name: str) -> None:
@@ -302,6 +302,11 @@ class World(UnitColumns):
         above = np.array([self.catalog.units[row].height for row in self.type[self.live]], dtype=np.float64)
         result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
         return result
+
+    def _stand(self, slot: int) -> None:
+        """Put a structure's footprint on the ground, unless units walk over it."""
+        if not self.unit_type(slot).underfoot:
+            self.ground.block(slot, self.footprint_cells(slot))
 
     def footprint_cells(self, slot: int) -> Ints:
         """(k, 2) cells ``(x, y)`` that a structure blocks; (0, 2) for others."""

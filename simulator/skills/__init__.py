@@ -93,7 +93,13 @@ PASSIVES: Final[dict[str, UnitRule]] = {
     **transports.PASSIVES,
     **carrier.PASSIVES,
 }
-SMARTS: Final[tuple[SmartRule, ...]] = (*construction.SMARTS, *battery.SMARTS, *transports.SMARTS, *production.SMARTS)
+SMARTS: Final[tuple[SmartRule, ...]] = (
+    *construction.SMARTS,
+    *battery.SMARTS,
+    *transports.SMARTS,
+    *production.SMARTS,
+    *terran.SMARTS,
+)
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
     **transports.DEATHS,
     **carrier.DEATHS,

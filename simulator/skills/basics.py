@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.refusal import Refusal
+from simulator.skills import room
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def off_self(buff: str) -> Effect:
 def _morph(world: World, cast: Cast) -> None:
     """Become what the ability makes; the time it takes has passed (see ``casting.prep_loops``)."""
     world.become(cast.slot, world.catalog.unit(cast.ability.unit))
+    room.make(world, cast.slot)
 
 
 def _can_morph(world: World, cast: Cast) -> Refusal:

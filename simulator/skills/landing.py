@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator import sites
 from simulator.columns import NOBODY
 from simulator.refusal import Refusal
-from simulator.skills import sites, teleport
+from simulator.skills import addons, room, teleport
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 KINDS: Final = ("TechLab", "Reactor")
-BESIDE: Final = (2.5, -0.5)
-"""Where an add-on stands, from the middle of its structure."""
 CLOSE: Final = 0.1
 
 
@@ -39,20 +38,18 @@ def _can_lift(world: World, cast: Cast) -> Refusal:
 def _can_land(world: World, cast: Cast) -> Refusal:
     if cast.point is None:
         return Refusal.CANT_LAND_LOCATION_INVALID
-    unit = world.catalog.unit(cast.ability.unit)
-    free = sites.is_free(world, unit, sites.centre(world, unit, cast.point), ignoring=cast.slot)
-    return Refusal.SUCCESS if free else Refusal.CANT_LAND_LOCATION_INVALID
+    why = sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
+    return Refusal.SUCCESS if why is Refusal.SUCCESS else Refusal.CANT_LAND_LOCATION_INVALID
 
 
 def _settle(world: World, cast: Cast) -> None:
     """Come down, unless something has come under it by now, and take up an add-on that stands at the right place."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
-    assert cast.point is not None
-    place = sites.centre(world, unit, cast.point)
-    if not sites.is_free(world, unit, place, ignoring=slot):
+    if cast.point is None or _can_land(world, cast) is not Refusal.SUCCESS:
         return
-    teleport.to(world, slot, place)
+    teleport.to(world, slot, sites.centre(world, unit, cast.point))
     world.become(slot, unit)
+    room.make(world, slot)
     attach(world, slot)
 
 
@@ -69,8 +66,7 @@ def detach(world: World, slot: int) -> None:
 
 def attach(world: World, slot: int) -> None:
     """Take up the plain add-on of the same owner that stands beside a structure, if there is one."""
-    x, y = world.pos[slot].tolist()
-    goal = x + BESIDE[0], y + BESIDE[1]
+    goal = addons.place_of(world, slot)
     for other in world.units_of(int(world.owner[slot])).tolist():
         unit = world.unit_type(other)
         own = world.catalog.row_of_name.get(world.unit_type(slot).name + unit.name)

@@ -40,7 +40,7 @@ def _is_healed(world: World, cast: Cast) -> bool:
 
 
 def _heal(world: World, cast: Cast) -> bool:
-    """Heal for one loop; go after a target that walks away, stop when it is well or the energy is used up."""
+    """Heal for one loop while the target is near (a Medivac follows), until it is well or the energy is used up."""
     slot, target = cast.slot, cast.target
     if target == NOBODY or not world.can_cast[slot] or not world.targetable[target]:
         return False
@@ -73,7 +73,10 @@ SKILLS: Final = {
         _begin,
         refuse=_can_heal,
         hold=_heal,
-        estimates=("healing is given evenly in every loop, and a follower heals from the range at which it begins",),
+        estimates=(
+            "healing is given evenly in every loop",
+            "a Medivac follows whom it heals at half the range at which it begins",
+        ),
     ),
     "medivac_speed_boost": Skill(on_self("MedivacSpeedBoost")),
 }

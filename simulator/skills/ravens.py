@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, sites
 from simulator.columns import NOBODY
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.refusal import Refusal
-from simulator.skills import flight, sites, teleport
+from simulator.skills import flight, room, teleport
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 
 def _has_room(world: World, cast: Cast) -> Refusal:
+    if cast.point is None:
+        return Refusal.CANT_BUILD_LOCATION_INVALID
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    free = cast.point is not None and sites.is_free(world, unit, sites.centre(world, unit, cast.point))
-    return Refusal.SUCCESS if free else Refusal.CANT_BUILD_LOCATION_INVALID
+    return sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
 
 
 def _place_turret(world: World, cast: Cast) -> None:
@@ -35,6 +36,7 @@ def _place_turret(world: World, cast: Cast) -> None:
     assert cast.point is not None
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     turret = world.spawn(unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
+    room.make(world, turret)
     lasts = number(cast, "duration_loops") + world.rng.random() * number(cast, "duration_random_loops")
     teleport.live_until(world, turret, world.loop + lasts)
 

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator import commands
 from simulator.columns import NOBODY
+from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.medivacs import resume
-from simulator.skills.skill import Skill, gap, number
+from simulator.skills.skill import Skill, distance, number, touching
 
 if TYPE_CHECKING:
-    from simulator.casts import Cast
+    from simulator.casts import Cast, Point
+    from simulator.skills.skill import SmartRule
     from simulator.world import World
 
 DONE: Final = 1e-9
+REPAIRS: Final = ("repair", "mule_repair")
 
 
 def _can_repair(world: World, cast: Cast) -> Refusal:
@@ -57,7 +61,8 @@ def _mend(world: World, cast: Cast) -> bool:
     slot, target = cast.slot, cast.target
     if target == NOBODY or not world.targetable[target] or world.life[target] >= world.life_max[target] - DONE:
         return False
-    if gap(world, slot, target) > cast.ability.range + cast.ability.slop:
+    x, y = world.pos[target].tolist()
+    if distance(world, slot, (x, y)) > touching(world, slot, target) + 2.0 * cast.ability.slop:
         resume(world, slot)
         return True
     if _unaffordable(world, cast) is not Refusal.SUCCESS:
@@ -80,6 +85,23 @@ def _begin(world: World, cast: Cast) -> None:
     _mend(world, cast)
 
 
+def _repair_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
+    """A right click of workers on a damaged machine or structure of their own sends them to repair it."""
+    if target == NOBODY or "mechanical" not in world.unit_type(target).attributes:
+        return []
+    if world.build_progress[target] < 1.0 or world.life[target] >= world.life_max[target] - DONE:
+        return []
+    taken: list[int] = []
+    for slot in slots:
+        card = world.catalog.abilities_of(int(world.type[slot]))
+        ability = next((a for a in card if a.does in REPAIRS), None)
+        if ability is not None and slot != target and world.owner[slot] == world.owner[target]:
+            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
+            taken += commands.give(world, [slot], order, queue=queue)
+    return taken
+
+
+SMARTS: Final[tuple[SmartRule, ...]] = (_repair_by_click,)
 SKILLS: Final = {
     name: Skill(
         _begin,
@@ -87,5 +109,5 @@ SKILLS: Final = {
         hold=_mend,
         estimates=("repair is given and paid for evenly in every loop; the game's rounding is not known",),
     )
-    for name in ("repair", "mule_repair")
+    for name in REPAIRS
 }

@@ -130,6 +130,12 @@ def distance(world: World, slot: int, point: Point) -> float:
     return math.hypot(point[0] - x, point[1] - y)
 
 
+def touching(world: World, slot: int, other: int) -> float:
+    """From centre to centre, how far apart two bodies are that can't come nearer to each other."""
+    bodies = float(world.radius[slot] + world.radius[other])
+    return max(bodies, float(world.separation[slot] + world.separation[other]))
+
+
 def gap(world: World, slot: int, other: int) -> float:
     """From edge to edge."""
     (x, y), (a, b) = world.pos[slot].tolist(), world.pos[other].tolist()

@@ -24,7 +24,7 @@ from simulator.skills import (
 from simulator.systems.damage import IMPACTS
 
 if TYPE_CHECKING:
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+    from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
 
 SKILLS: Final[dict[str, Skill]] = {
     **buildings.SKILLS,
@@ -54,5 +54,6 @@ FIELDS: Final[dict[str, FieldRule]] = {
 TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts.TICKS}
 ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}
 PASSIVES: Final[dict[str, UnitRule]] = {**buildings.PASSIVES, **mines.PASSIVES}
+SMARTS: Final[tuple[SmartRule, ...]] = repair.SMARTS
 
 IMPACTS.update(infantry.IMPACTS)

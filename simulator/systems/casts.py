@@ -77,7 +77,7 @@ def _begin(world: World, cast: Cast) -> None:
 def _take_effect(world: World, cast: Cast) -> None:
     slot, skill = cast.slot, casting.skill_of(cast.ability)
     why = Refusal.SUCCESS
-    if world.cast_at[slot] < world.loop and not world.bound[slot]:  # it took time to prepare: look again
+    if world.cast_begun[slot] < world.loop and not world.bound[slot]:  # it took time to prepare: look again
         why = casting.refusal(world, slot, cast.ability)
         if why is Refusal.SUCCESS and not casting.in_range(world, cast):
             why = Refusal.TARGET_IS_OUT_OF_RANGE

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import casting, geometry
 from simulator.arrays import some, which
+from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.harvesting import Phase, reach_of
 from simulator.mechanics import MECHANICS
@@ -136,18 +137,22 @@ def _haul(world: World) -> None:
 
 
 def _approach(world: World) -> None:
-    """Units that are to use an ability walk until it reaches, and stand from then on."""
+    """Units that are to use an ability walk until it reaches, and stand from then on unless they have to follow."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])
         ability = world.catalog.ability(int(world.order_ability[slot]))
         ability = world.stats.ability(int(world.owner[slot]), ability)
         aimed = target != NOBODY or bool(world.order_aimed[slot])
         waits = world.cast_at[slot] < 0.0 and not world.channels[slot]
-        if not (aimed and waits) or ability.range >= ANYWHERE:
+        follows = bool(world.channels[slot]) and ability.follow_range > 0.0
+        if not (aimed and (waits or follows)) or ability.range >= ANYWHERE:
             continue
         goal = world.pos[target] if target != NOBODY else world.order_point[slot]
         body = float(world.radius[target]) if target != NOBODY else 0.0
-        stop_at = 0.0 if ability.overhead else ability.range + float(world.radius[slot]) + body
+        if follows:
+            stop_at = ability.follow_range + float(world.radius[slot]) + body
+        else:
+            stop_at = casting.reach(world, Cast(slot, ability, target))
         dx, dy = (goal - world.pos[slot]).tolist()
         world.goal[slot] = goal
         world.stop_at[slot] = max(stop_at - MECHANICS.chase_slack, 0.0)
