@@ -55,7 +55,7 @@ def _some(values: tuple[T, ...]) -> tuple[T, ...]:
 KeyName: TypeAlias = Annotated[str, AfterValidator(_key_name)]
 UnitTypeName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, knowledge(), "unit type"))]
 ActionName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, catalogue(), "action"))]
-MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, known_maps(), "map"))]
+MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: name and _known(name, known_maps(), "map"))]
 
 
 class TeamConfig(Frozen):

@@ -63,6 +63,8 @@ def test_a_task_may_bring_its_own_map() -> None:
     own = GOOD.replace("map: 2s3z", "own_map: {file: mine/ramp.SC2Map, race: protoss, opponent: null}")
     spec = loads(own, TaskConfig, source="t").map_spec
     assert (spec.name, spec.file, spec.opponent) == ("ramp", "mine/ramp.SC2Map", None)
+    read_again = TaskConfig.model_validate(loads(own, TaskConfig, source="t").model_dump())
+    assert read_again.map_spec == spec
 
 
 @pytest.mark.parametrize("maps", ["", "map: 2s3z\nown_map: {file: a/b.SC2Map, race: zerg, opponent: zerg}\n"])
