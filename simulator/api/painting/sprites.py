@@ -39,6 +39,8 @@ REACH = 1.8
 """Half of a sprite's size in radii of its unit: the longest outline and its shadow."""
 ONE_LETTER, ALL_LETTERS = 4.6, 7.5
 """Radius in pixels from which a unit carries the first of its letters, and all of them."""
+LETTER_HEIGHT, LETTERS_WIDTH = 1.1, 1.6
+"""Size of the letters at most, in radii."""
 UPRIGHT = frozenset({Class.STRUCTURE, Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 RINGED = frozenset({Class.MASSIVE, Class.CAPITAL})
 NOSE = ((1.22, 0), (0.74, 0.2), (0.74, 0))
@@ -234,7 +236,7 @@ def _light(side: int) -> Floats:
 def _letters(code: str, radius: float, side: int, livery: Livery) -> Floats:
     """Capitals in the middle of an image, with an edge around them."""
     size = side * FINER
-    mask = _text(code, size, min(radius * 0.95, 1.9 * radius / len(code)) * FINER)
+    mask = _text(code, size, LETTER_HEIGHT * radius * FINER, LETTERS_WIDTH * radius * FINER)
     image = np.zeros((size, size, 4), np.float32)
     for shape, colour, part in ((cv2.dilate(mask, _disc(1)), livery.dark, 0.9), (mask, livery.ink, 1.0)):
         cover = shape.astype(np.float32)[..., None] * np.float32(part / 255)
@@ -242,16 +244,16 @@ def _letters(code: str, radius: float, side: int, livery: Livery) -> Floats:
     return np.asarray(cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _text(text: str, size: int, height: float) -> Mask:
-    """Capitals of this height in the middle of a square mask."""
+def _text(text: str, size: int, height: float, width: float) -> Mask:
+    """Capitals in the middle of a square mask, no larger than this."""
     font, mask = cv2.FONT_HERSHEY_SIMPLEX, np.zeros((size, size), np.uint8)
-    (_, unit), _ = cv2.getTextSize("H", font, 1.0, 1)
-    scale = height / unit
-    thickness = max(1, round(height * 0.15))
-    (width, tall), _ = cv2.getTextSize(text, font, scale, thickness)
-    at = (round((size - width) / 2), round((size + tall) / 2))
+    (wide, tall), _ = cv2.getTextSize(text, font, 1.0, 1)
+    scale = min(height / tall, width / wide)
+    thickness = max(1, round(width * 0.09))
+    at = (round((size - wide * scale) / 2), round((size + tall * scale) / 2))
     cv2.putText(mask, text, at, font, scale, 255, thickness, cv2.LINE_AA)
-    return mask
+    x, y, wide, tall = cv2.boundingRect(mask)  # fonts differ in what they call the size of a text
+    return np.roll(mask, ((size - tall) // 2 - y, (size - wide) // 2 - x), axis=(0, 1))
 
 
 def _cut_out(image: Floats) -> Sprite:
