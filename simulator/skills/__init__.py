@@ -44,6 +44,24 @@ if TYPE_CHECKING:
     from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
     from simulator.world import World
 
+
+def _joined(*tables: dict[str, UnitRule]) -> dict[str, UnitRule]:
+    """The rules of several tables; a type that more than one of them names obeys all its rules in turn."""
+    rules: dict[str, list[UnitRule]] = {}
+    for table in tables:
+        for name, rule in table.items():
+            rules.setdefault(name, []).append(rule)
+    return {name: found[0] if len(found) == 1 else _in_turn(found) for name, found in rules.items()}
+
+
+def _in_turn(rules: list[UnitRule]) -> UnitRule:
+    def all_of_them(world: World, slots: list[int]) -> None:
+        for rule in rules:
+            rule(world, slots)
+
+    return all_of_them
+
+
 SKILLS: Final[dict[str, Skill]] = {
     **basics.SKILLS,
     **harvest.SKILLS,
@@ -83,16 +101,16 @@ ENDS: Final[dict[str, BuffRule]] = {
     **terran.ENDS,
 }
 FINALS: Final[dict[str, BuffRule]] = {}
-PASSIVES: Final[dict[str, UnitRule]] = {
-    **sentry.PASSIVES,
-    **gateway.PASSIVES,
-    **robotics.PASSIVES,
-    **stargate.PASSIVES,
-    **mothership.PASSIVES,
-    **terran.PASSIVES,
-    **transports.PASSIVES,
-    **carrier.PASSIVES,
-}
+PASSIVES: Final[dict[str, UnitRule]] = _joined(
+    sentry.PASSIVES,
+    gateway.PASSIVES,
+    robotics.PASSIVES,
+    stargate.PASSIVES,
+    mothership.PASSIVES,
+    terran.PASSIVES,
+    transports.PASSIVES,
+    carrier.PASSIVES,
+)
 SMARTS: Final[tuple[SmartRule, ...]] = (
     *construction.SMARTS,
     *battery.SMARTS,

@@ -11,6 +11,7 @@ from simulator import buffs
 from simulator.refusal import Refusal
 from simulator.skills import room
 from simulator.skills.skill import Skill
+from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -54,8 +55,17 @@ def _morph(world: World, cast: Cast) -> None:
 
 
 def _can_morph(world: World, cast: Cast) -> Refusal:
-    known = cast.ability.unit in world.catalog.row_of_name
-    return Refusal.SUCCESS if known else Refusal.NOT_SUPPORTED
+    row = world.catalog.row_of_name.get(cast.ability.unit)
+    if row is None:
+        return Refusal.NOT_SUPPORTED
+    lands = world.unit_type(cast.slot).flying and not world.catalog.units[row].flying
+    return Refusal.CANT_LAND_LOCATION_INVALID if lands and not _walkable(world, cast.slot) else Refusal.SUCCESS
+
+
+def _walkable(world: World, slot: int) -> bool:
+    """Whether the ground under a flyer bears walkers."""
+    surface = world.ground.surface(Layer.WALK)
+    return bool(surface.flat[surface.cell(world.pos[slot][None])][0])
 
 
 SKILLS: Final = {

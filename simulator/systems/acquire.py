@@ -160,7 +160,7 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     sparing = world.spares_structures.take(seekers)
     if some(sparing):
         wanted &= ~(sparing[:, None] & world.walled.take(foes))
-    if world.fields:
+    if world.fields and some(world.zone_radius.take(seekers) > 0.0):
         k, m = wanted.shape
         wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)
     rank = world.priority[foes] * PRIORITY_WEIGHT

@@ -329,6 +329,15 @@ def test_a_burning_structure_burns_down_and_nobody_is_credited(field: Any) -> No
     assert world.deaths[-1].killer == -1
 
 
+def test_a_bunker_that_holds_marines_burns_as_well(field: Any) -> None:
+    world = field.world
+    slot, marine = field.put("Bunker", 1, 10.5, 10.5), field.put("Marine", 1, 14, 10)
+    world.stow(marine, slot)
+    world.life[slot] = 100.0
+    field.play(60)
+    assert world.life[slot] < 95.0
+
+
 def test_repair_puts_a_fire_out(field: Any) -> None:
     world = field.world
     slot = field.put("Barracks", 1, 10.5, 10.5)

@@ -13,6 +13,7 @@ from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 SNIPE, EMP, CLOAK, UNCLOAK, HOLD_FIRE, FREE, NUKE, CANCEL_NUKE = 2714, 1628, 382, 383, 36, 38, 1622, 1623
+ARM = 710
 BANSHEE_CLOAK = 392
 
 
@@ -274,6 +275,17 @@ def test_a_strike_uses_up_one_nuke_and_needs_one(field: Any) -> None:
     field.play(2)
     assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.TECH_REQUIREMENTS_NOT_MET
     assert not any(field.world.unit_type(s).name == "Nuke" for s in range(field.world.top) if field.world.alive[s])
+
+
+def test_an_academy_arms_a_nuke_that_a_ghost_then_calls(field: Any) -> None:
+    world = field.world
+    ghost, academy = still(field, "Ghost", 1, 6, 16), field.put("GhostAcademy", 1, 4.5, 28.5)
+    field.put("Factory", 1, 10.5, 28.5)
+    world.players[1].minerals = world.players[1].vespene = 100.0
+    assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.order(academy, ARM)
+    field.play(int(world.catalog.ability(ARM).loops) + 2)
+    assert field.order(ghost, NUKE, point=(17, 16))
 
 
 @pytest.mark.parametrize("how", ["cancel", "order", "death"])

@@ -84,6 +84,24 @@ def test_an_order_given_while_a_tank_changes_its_mode_is_kept_for_afterwards(fie
     assert world.pos[slot].tolist() == pytest.approx([12, 10], abs=0.1)
 
 
+@pytest.mark.parametrize(("name", "number", "cancel"), [("WidowMine", BURROW, 2096), ("Thor", HIGH_IMPACT, 2363)])
+def test_what_can_be_cancelled_is(field: Any, name: str, number: int, cancel: int) -> None:
+    slot = field.put(name, 1, 10, 10)
+    field.order(slot, number)
+    field.play(10)
+    assert field.order(slot, cancel)
+    field.play(60)
+    assert field.world.unit_type(slot).name == name
+
+
+def test_a_viking_does_not_land_where_nobody_can_stand(field: Any) -> None:
+    slot = field.put("VikingFighter", 1, 10.5, 10.5)
+    field.put("Barracks", 2, 10.5, 10.5)
+    assert field.why_not(slot, ASSAULT) is Refusal.CANT_LAND_LOCATION_INVALID
+    field.world.pos[slot] = (14, 10)
+    assert field.why_not(slot, ASSAULT) is Refusal.SUCCESS
+
+
 def test_stop_does_not_keep_a_tank_from_sieging(field: Any) -> None:
     world = field.world
     slot = field.put("SiegeTank", 1, 6, 10)
