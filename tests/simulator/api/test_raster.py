@@ -1,5 +1,7 @@
 """Discs and samples, pixel by pixel, and their bytes as PySC2 reads them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -91,11 +93,14 @@ def decode(parts: list[bytes | memoryview], name: str) -> common_pb2.ImageData:
         (1, [[1, 0, 0], [0, 0, 0], [0, 0, 1]], b"\x80\x80"),
         (8, [[1, 0, 0], [0, 0, 0], [0, 0, 9]], bytes([1, 0, 0, 0, 0, 0, 0, 0, 9])),
         (32, [[1, 0, 0], [0, 0, 0], [0, 0, 515]], b"\1\0\0\0" + bytes(28) + b"\3\2\0\0"),
+        (
+            24,
+            [[[1, 2, 3], [0] * 3, [0] * 3], [[0] * 3] * 3, [[0] * 3, [0] * 3, [7, 8, 9]]],
+            b"\1\2\3" + bytes(21) + b"\7\10\11",
+        ),
     ],
 )
-def test_layers_are_rows_from_the_top_most_significant_bit_first(
-    bits: int, image: list[list[int]], data: bytes
-) -> None:
+def test_layers_are_rows_from_the_top_most_significant_bit_first(bits: int, image: list[Any], data: bytes) -> None:
     layer = Layer(1, bits, 3, 3)
     message = decode(layer.encode(np.array(image)), "height_map")
     assert (message.bits_per_pixel, message.size.x, message.size.y) == (bits, 3, 3)
