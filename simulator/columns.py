@@ -120,6 +120,9 @@ class UnitColumns:
     nav_loop: Ints = state(int)  # loop at which the path is looked over again
     nav_straight: Bools = state(bool)  # the straight line to the goal is free
     nav_end: Bools = state(bool)  # no way leads nearer to the goal
+    nav_goal: Floats = state(float, width=2)  # the goal, or what can be reached nearest to it
+    nav_best: Floats = state(float)  # the least distance from there since the way was begun
+    nav_best_loop: Ints = state(int)  # and when that was
     blocked: Ints = state(int)  # loops without progress in a row
     detour: Ints = state(int)  # side on which it goes around bodies, -1 right, 1 left, 0 none
     detour_end: Ints = state(int)  # loop at which it forgets that side

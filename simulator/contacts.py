@@ -95,7 +95,7 @@ def within(at: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
     order = np.argsort(along, kind="stable")
     along, across = along.take(order), across.take(order)
     rank = np.arange(len(order))
-    follow = np.searchsorted(along, along + reach, "right") - rank - 1
+    follow = np.searchsorted(along, along + reach, "left") - rank - 1
     one = np.repeat(rank, follow)
     first = np.cumsum(follow) - follow
     other = np.arange(len(one)) - np.repeat(first - rank - 1, follow)

@@ -47,6 +47,7 @@ class Mechanics:
     push_limit: float
     push_firm: float
     push_idle: float
+    push_ahead: float
     flyer_drift: float
     flyer_drift_limit: float
     blocked_share: float
@@ -56,14 +57,9 @@ class Mechanics:
     crowd_share: float
     crowd_near: float
     crowd_patience: int
+    crowd_stall: int
     vision_period: int
     bunker_range: float
-    emp_speed_n: float
-    yamato_speed_n: float
-    mine_missile_speed_n: float
-    matrix_speed_n: float
-    shredder_speed_n: float
-    knockback_loops: int
     high_ground_step: float
     building_sight: float
     harvest_gap: float
@@ -72,6 +68,12 @@ class Mechanics:
     creep_cells_per_step: int
     creep_decay_loops: float
     off_creep_damage: float
+    emp_speed_n: float
+    yamato_speed_n: float
+    mine_missile_speed_n: float
+    matrix_speed_n: float
+    shredder_speed_n: float
+    knockback_loops: int
 
 
 def entries() -> tuple[Entry, ...]:

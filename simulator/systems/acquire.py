@@ -48,9 +48,9 @@ def choose_targets(world: World) -> None:
     due &= world.acquires[:n]
     due &= world.scan_loop[:n] <= world.loop
     due &= world.windup[:n] < 0.0
-    content = world.in_reach[:n]
+    content = world.in_reach[:n] & (world.target[:n] != NOBODY)
     if world.loop % MECHANICS.look_up_period == 0:
-        content = content & (world.rank[:n] >= TOP_RANK)
+        content &= world.rank[:n] >= TOP_RANK
     due &= ~content
     if some(world.leashed[:n]):
         _slip_leash(world)

@@ -34,6 +34,7 @@ SAME_POINT = 1e-9
 STIR = 1e3
 EDGE_MARGIN = 1e-6
 IMMOBILE_YIELDING = 1e-6
+EVEN = 0.5 - 1e-9
 LAYERS = tuple(Layer)
 AIR = Layer.AIR
 EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 4)) for i in range(8)])
@@ -77,7 +78,7 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
         pairs = _Pairs(found.one, found.other, found.apart, _shares(world, slots, found.one, found.other))
         deep = pairs.relax(after, MECHANICS.push_rounds)
         if deep.size:
-            pressed = pairs.one[deep]
+            pressed = pairs.one[deep[pairs.share[deep] >= EVEN]]
             after[pressed] = start[pressed] = before[pressed]
             pairs.relax(after, MECHANICS.push_rounds - 1)
     shift = after - start
@@ -157,8 +158,23 @@ def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
         friends = owner.take(one) == owner.take(other)
         mine = np.where(friends, yielding_to_friend.take(one), mine)
         theirs = np.where(friends, yielding_to_friend.take(other), theirs)
+    wants = world.wants.take(slots)
+    rivals = wants.take(one) & wants.take(other)
+    if some(rivals):
+        left = _left(world, slots)
+        ahead = left.take(other) - left.take(one)
+        mine = np.where(rivals & (ahead > 0.0), mine * MECHANICS.push_ahead, mine)
+        theirs = np.where(rivals & (ahead < 0.0), theirs * MECHANICS.push_ahead, theirs)
     share: Floats = mine / (mine + theirs)
     return share
+
+
+def _left(world: World, slots: Ints) -> Floats:
+    """How far each of ``slots`` has to its next corner, squared; who is nearer goes first."""
+    offset = world.nav_point.take(slots, 0) - world.pos.take(slots, 0)
+    offset *= offset
+    left: Floats = offset[:, 0] + offset[:, 1]
+    return left
 
 
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:

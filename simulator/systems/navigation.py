@@ -18,10 +18,12 @@ from simulator.traits import Layer
 if TYPE_CHECKING:
     from simulator.columns import Ints
     from simulator.geometry import Floats
+    from simulator.pathing import Surface
     from simulator.world import World
 
 CORNER_REACHED = 0.4
 NEAR_CORNER = 1.8
+HEADWAY = 0.25  # so much nearer to the goal counts as progress
 LOOK_PERIOD = 4  # looking over many at once costs little more than looking over one
 LAYERS = tuple(Layer)
 AIR = Layer.AIR
@@ -57,23 +59,38 @@ def _look_over(world: World, slots: Ints, layer: Layer) -> None:
         straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))
     world.nav_straight[slots] = straight
     world.nav_end[slots] = False
-    world.nav_point[slots] = goal
+    world.nav_point[slots] = world.nav_goal[slots] = goal
     crooked = slots[~straight]
-    if not crooked.size:
-        return
+    if crooked.size:
+        _find_corners(world, crooked, surface)
+    _note_progress(world, slots)
+
+
+def _find_corners(world: World, crooked: Ints, surface: Surface) -> None:
+    """Send walkers whose straight line is not free to the next corner of their way."""
     start = world.pos[crooked]
     cells = surface.cell(world.goal[crooked])
     parts = surface.part[surface.cell(start)]
     usable = parts >= 0
     for i in np.flatnonzero(usable & (surface.part[cells] != parts)).tolist():
         cells[i] = surface.nearest(world.goal[crooked[i]], int(parts[i]), start[i])
-    crooked, start, cells = crooked[usable], start[usable], cells[usable]
+    elsewhere = surface.cell(world.goal[crooked]) != cells
+    crooked, start, cells, elsewhere = crooked[usable], start[usable], cells[usable], elsewhere[usable]
     if crooked.size:
+        world.nav_goal[crooked[elsewhere]] = surface.centre(cells[elsewhere])
         centre = surface.centre(cells)
         at_goal = surface.cell(start) == cells
         world.nav_point[crooked] = np.where(at_goal[:, None], centre, surface.corners(start, cells))
         offset = centre - start
         world.nav_end[crooked] = at_goal & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
+
+
+def _note_progress(world: World, slots: Ints) -> None:
+    """Remember how near to its goal each walker has come on this way, and when."""
+    left = geometry.length(world.nav_goal.take(slots, 0) - world.pos.take(slots, 0))
+    nearer = (world.nav_loop.take(slots) == 0) | (left < world.nav_best.take(slots) - HEADWAY)
+    world.nav_best[slots] = np.where(nearer, left, world.nav_best.take(slots))
+    world.nav_best_loop[slots] = np.where(nearer, world.loop, world.nav_best_loop.take(slots))
 
 
 def _stopping_point(world: World, slots: Ints, goal: Floats) -> Floats:

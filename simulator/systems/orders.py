@@ -13,7 +13,6 @@ from simulator.mechanics import MECHANICS
 if TYPE_CHECKING:
     from simulator.world import World
 
-PACKED_AFTER_LOOPS = 2
 CROWD_PERIOD = 2  # whether the crowd at a goal is dense is looked over so often
 
 
@@ -47,8 +46,10 @@ def _arrived(world: World) -> list[int]:
     squared = offset[:, 0] + offset[:, 1]
     there = squared <= MECHANICS.arrival_radius**2
     there |= world.nav_end.take(walkers)
-    stuck = world.blocked.take(walkers) >= PACKED_AFTER_LOOPS
-    stuck &= ~there
-    if world.loop % CROWD_PERIOD == 0 and some(stuck):
-        there[stuck] = packed(world, walkers[stuck], squared[stuck])
+    if world.loop % CROWD_PERIOD == 0:
+        stuck = world.blocked.take(walkers) > 0
+        stuck |= world.loop - world.nav_best_loop.take(walkers) > MECHANICS.crowd_stall
+        stuck &= ~there
+        if some(stuck):
+            there[stuck] = packed(world, walkers[stuck])
     return walkers[there].tolist() if some(there) else []

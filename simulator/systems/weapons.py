@@ -63,6 +63,7 @@ def _drop_lost(world: World, lost: Ints) -> None:
     if lost.size:
         world.windup[lost] = NOT_STARTED
         world.cooldown[lost] = 0.0
+        world.scan_now = True
 
 
 def _turn_turrets(world: World, slots: Ints) -> None:

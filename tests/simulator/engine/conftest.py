@@ -48,7 +48,16 @@ class Field:
         self.world = World(bare_map(terrain, fog=fog), PLAYERS, seed=seed, catalog=load_catalog(version))
 
     def put(self, name: str, owner: int, x: float, y: float, facing: float = 0.0) -> int:
-        return self.world.spawn(self.world.catalog.unit(name), owner, (x, y), facing)
+        unit = self.world.catalog.unit(name)
+        if unit.structure and unit.needs_creep:
+            self._paint_creep(x, y)
+        return self.world.spawn(unit, owner, (x, y), facing)
+
+    def _paint_creep(self, x: float, y: float) -> None:
+        """Put creep under the middle of a structure, so that it does not wither."""
+        covered = self.world.growth.covered.copy()
+        covered[int(y), int(x)] = True
+        self.world.growth.covered = covered
 
     def order(
         self, slot: int, ability: int, target: int | None = None, point: tuple[float, float] | None = None

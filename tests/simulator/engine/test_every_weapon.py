@@ -72,6 +72,8 @@ class Duel:
         away = self.attacker_type.radius + self.target_type.radius + gap
         self.target = self.field.put(self.target_type.name, 2, 8 + away, 16)
         self.attacker = self.field.put(case.unit, 1, 8, 16)
+        if self.attacker_type.needs_power:
+            self.field.put("Pylon", 1, 8, 20)
         if self.weapon.disabled:
             set_weapon(world, self.attacker, self.weapon.id, on=True)
         world.acquires[self.target] = world.acquires[self.attacker] = False
