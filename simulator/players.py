@@ -89,6 +89,7 @@ class Player:
     result: GameResult = GameResult.UNDECIDED
     surrendered: bool = False
     score: Score = field(default_factory=Score)
+    attacking: bool = False  # a computer player's army is on its way
     start: tuple[float, float] | None = None  # where his town hall was put at the start of a melee game
     camera: tuple[float, float] | None = None  # where he looks at the start, if not where the map says
 

@@ -20,6 +20,8 @@ Cost = tuple[float, float]
 
 BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "summon", "warp_in", "arm", "structure_morph"})
 """What is charged for as its product's ``made_by`` says."""
+BUILD_REACH: Final = 0.5
+"""How far from a structure's body its builder may stand when it places it (an estimate)."""
 ALL: Final = 1.0
 """Share of the price that comes back for what was only in a queue."""
 CANCELLED: Final = 0.75
@@ -48,7 +50,7 @@ def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[s
     if not ways or ability.minerals or ability.vespene:
         return ability
     way = ways[0]
-    reach = product.radius if ability.does == "build" and not ability.range else ability.range
+    reach = product.radius + BUILD_REACH if ability.does == "build" and not ability.range else ability.range
     minerals, vespene = way.cost
     return dataclasses.replace(
         ability,

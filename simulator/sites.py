@@ -93,6 +93,8 @@ def _enemies_on(world: World, player: int, cells: Ints) -> bool:
 
 def taken(world: World) -> Bools:
     """(h, w) the cells on which structures and resources stand, those that can be walked over included."""
+    if world.taken is not None and world.taken[0] == world.population:
+        return world.taken[1]
     width, height = world.map.terrain.size
     grid: Bools = np.zeros((height, width), dtype=np.bool_)
     for slot in world.live.tolist():
@@ -100,6 +102,7 @@ def taken(world: World) -> Bools:
         if len(cells):
             inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
             grid[cells[inside, 1], cells[inside, 0]] = True
+    world.taken = world.population, grid
     return grid
 
 

@@ -26,6 +26,7 @@ from simulator.systems import (
     missiles,
     movement,
     navigation,
+    opponents,
     orders,
     passives,
     power,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from simulator.players import PlayerSetup
 
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
+    opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
     acquire.choose_targets,  # whom to fight, without being told
     autocast.look_out,  # what to use, without being told

@@ -131,6 +131,8 @@ class World(UnitColumns):
         self.alerts: list[Alert] = []
         self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
         self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
+        self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
+        self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
         self.powered_at = -1  # the population for which ``powered`` was written
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 WHOLE: Final = 1.0 - 1e-9
+FOLLOW: Final = int(OrderKind.FOLLOW)
 BESIDE: Final = 1.5  # from edge to edge: how far from its site a builder still works on it
 
 
@@ -42,8 +43,10 @@ def _note_builders(world: World, sites: Ints) -> None:
     """Say which sites have somebody at work, and who that is."""
     n = world.top
     world.site[:n] = -1
-    following = (world.order_kind[:n] == OrderKind.FOLLOW.value) & np.isin(world.order_target[:n], sites)
-    following &= world.can_act[:n]
+    is_site = np.zeros(world.capacity, dtype=np.bool_)
+    is_site[sites] = True
+    following = (world.order_kind[:n] == FOLLOW) & (world.order_target[:n] >= 0) & world.can_act[:n]
+    following &= is_site.take(world.order_target[:n], mode="clip")
     for slot in which(following).tolist():
         site = int(world.order_target[slot])
         if not is_work(world, slot) or world.worked[site] == world.loop:
@@ -67,9 +70,10 @@ def _grow(world: World, sites: Ints) -> None:
         share = np.where(np.isin(world.owner[sites], quick), 1.0, share)
     share = np.minimum(share, 1.0 - world.build_progress[sites])
     world.build_progress[sites] += share
-    stone = sites[[world.unit_type(s).structure for s in sites.tolist()]]
+    is_stone = np.array([world.unit_type(s).structure for s in sites.tolist()])
+    stone = sites[is_stone]
     if stone.size:
-        grown = (1.0 - construction.START_SHARE) * share[np.isin(sites, stone)]
+        grown = (1.0 - construction.START_SHARE) * share[is_stone]
         world.life[stone] = np.minimum(world.life[stone] + grown * world.life_max[stone], world.life_max[stone])
         most = world.shields_max[stone]
         world.shields[stone] = np.minimum(world.shields[stone] + grown * most, most)

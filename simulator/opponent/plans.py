@@ -1,0 +1,53 @@
+"""What a computer player of each race builds, in short lists. An estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Names of unit types: what gives supply, gathers gas, makes units, comes before better units, and fights.
+
+    ``army`` is in the order of preference; what is not allowed or affordable yet is passed over.
+    """
+
+    worker: str
+    supply: str
+    gas: str
+    producer: str
+    tech: tuple[str, ...]
+    army: tuple[str, ...]
+    makers: tuple[str, ...]
+
+
+PLANS: Final = {
+    "protoss": Plan(
+        worker="Probe",
+        supply="Pylon",
+        gas="Assimilator",
+        producer="Gateway",
+        tech=("CyberneticsCore",),
+        army=("Stalker", "Zealot"),
+        makers=("Gateway", "WarpGate"),
+    ),
+    "terran": Plan(
+        worker="SCV",
+        supply="SupplyDepot",
+        gas="Refinery",
+        producer="Barracks",
+        tech=(),
+        army=("Marine",),
+        makers=("Barracks",),
+    ),
+    "zerg": Plan(
+        worker="Drone",
+        supply="Overlord",
+        gas="Extractor",
+        producer="SpawningPool",
+        tech=("RoachWarren",),
+        army=("Roach", "Zergling"),
+        makers=("Larva",),
+    ),
+}
