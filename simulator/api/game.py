@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 _VISIBLE = 2
+_CENTRED_LOOP = 1
+"""Loop in which the game itself points the cameras of a melee game; clients see that reported a loop later."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,8 +87,10 @@ class Game:
 
     def sit(self, player: int, options: sc.InterfaceOptions) -> Seat:
         """Gives a player an interface."""
-        self.seats[player] = Seat(self.world, self.types, player, options)
-        return self.seats[player]
+        seat = self.seats[player] = Seat(self.world, self.types, player, options)
+        if self.end_loop is None and self.world.players[player].start is not None:
+            self.note(Entry(_CENTRED_LOOP, player, _centre(seat)))
+        return seat
 
     def act(self, player: int, action: sc.Action) -> error_pb2.ActionResult.ValueType:
         """Notes an action of a player, and says how it looks as things stand."""
@@ -160,6 +164,14 @@ class Game:
         for player, seat in self.seats.items():
             if player == sender or chat.channel != sc.ActionChat.Team:
                 seat.hands.chat.append(sc.ChatReceived(player_id=sender, message=chat.message))
+
+
+def _centre(seat: Seat) -> sc.Action:
+    """The camera's move to where it already is, with which a melee game begins."""
+    action = sc.Action()
+    point = action.action_raw.camera_move.center_world_space
+    point.x, point.y = seat.camera[0] - seat.origin[0], seat.camera[1] - seat.origin[1]
+    return action
 
 
 def _result(world: World, player: int) -> sc.Result.ValueType:

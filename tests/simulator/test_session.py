@@ -167,6 +167,21 @@ def test_a_step_without_a_count_is_one_loop(playing: Client) -> None:
     assert playing.ask(step=sc.RequestStep(count=0)).step.simulation_loop == 2
 
 
+def test_a_melee_game_begins_with_a_camera_move_of_its_own(client: Client) -> None:
+    client.play("Melee/Flat64")
+    first = client.observe()
+    seen = [client.step() for _ in range(3)]
+    assert [len(o.actions) for o in (first, *seen)] == [0, 0, 1, 0]
+    (move,) = seen[1].actions
+    assert move.game_loop == 1
+    assert move.HasField("action_feature_layer")
+    point, camera = move.action_raw.camera_move.center_world_space, first.observation.raw_data.player.camera
+    assert (point.x, point.y) == (camera.x, camera.y)
+    data = client.ask(save_replay=sc.RequestSaveReplay()).save_replay.data
+    client.ask(start_replay=sc.RequestStartReplay(replay_data=data, observed_player_id=1, options=interface(screen=0)))
+    assert [len(client.step().actions) for _ in range(3)] == [0, 1, 0]
+
+
 # requests that fail ---------------------------------------------------------------------------------------------------
 
 CreateError, JoinError = sc.ResponseCreateGame.Error, sc.ResponseJoinGame.Error

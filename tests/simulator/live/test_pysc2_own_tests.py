@@ -34,6 +34,10 @@ PASSED = [
     "actions_test.ActionsTest.test_general_attack",
     "obs_test.ObsTest.test_hallucination",
     "obs_test.ObsTest.test_effects",
+    "obs_test.ObsTest.test_hide_cloaked",
+    "obs_test.ObsTest.test_show_cloaked",
+    "obs_test.ObsTest.test_active",
+    "obs_test.ObsTest.test_disable_fog",
     "random_agent_test.TestRandomAgent.test_random_agent_features",
     "obs_spec_test.TestObservationSpec.test_heterogeneous_observations",
     "host_remote_agent_test.TestHostRemoteAgent.testVsAgent",
@@ -53,11 +57,7 @@ SLOW = [
     "easy_scripted_test.TestEasy.test_defeat_roaches_raw",
 ]
 NOT_YET = {
-    "obs_test.ObsTest.test_hide_cloaked": "needs the debug state god",
-    "obs_test.ObsTest.test_show_cloaked": "needs the debug state god",
-    "obs_test.ObsTest.test_active": "needs harvesting and production",
-    "obs_test.ObsTest.test_disable_fog": "needs harvesting and production",
-    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "needs a Terran economy",
+    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "builds on pixels where the shipped Flat64 has minerals",
     "observer_test.TestObserver.test_observer": "needs a built-in AI that finishes games",
 }
 WITHOUT_A_GAME = {"dummy_observation_test"}
