@@ -148,6 +148,8 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     )
 
 
+WALK_BY_UPGRADE: Final = frozenset({"RoachBurrowed"})
+"""Types without a speed of their own that an upgrade gives one."""
 BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack")
 
 
@@ -164,7 +166,7 @@ def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple
 
 def _card(unit: UnitType, found: dict[int, Ability], smart: Ability) -> tuple[Ability, ...]:
     armed = any(unit.weapon_against(plane) is not None for plane in ("ground", "air"))
-    walks = unit.speed_n > 0.0
+    walks = unit.speed_n > 0.0 or unit.name in WALK_BY_UPGRADE
     fits = {"attack": armed, "scan_move": walks and not armed, "stop": armed or walks}
     card = {} if unit.uncommandable else dict(found)
     seen: set[str] = set()

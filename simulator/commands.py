@@ -44,12 +44,12 @@ Point = tuple[float, float]
 def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
     """Walk to a point and look at nobody on the way."""
     order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
-    return give(world, [s for s in slots if can_move(_soon(world, s))], order, queue=queue)
+    return give(world, [s for s in slots if can_move(world, s)], order, queue=queue)
 
 
 def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
     """Walk after another unit (a tag)."""
-    takers = [s for s in slots if can_move(_soon(world, s)) and world.tag_of(s) != target]
+    takers = [s for s in slots if can_move(world, s) and world.tag_of(s) != target]
     return give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
 
 
@@ -57,10 +57,9 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
     """Walk to a point and fight what is met; a unit without a weapon scan-moves."""
     taken: list[int] = []
     for slot in slots:
-        unit = _soon(world, slot)
         if can_attack(world, slot):
             order = Order(OrderKind.ATTACK_MOVE, ATTACK, point=_inside(world, point))
-        elif can_move(unit):
+        elif can_move(world, slot):
             order = Order(OrderKind.SCAN_MOVE, SCAN_MOVE, point=_inside(world, point))
         else:
             continue
@@ -81,7 +80,7 @@ def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = Fa
     """Go back and forth between here and a point, fighting what is met."""
     taken: list[int] = []
     for slot in slots:
-        if can_move(_soon(world, slot)):
+        if can_move(world, slot):
             x, y = world.pos[slot]
             order = Order(OrderKind.PATROL, PATROL, point=_inside(world, point), origin=(float(x), float(y)))
             taken += give(world, [slot], order, queue=queue)
@@ -101,7 +100,7 @@ def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 
 def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
     """Stay on the spot and fight only what is in reach."""
-    takers = [s for s in slots if can_move(_soon(world, s))]
+    takers = [s for s in slots if can_move(world, s)]
     return give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
 
 
@@ -225,9 +224,10 @@ def _soon(world: World, slot: int) -> UnitType:
     return world.unit_type(slot)
 
 
-def can_move(unit: UnitType) -> bool:
-    """Whether units of this type take movement orders."""
-    return unit.speed_n > 0.0 and _commandable(unit)
+def can_move(world: World, slot: int) -> bool:
+    """Whether a unit takes movement orders: what it is or is about to be has a speed, or an upgrade gives it one."""
+    unit = _soon(world, slot)
+    return bool(world.stats.step[world.owner[slot], unit.row] > 0.0) and _commandable(unit)
 
 
 def can_attack(world: World, slot: int) -> bool:

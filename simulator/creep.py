@@ -14,9 +14,12 @@ import json
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+GENERATING: Final = "makeCreep2x2Overlord"
+"""The buff of an Overlord that lets creep fall."""
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,6 +121,12 @@ class Creep:
         inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
         self._count[y[inside], x[inside]] += 1 if extent > source.extent else -1
         source.extent = extent
+
+    def paint(self, x0: int, y0: int, x1: int, y1: int) -> None:
+        """Put creep that never recedes on the cells of a box (``x1`` and ``y1`` exclusive), as a map can have it."""
+        self._painted = self._painted.copy()
+        self._painted[max(y0, 0) : y1, max(x0, 0) : x1] = True
+        self.settle()
 
     def settle(self) -> None:
         """Write ``covered`` anew after sources have changed, and forget those that cover nothing any more."""

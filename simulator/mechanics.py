@@ -74,6 +74,15 @@ class Mechanics:
     matrix_speed_n: float
     shredder_speed_n: float
     knockback_loops: int
+    larvae_natural: int
+    larva_limit: int
+    larva_loops: int
+    injected_larva_loops: float
+    larva_rest_loops: int
+    larva_step: float
+    larva_leash: float
+    broodling_random_loops: float
+    swoop_speed_n: float
 
 
 def entries() -> tuple[Entry, ...]:

@@ -53,8 +53,8 @@ def engage(world: World, slot: int, target: int) -> bool:
 
 def measure_reach(world: World, slot: int) -> None:
     """Write the reach of the weapon at hand, with what buffs add to it or take from it."""
-    reach = float(world.stats.range[world.owner[slot], world.weapon[slot]] + world.range_add[slot])
-    world.reach[slot] = max(reach, 0.0)
+    plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])
+    world.reach[slot] = max(plain + more, min(plain, 0.0))  # what is taken away leaves an arm's length
 
 
 def disengage(world: World, slot: int) -> None:

@@ -36,6 +36,7 @@ from simulator.skills import (
     terran,
     transports,
     warpgate,
+    zerg,
 )
 
 if TYPE_CHECKING:
@@ -80,6 +81,7 @@ SKILLS: Final[dict[str, Skill]] = {
     **terran.SKILLS,
     **transports.SKILLS,
     **carrier.SKILLS,
+    **zerg.SKILLS,
 }
 FIELDS: Final[dict[str, FieldRule]] = {
     **sentry.FIELDS,
@@ -89,18 +91,21 @@ FIELDS: Final[dict[str, FieldRule]] = {
     **stargate.FIELDS,
     **mothership.FIELDS,
     **terran.FIELDS,
+    **zerg.FIELDS,
 }
 TICKS: Final[dict[str, BuffRule]] = {
     **templar.TICKS,
     **mothership.TICKS,
     **terran.TICKS,
+    **zerg.TICKS,
 }
 ENDS: Final[dict[str, BuffRule]] = {
     **robotics.ENDS,
     **stargate.ENDS,
     **terran.ENDS,
+    **zerg.ENDS,
 }
-FINALS: Final[dict[str, BuffRule]] = {}
+FINALS: Final[dict[str, BuffRule]] = {**zerg.FINALS}
 PASSIVES: Final[dict[str, UnitRule]] = _joined(
     sentry.PASSIVES,
     gateway.PASSIVES,
@@ -110,6 +115,7 @@ PASSIVES: Final[dict[str, UnitRule]] = _joined(
     terran.PASSIVES,
     transports.PASSIVES,
     carrier.PASSIVES,
+    zerg.PASSIVES,
 )
 SMARTS: Final[tuple[SmartRule, ...]] = (
     *construction.SMARTS,
@@ -121,4 +127,5 @@ SMARTS: Final[tuple[SmartRule, ...]] = (
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
     **transports.DEATHS,
     **carrier.DEATHS,
+    **zerg.DEATHS,
 }

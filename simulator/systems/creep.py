@@ -12,7 +12,7 @@ import numpy as np
 
 from simulator import buffs
 from simulator.columns import NOBODY
-from simulator.creep import spreads
+from simulator.creep import GENERATING, spreads
 from simulator.mechanics import MECHANICS
 from simulator.systems.damage import wound
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 LOOK_PERIOD: Final = 8
-GENERATING: Final = "makeCreep2x2Overlord"
 WITHERING: Final = "ZergBuildingNotOnCreep"
 
 
@@ -54,7 +53,7 @@ def _look_over(world: World) -> None:
             source.due = world.loop + MECHANICS.creep_decay_loops
             creep.due = min(creep.due, source.due)
     for tag, slot in stand.items():
-        creep.add(tag, world.unit_type(slot).name, _cell(world, slot), world.loop, grown=world.loop == 0)
+        creep.add(tag, world.unit_type(slot).name, _cell(world, slot), world.loop, grown=_old(world, slot))
     if stand:
         creep.settle()
     world.growth.withering = world.live[needy(world.catalog)[world.type[world.live]]]
@@ -73,6 +72,11 @@ def _generates(world: World, slot: int) -> bool:
     if was is None or was[:2] != (x, y):
         world.growth.waiting[tag] = was = (x, y, world.loop)
     return world.loop - was[2] >= spread.delay_loops
+
+
+def _old(world: World, slot: int) -> bool:
+    """Whether a source stands since the game began, and has all its creep."""
+    return bool(world.born_loop[slot] == 0) and not world.growth.spreads[world.unit_type(slot).name].delay_loops
 
 
 def _cell(world: World, slot: int) -> tuple[int, int]:

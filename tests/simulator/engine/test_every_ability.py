@@ -21,6 +21,7 @@ from simulator.maps import load_map
 from simulator.players import PlayerSetup
 from simulator.refusal import Refusal
 from simulator.skills import SKILLS
+from simulator.systems import creep
 from simulator.tick import advance
 from simulator.world import World
 
@@ -65,6 +66,7 @@ def stage(version: str) -> World:
             if owner and not world.unit_type(slot).structure:
                 world.life[slot] *= 0.6
                 world.shields[slot] *= 0.5
+    creep.spread(world)
     return world
 
 
@@ -211,6 +213,35 @@ def _near_power(world: World, slot: int) -> None:
     advance(world, 1)
 
 
+def _on_creep(world: World, slot: int) -> None:
+    """Creep around the caster."""
+    x, y = world.pos[slot].tolist()
+    world.growth.add(world.tag_of(slot), "Hatchery", (int(x), int(y)), world.loop, grown=True)
+    world.growth.settle()
+
+
+def _hungry(world: World, slot: int) -> None:
+    world.energy[slot] = 10.0
+
+
+def _morphing(*kinds: str) -> Callable[[World, int], None]:
+    """In the middle of a morph of its own; a cocoon has just begun to be one."""
+
+    def prepare(world: World, slot: int) -> None:
+        _on_creep(world, slot)
+        name = world.unit_type(slot).name
+        before = next((a for a in world.catalog.abilities if a.numbers.get("cocoon") == name), None)
+        if before is not None:
+            world.become(slot, world.catalog.unit(before.users[0]))
+        x, y = world.pos[slot].tolist()
+        found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.does in kinds)
+        found = before or found
+        casting.use(world, [slot], found, point=(x, y) if found.requires_point else None)
+        advance(world, 12 if before is not None else 3)
+
+    return prepare
+
+
 PREPARE: dict[str, Callable[[World, int], None]] = {
     "ghost_weapons_free": _bear("GhostHoldFireB"),
     "ghost_cloak_off": _bear("GhostCloak"),
@@ -218,6 +249,16 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
     "cancel_lock_on_cancel": _use(2350),
     "cancel_channel_snipe": _use(2714),
     "cancel_tac_nuke_strike": _use(1622),
+    "cancel_neural_parasite": _use(249),
+    "cancel_growth": _morphing("grow"),
+    "cancel_morph": _morphing("morph", "root"),
+    "creep_tumor": _on_creep,
+    "root": _on_creep,
+    "transfusion": _on_creep,
+    "viper_consume_structure": _hungry,
+    "generate_creep_off": _bear("makeCreep2x2Overlord"),
+    "lurker_remove_hold_fire": _bear("LurkerHoldFireB"),
+    "volatile_burst_building_off": _bear("VolatileBurstBuilding"),
     "cancel_job": _queue,
     "cancel_slot": _queue,
     "halt": _at_work,

@@ -1,0 +1,98 @@
+"""Morphs that are paid for when they begin and take their time in a cocoon or in place, and calling morphs off.
+
+A Zergling that becomes a Baneling, a Hatchery that becomes a Lair: the price is charged at the beginning, the unit is a
+cocoon (if there is one) until the time has passed, and nothing but calling it off ends it before. Burrowing and the
+like, which cost nothing, are ``basics``' morphs; here is how those are called off.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator import commands, prices
+from simulator.refusal import Refusal
+from simulator.skills.skill import Skill
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.records import UnitType
+    from simulator.world import World
+
+
+def _grow(world: World, cast: Cast) -> None:
+    """Become a cocoon, if there is one, and in the end something new."""
+    world.cast_begun[cast.slot], world.cast_at[cast.slot] = world.loop, world.loop + cast.ability.loops
+    cocoon = str(cast.ability.numbers.get("cocoon", ""))
+    if cocoon:
+        _renewed(world, cast.slot, world.catalog.unit(cocoon))
+
+
+def _grows(world: World, cast: Cast) -> bool:
+    if world.loop < cast.begun + cast.ability.loops:
+        return True
+    unit = world.catalog.unit(cast.ability.unit)
+    if cast.ability.numbers.get("cocoon"):
+        _renewed(world, cast.slot, unit)
+    else:
+        world.become(cast.slot, unit)
+    world.alert(int(world.owner[cast.slot]), "MorphComplete")
+    return False
+
+
+def _renewed(world: World, slot: int, unit: UnitType) -> None:
+    """Become another type with all of its life, as what comes into or out of a cocoon has."""
+    world.become(slot, unit)
+    world.life[slot] = world.life_max[slot]
+    world.energy[slot] = min(
+        float(world.stats.energy_start[world.owner[slot], unit.row]), float(world.energy_max[slot])
+    )
+
+
+def _can_grow(world: World, cast: Cast) -> Refusal:
+    busy = cast.slot in world.jobs
+    return Refusal.CANT_QUEUE_THAT_ORDER if busy else Refusal.SUCCESS
+
+
+def _call_off_growth(world: World, cast: Cast) -> None:
+    """Become what it was before; three quarters of the price come back."""
+    growing = world.channelling.get(cast.slot)
+    if growing is None or growing.ability.does != "grow":
+        return
+    was = world.catalog.units[growing.was]
+    if world.type[cast.slot] != was.row:
+        _renewed(world, cast.slot, was)
+    prices.refund(world, int(world.owner[cast.slot]), prices.cost_of(growing.ability), prices.CANCELLED)
+    commands.begin_next(world, cast.slot)
+
+
+def _grows_now(world: World, cast: Cast) -> Refusal:
+    growing = world.channelling.get(cast.slot)
+    found = growing is not None and growing.ability.does == "grow"
+    return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
+
+
+def _call_off_morph(world: World, cast: Cast) -> None:
+    """Stay what it is: the morph under way is dropped."""
+    commands.begin_next(world, cast.slot)
+
+
+def _morphs_now(world: World, cast: Cast) -> Refusal:
+    slot = cast.slot
+    under_way = world.casts[slot] and world.bound[slot] and not world.channels[slot]
+    return Refusal.SUCCESS if under_way else Refusal.CANT_FIND_CANCEL_ORDER
+
+
+SKILLS: Final = {
+    "grow": Skill(
+        _grow,
+        refuse=_can_grow,
+        hold=_grows,
+        binds=True,
+        estimates=(
+            "that a cocoon, and what comes out of it, has all of its life",
+            "that the new unit has its starting energy",
+        ),
+    ),
+    "cancel_growth": Skill(_call_off_growth, refuse=_grows_now, estimates=("the share of the price that comes back",)),
+    "cancel_morph": Skill(_call_off_morph, refuse=_morphs_now),
+}

@@ -1,0 +1,54 @@
+"""The Ravager's Corrosive Bile: it is seen where it will fall, and falls on friend and foe."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.fields import Field, source_slot
+from simulator.skills.skill import Skill, around, number, place_of
+from simulator.systems.damage import wound
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+BILE_EFFECT = 11
+
+
+def _bile(world: World, cast: Cast) -> None:
+    """Harm whoever stands at the place some time later, and destroy force fields there."""
+    rises, falls = number(cast, "delay_loops"), number(cast, "fall_loops")
+    due = world.loop + rises + falls
+    world.fields.append(
+        Field(
+            does="corrosive_bile",
+            owner=int(world.owner[cast.slot]),
+            points=[place_of(world, cast)],
+            radius=number(cast, "radius"),
+            begun=world.loop,
+            end=due,
+            effect=BILE_EFFECT,
+            due=due,
+            ability=cast.ability.id,
+            source=world.tag_of(cast.slot),
+        )
+    )
+
+
+def _falls(world: World, item: Field) -> None:
+    damage = number(world.catalog.ability(item.ability), "damage")
+    for slot in around(world, item.at, item.radius):
+        wound(world, source_slot(world, item), item.owner, slot, damage)
+    fields_of_force = world.live[world.type[world.live] == world.catalog.unit("ForceField").row]
+    for slot in fields_of_force.tolist():
+        x, y = world.pos[slot].tolist()
+        if (x - item.at[0]) ** 2 + (y - item.at[1]) ** 2 <= (item.radius + float(world.radius[slot])) ** 2:
+            world.life[slot] = 0.0
+
+
+SKILLS: Final = {
+    "ravager_corrosive_bile": Skill(
+        _bile, estimates=("how long the bile falls after its two seconds in the air: 8 loops",)
+    ),
+}
+FIELDS: Final = {"corrosive_bile": _falls}

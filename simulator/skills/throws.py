@@ -1,0 +1,48 @@
+"""Throws: what a spell sends on its way and what happens where it arrives.
+
+A throw is a field that does nothing until it is due. The catalog says which spells have a missile and not how fast it
+is; the speeds stand with the abilities (``missile_speed_n``, per normal second) and are estimates.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
+from simulator.fields import Field
+from simulator.skills.skill import distance, gap, number, place_of
+
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+SPEED_UNKNOWN = "how fast the missile flies"
+
+
+def flight_loops(world: World, cast: Cast) -> int:
+    """Loops from the throw until it arrives: at the point, or at the edge of the target where it stands now."""
+    step = number(cast, "missile_speed_n") / LOOPS_PER_NORMAL_SECOND
+    if cast.target == NOBODY:
+        return math.ceil(distance(world, cast.slot, place_of(world, cast)) / step)
+    return math.ceil((gap(world, cast.slot, cast.target) + float(world.radius[cast.slot])) / step)
+
+
+def throw(world: World, cast: Cast, does: str, *, radius: float = 0.0, delay_loops: float = 0.0) -> Field:
+    """Send something to where a cast is aimed; the field's rule ``does`` runs once, when it arrives."""
+    due = world.loop + flight_loops(world, cast) + delay_loops
+    item = Field(
+        does=does,
+        owner=int(world.owner[cast.slot]),
+        points=[place_of(world, cast)],
+        radius=radius,
+        begun=world.loop,
+        end=due,
+        due=due,
+        ability=cast.ability.id,
+        source=world.tag_of(cast.slot),
+        target=world.tag_of(cast.target),
+    )
+    world.fields.append(item)
+    return item

@@ -1,0 +1,203 @@
+"""The Viper's skills: Blinding Cloud, Abduct, Parasitic Bomb, Consume."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from simulator import buffs, commands
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from simulator.columns import NOBODY
+from simulator.fields import Field, source_slot
+from simulator.refusal import Refusal
+from simulator.skills import teleport
+from simulator.skills.skill import Skill, around, foes, number, place_of
+from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
+from simulator.systems.damage import wound
+from simulator.systems.placement import free_places
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from simulator.casts import Cast
+    from simulator.world import World
+
+CLOUD_EFFECT = 10
+PARASITIC_BOMB = 2542
+PULLED = "Yoink"
+BOMB, AFTER_BOMB, INFECTED, BOMB_UNIT = (
+    "ParasiticBomb", "ParasiticBombSecondaryUnitSearch", "ParasiticBombSecondaryBuff", "ParasiticBombDummy",
+)  # fmt: skip
+DELAY = "ParasiticBombInitialDelay"
+DRAINED = "ViperConsumeStructure"
+
+
+# Blinding Cloud -------------------------------------------------------------------------------------------------------
+
+
+def _cloud(world: World, cast: Cast) -> None:
+    """Lay a cloud in which nobody on the ground shoots farther than an arm's length, and structures detect nothing."""
+    world.fields.append(
+        Field(
+            does="blinding_cloud",
+            owner=int(world.owner[cast.slot]),
+            points=[place_of(world, cast)],
+            radius=number(cast, "radius"),
+            begun=world.loop,
+            end=world.loop + number(cast, "duration_loops"),
+            effect=CLOUD_EFFECT,
+            due=world.loop,
+            period=number(cast, "period_loops"),
+            ability=cast.ability.id,
+            source=world.tag_of(cast.slot),
+        )
+    )
+
+
+def _blinds(world: World, item: Field) -> None:
+    source = source_slot(world, item)
+    for slot in around(world, item.at, item.radius, plane="ground"):
+        if world.owner[slot]:
+            name = "BlindingCloudStructure" if world.unit_type(slot).structure else "BlindingCloud"
+            buffs.apply(world, slot, name, source=source, owner=item.owner)
+
+
+# Abduct ---------------------------------------------------------------------------------------------------------------
+
+
+def _reach_out(world: World, cast: Cast) -> None:
+    """Pull a unit to the Viper."""
+    throw(world, cast, "abduct")
+
+
+def _can_pull(world: World, cast: Cast) -> Refusal:
+    held = buffs.frenzied(world, cast.target) or buffs.has(world, cast.target, PULLED)
+    return Refusal.CANT_TARGET_THAT_UNIT if held else Refusal.SUCCESS
+
+
+def _caught(world: World, item: Field) -> None:
+    """The tentacle has its victim: that drops everything, comes out of the ground and is on its way."""
+    viper, slot = source_slot(world, item), world.slot_of(item.target)
+    if NOBODY in (viper, slot):
+        return
+    unit = world.unit_type(slot)
+    standing = world.catalog.row_of_id.get(unit.unit_alias)
+    if standing is not None and (unit.burrowed or unit.speed_n <= 0.0):
+        world.become(slot, world.catalog.units[standing])
+    world.queue[slot] = []
+    commands.begin(world, slot, None)
+    x, y = world.pos[viper].tolist()
+    (place,) = free_places(world, world.unit_type(slot), (x, y), 1)
+    ability = world.catalog.ability(item.ability)
+    loops = number(ability, "max_disable_loops")
+    buffs.apply(world, slot, PULLED, source=viper, owner=item.owner, loops=loops)
+    step = number(ability, "pull_speed_n") / LOOPS_PER_NORMAL_SECOND
+    world.fields.append(
+        Field("pull", item.owner, [place], step, world.loop, world.loop + loops, due=world.loop + 1,
+              ability=item.ability, target=item.target)
+    )  # fmt: skip
+
+
+def _pulls(world: World, item: Field) -> None:
+    """Bring the victim one step nearer; its ``radius`` is the step."""
+    slot = world.slot_of(item.target)
+    if slot == NOBODY or not buffs.has(world, slot, PULLED):
+        item.end = world.loop
+        return
+    x, y = world.pos[slot].tolist()
+    away = math.hypot(item.at[0] - x, item.at[1] - y)
+    teleport.to(world, slot, teleport.within(world, slot, item.at, item.radius))
+    if away <= item.radius:
+        buffs.remove(world, slot, PULLED)
+        item.end = world.loop
+
+
+# Parasitic Bomb -------------------------------------------------------------------------------------------------------
+
+
+def _bomb(world: World, cast: Cast) -> None:
+    """Throw a parasite at a flyer, which harms enemy flyers around it, and goes on where it dies."""
+    throw(world, cast, "parasitic_bomb")
+
+
+def _infects(world: World, item: Field) -> None:
+    slot = world.slot_of(item.target)
+    if slot != NOBODY and not buffs.has(world, slot, BOMB):
+        lasts = world.catalog.buff(BOMB).loops + world.catalog.buff(DELAY).loops
+        buffs.apply(world, slot, BOMB, source=source_slot(world, item), owner=item.owner, loops=lasts)
+
+
+def _spreads(world: World, slot: int, row: np.void) -> None:
+    """Infect the owner's enemies in the air around the host, or around the place where it died."""
+    delay = world.catalog.buff(DELAY).loops if world.catalog.buffs[int(row["buff"])].name == BOMB else 0.0
+    if world.loop - int(row["begun"]) <= delay:
+        return
+    x, y = world.pos[slot].tolist()
+    radius, owner = number(world.catalog.ability(PARASITIC_BOMB), "radius"), int(row["owner"])
+    for other in foes(world, around(world, (x, y), radius, plane="air", structures=False), owner):
+        buffs.apply(world, other, INFECTED, source=int(row["source"]), owner=owner)
+
+
+def _harms(world: World, slot: int, row: np.void) -> None:
+    damage = number(world.catalog.ability(PARASITIC_BOMB), "damage_per_tick")
+    wound(world, int(row["source"]), int(row["owner"]), slot, damage)
+
+
+def _lingers(world: World, slot: int, row: np.void) -> None:
+    """The host is dead: what is left of the time goes on at the place."""
+    left = float(row["end"]) - world.loop
+    if left <= 0.0:
+        return
+    x, y = world.pos[slot].tolist()
+    cloud = world.spawn(world.catalog.unit(BOMB_UNIT), int(row["owner"]), (x, y))
+    buffs.apply(world, cloud, AFTER_BOMB, source=int(row["source"]), owner=int(row["owner"]), loops=left)
+    teleport.live_until(world, cloud, world.loop + left + 1)
+
+
+# Consume --------------------------------------------------------------------------------------------------------------
+
+
+def _consume(world: World, cast: Cast) -> None:
+    """Drain a structure of its own side's life for energy."""
+    buffs.apply(world, cast.target, DRAINED, source=cast.slot)
+
+
+def _can_consume(world: World, cast: Cast) -> Refusal:
+    full = world.energy[cast.slot] >= world.energy_max[cast.slot]
+    unfit = world.unit_type(cast.target).name == "CreepTumorBurrowed"
+    return Refusal.CANT_TARGET_THAT_UNIT if full or unfit else Refusal.SUCCESS
+
+
+def _drains(world: World, cast: Cast) -> bool:
+    slot, target = cast.slot, cast.target
+    if world.order_target[slot] != target or world.energy[slot] >= world.energy_max[slot]:
+        return False
+    ticks, rest = divmod(world.loop - cast.begun - flight_loops(world, cast), int(number(cast, "period_loops")))
+    if ticks < 1 or rest:
+        return True
+    world.life[target] += number(cast, "life_per_tick")
+    world.attacker[target] = NOBODY
+    gained = float(world.energy[slot]) + number(cast, "energy_per_tick")
+    world.energy[slot] = min(gained, float(world.energy_max[slot]))
+    return ticks < number(cast, "ticks")
+
+
+def _ends_draining(world: World, cast: Cast) -> None:
+    at = world.buffs.find(cast.target, world.catalog.buff(DRAINED).row)
+    if at >= 0 and int(world.buffs.rows[at]["source"]) in (cast.slot, NOBODY):
+        buffs.remove(world, cast.target, DRAINED)
+
+
+SKILLS: Final = {
+    "blinding_cloud": Skill(_cloud),
+    "yoink": Skill(
+        _reach_out, refuse=_can_pull, estimates=(SPEED_UNKNOWN, "how fast the victim is pulled: 20 per normal second")
+    ),
+    "parasitic_bomb": Skill(_bomb, estimates=(SPEED_UNKNOWN, "that its time begins after the delay of one second")),
+    "viper_consume_structure": Skill(
+        _consume, refuse=_can_consume, hold=_drains, end=_ends_draining, estimates=(SPEED_UNKNOWN,)
+    ),
+}
+FIELDS: Final = {"blinding_cloud": _blinds, "abduct": _caught, "pull": _pulls, "parasitic_bomb": _infects}
+TICKS: Final = {BOMB: _spreads, AFTER_BOMB: _spreads, INFECTED: _harms}
+FINALS: Final = {BOMB: _lingers}

@@ -1,0 +1,71 @@
+"""The Zerg's tables, joined from the modules of their groups."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from simulator.skills import (
+    banelings,
+    broods,
+    corruptors,
+    crawlers,
+    growth,
+    infestors,
+    larvae,
+    lurkers,
+    overlords,
+    queens,
+    ravagers,
+    swarmhosts,
+    vipers,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+    from simulator.world import World
+
+SKILLS: Final[dict[str, Skill]] = {
+    **banelings.SKILLS,
+    **corruptors.SKILLS,
+    **crawlers.SKILLS,
+    **growth.SKILLS,
+    **infestors.SKILLS,
+    **larvae.SKILLS,
+    **lurkers.SKILLS,
+    **overlords.SKILLS,
+    **queens.SKILLS,
+    **ravagers.SKILLS,
+    **swarmhosts.SKILLS,
+    **vipers.SKILLS,
+}
+FIELDS: Final[dict[str, FieldRule]] = {
+    **broods.FIELDS,
+    **infestors.FIELDS,
+    **larvae.FIELDS,
+    **ravagers.FIELDS,
+    **swarmhosts.FIELDS,
+    **vipers.FIELDS,
+}
+TICKS: Final[dict[str, BuffRule]] = {
+    **infestors.TICKS,
+    **queens.TICKS,
+    **vipers.TICKS,
+}
+ENDS: Final[dict[str, BuffRule]] = {
+    **infestors.ENDS,
+    **larvae.ENDS,
+}
+FINALS: Final[dict[str, BuffRule]] = {
+    **vipers.FINALS,
+}
+PASSIVES: Final[dict[str, UnitRule]] = {
+    **larvae.PASSIVES,
+    **overlords.PASSIVES,
+    **queens.PASSIVES,
+}
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
+    **banelings.DEATHS,
+    **broods.DEATHS,
+}
