@@ -12,6 +12,7 @@ import math
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,13 +57,26 @@ class Surface:
         ]
         self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
         self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
-        self._fields: dict[int, tuple[Ints, Floats]] = {}
+        self._fields: dict[int, _Field] = {}
+        # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
+        self._steps: list[int] = self._free_steps(blocked).tolist()
+        self._edges = _edges(self.width)
 
     def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
         """(cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
         padded = np.pad(self.free, 1)
         shifted = padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width]
         return ~shifted.ravel()
+
+    def _free_steps(self, blocked: dict[tuple[int, int], Bools]) -> NDArray[np.uint8]:
+        """(cells,) the bits of ``_steps``."""
+        steps = np.zeros(self.flat.size, dtype=np.uint8)
+        for bit, (dx, dy) in enumerate(NEIGHBOURS):
+            free = self.flat & ~blocked[dx, dy]
+            if dx and dy:
+                free &= ~blocked[dx, 0] & ~blocked[0, dy]
+            steps |= free.astype(np.uint8) << bit
+        return steps
 
     # cells --------------------------------------------------------------------------------------------------------
 
@@ -154,11 +168,16 @@ class Surface:
             return 0.0
         if self.clear(start[None], goal[None])[0]:
             return math.dist(start, goal)
-        return float(self._field(b)[1][a])
+        return self._field(b, [a]).distance[a]
+
+    def next_cells(self, cells: Ints, goal: int) -> Ints:
+        """(k,) the next cell on the way from each of ``cells`` to a goal cell of the same connected part."""
+        result: Ints = self._field(goal, cells.tolist()).towards_array().take(cells)
+        return result
 
     def _follow(self, cells: Ints, goal: int) -> Ints:
         """(k, len(LOOK_AHEAD)) the cells that lie so many steps on the way from each of ``cells``."""
-        towards = self._field(goal)[0]
+        towards = self._field(goal, cells.tolist()).towards_array()
         steps, at = [], 0
         for wanted in LOOK_AHEAD:
             while at < wanted:
@@ -167,50 +186,24 @@ class Surface:
             steps.append(cells)
         return np.stack(steps, axis=1)
 
-    def _field(self, goal: int) -> tuple[Ints, Floats]:
-        """For every cell the next cell towards ``goal`` (itself where there is no way) and the distance."""
+    def _field(self, goal: int, cells: list[int]) -> _Field:
+        """The ways to ``goal``, as far as they are needed from ``cells``."""
         found = self._fields.get(goal)
         if found is None:
             if len(self._fields) >= FIELDS_KEPT:
                 self._fields.clear()
-            found = self._fields[goal] = self._dijkstra(goal)
+            found = self._fields[goal] = _Field(goal, self.flat.size)
+        found.reach(cells, self._steps, self._edges)
         return found
-
-    def _dijkstra(self, goal: int) -> tuple[Ints, Floats]:
-        distance = [math.inf] * self.flat.size
-        towards = list(range(self.flat.size))
-        distance[goal] = 0.0
-        heap = [(0.0, goal)]
-        while heap:
-            reached, cell = heapq.heappop(heap)
-            if reached > distance[cell]:
-                continue
-            for neighbour, cost in self._edges[cell]:
-                further = reached + cost
-                if further < distance[neighbour]:
-                    distance[neighbour] = further
-                    towards[neighbour] = cell
-                    heapq.heappush(heap, (further, neighbour))
-        return np.array(towards), np.array(distance)
-
-    @cached_property
-    def _edges(self) -> dict[int, list[tuple[int, float]]]:
-        """Every free cell's neighbours with their distance; diagonals need both sides free."""
-        return {cell: self._neighbours(cell) for cell in np.flatnonzero(self.flat).tolist()}
 
     @cached_property
     def part(self) -> Ints:
-        """(cells,) number of the connected part each cell belongs to, -1 where it is blocked."""
-        part: Ints = np.full(self.flat.size, -1)
-        number = 0
-        for cell in self._edges:
-            if part[cell] < 0:
-                part[cell], stack = number, [cell]
-                while stack:
-                    unlabelled = [n for n, _ in self._edges[stack.pop()] if part[n] < 0]
-                    part[unlabelled] = number
-                    stack += unlabelled
-                number += 1
+        """(cells,) number of the connected part each cell belongs to, -1 where it is blocked.
+
+        A diagonal step needs both sides free, so that what is connected is connected by the four straight ones.
+        """
+        _, labels = cv2.connectedComponents(self.free.astype(np.uint8), connectivity=4)
+        part: Ints = labels.ravel().astype(np.int64) - 1
         return part
 
     @cached_property
@@ -218,15 +211,55 @@ class Surface:
         """The cells of each connected part, ascending."""
         return [np.flatnonzero(self.part == number) for number in range(int(self.part.max()) + 1)]
 
-    def _neighbours(self, cell: int) -> list[tuple[int, float]]:
-        y, x = divmod(cell, self.width)
-        found = []
-        for dx, dy in NEIGHBOURS:
-            nx, ny = x + dx, y + dy
-            inside = 0 <= nx < self.width and 0 <= ny < self.height
-            if inside and self.free[ny, nx] and self.free[y, nx] and self.free[ny, x]:
-                found.append((ny * self.width + nx, math.sqrt(dx * dx + dy * dy)))
-        return found
+
+class _Field:
+    """The shortest ways to one goal, found outwards from it only as far as somebody has asked (Dijkstra).
+
+    ``towards`` holds for every settled cell the next one on its way, ``distance`` how far it is; what is not settled
+    yet, or has no way, leads to itself.
+    """
+
+    def __init__(self, goal: int, cells: int) -> None:
+        self.distance = [math.inf] * cells
+        self.distance[goal] = 0.0
+        self.towards = list(range(cells))
+        self._settled = bytearray(cells)
+        self._heap = [(0.0, goal)]
+        self._array: Ints | None = None
+
+    def towards_array(self) -> Ints:
+        """(cells,) ``towards`` as an array; cells that are not settled have no meaning in it."""
+        if self._array is None:
+            self._array = np.array(self.towards)
+        return self._array
+
+    def reach(self, cells: list[int], steps: list[int], edges: list[list[tuple[int, float]]]) -> None:
+        """Go on until all of ``cells`` are settled or nothing is left to settle."""
+        settled, heap = self._settled, self._heap
+        wanted = {cell for cell in cells if not settled[cell]}
+        if not wanted or not heap:
+            return
+        distance, towards = self.distance, self.towards
+        while heap and wanted:
+            reached, cell = heapq.heappop(heap)
+            if settled[cell]:
+                continue
+            settled[cell] = 1
+            wanted.discard(cell)
+            for offset, cost in edges[steps[cell]]:
+                neighbour, further = cell + offset, reached + cost
+                if further < distance[neighbour]:
+                    distance[neighbour] = further
+                    towards[neighbour] = cell
+                    heapq.heappush(heap, (further, neighbour))
+        self._array = None
+
+
+@lru_cache(maxsize=64)
+def _edges(width: int) -> list[list[tuple[int, float]]]:
+    """For every set of free steps (8 bits): the offset of each in a flat grid of that width, and its length."""
+    moves = [(dy * width + dx, math.sqrt(dx * dx + dy * dy)) for dx, dy in NEIGHBOURS]
+    return [[move for bit, move in enumerate(moves) if mask >> bit & 1] for mask in range(256)]
 
 
 @lru_cache(maxsize=64)

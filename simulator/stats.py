@@ -45,6 +45,7 @@ READ: Final = {
     },
     "weapon": {"MinScanRange", "Range", "RateMultiplier"},
     "effect": {"Amount"},
+    "behavior": {"Modification.MoveSpeedMultiplier", "Modification.AccelerationMultiplier"},
 }  # fmt: skip
 """The fields whose changes by upgrades have an effect here; attribute bonuses of effects as well."""
 

@@ -131,10 +131,13 @@ def _plain(world: World, slot: int) -> None:
 def _change(world: World, slot: int, buff: Buff) -> None:
     """Apply the numbers of one buff."""
     second = LOOPS_PER_NORMAL_SECOND
-    world.step_max[slot] = (world.step_max[slot] + buff.speed_add_n / second) * buff.speed * buff.time
+    owner, changed = int(world.owner[slot]), world.stats.changed
+    speed = changed(owner, "behavior", buff.name, "Modification.MoveSpeedMultiplier", buff.speed)
+    gain = changed(owner, "behavior", buff.name, "Modification.AccelerationMultiplier", buff.acceleration)
+    world.step_max[slot] = (world.step_max[slot] + buff.speed_add_n / second) * speed * buff.time
     if buff.speed_max_n is not None:
         world.step_max[slot] = min(float(world.step_max[slot]), buff.speed_max_n / second)
-    world.step_gain[slot] = world.step_gain[slot] * buff.acceleration + buff.acceleration_add_n / second**2
+    world.step_gain[slot] = world.step_gain[slot] * gain + buff.acceleration_add_n / second**2
     world.step_loss[slot] += buff.deceleration_add_n / second**2
     world.attack_rate[slot] *= buff.attack_rate * buff.time
     world.work_rate[slot] *= buff.work_rate * buff.time

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator.maps import load_map
-from simulator.pathing import Ground, Surface
+from simulator.pathing import NEIGHBOURS, Ground, Surface
 from simulator.traits import Layer
 
 ROOM = """
@@ -102,3 +102,50 @@ def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
         return
     assert there == pytest.approx(back, abs=1.5)  # ways count from cell to cell
     assert there >= math.dist(a, b) - 1.5
+
+
+def shortest(grid: np.ndarray[tuple[int, int], np.dtype[np.bool_]], goal: int) -> list[float]:
+    """How far every cell is from a goal, by relaxing all steps until nothing changes."""
+    height, width = grid.shape
+    far = [math.inf] * grid.size
+    far[goal], changed = 0.0, True
+    while changed:
+        changed = False
+        for y, x in np.argwhere(grid).tolist():
+            for dx, dy in NEIGHBOURS:
+                px, py = x + dx, y + dy
+                if 0 <= px < width and 0 <= py < height and grid[py, px] and grid[py, x] and grid[y, px]:
+                    over = far[py * width + px] + math.hypot(dx, dy)
+                    if over < far[y * width + x] - 1e-9:
+                        far[y * width + x], changed = over, True
+    return far
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), width=st.integers(2, 9), height=st.integers(2, 9))
+def test_ways_that_are_found_bit_by_bit_are_the_shortest_ones(seed: int, width: int, height: int) -> None:
+    rng = np.random.default_rng(seed)
+    grid = rng.random((height, width)) > 0.3
+    found = Surface(grid)
+    cells = rng.permutation(np.flatnonzero(grid))
+    if not len(cells):
+        return
+    goal = int(cells[0])
+    far = shortest(grid, goal)
+    for cell in cells.tolist():
+        assert (found.part[cell] == found.part[goal]) == math.isfinite(far[cell])
+        if not math.isfinite(far[cell]):
+            continue
+        steps = 0
+        at_cell, walked = cell, 0.0
+        while at_cell != goal and steps <= grid.size:
+            ahead = int(found.next_cells(np.array([at_cell]), goal)[0])
+            walked += float(np.hypot(*(found.centre(np.array(ahead)) - found.centre(np.array(at_cell)))))
+            at_cell, steps = ahead, steps + 1
+        assert walked == pytest.approx(far[cell])
+
+
+def test_parts_are_numbered_from_the_lower_left_row_by_row() -> None:
+    islands = surface("..#..\n#####\n..#..\n#.#.#")
+    assert [int(islands.part[islands.cell(at(x, y))]) for x, y in ((1, 0), (3, 0), (0, 3), (4, 3))] == [0, 1, 2, 3]
+    assert int(surface("###\n###").part.max()) == -1

@@ -333,6 +333,31 @@ def test_an_alignment_lasts_20_seconds_cools_down_for_60_and_can_be_given_up(fie
     assert not has(field, ray, "VoidRaySwarmDamageBoost")
 
 
+def test_a_faster_void_ray_is_slowed_more_by_its_alignment(make_field: Any) -> None:
+    field = make_field(version="5.0.13")
+    ray = put(field, "VoidRay", 1, 8.0, 8.0)
+    field.research(1, "VoidRaySpeedUpgrade")
+    assert field.world.step_max[ray] * 16 == pytest.approx(3.3203)
+    field.order(ray, ALIGN)
+    assert field.world.step_max[ray] * 16 == pytest.approx(3.3203 * 0.621)
+    assert field.world.step_gain[ray] * 256 == pytest.approx(2.6875 * 0.7441)
+
+
+def test_a_tempest_with_its_upgrade_deals_40_more_to_structures(make_field: Any) -> None:
+    taken = []
+    for upgrades in ((), ("TempestGroundAttackUpgrade",)):
+        field = make_field(version="5.0.13")
+        field.research(1, *upgrades)
+        tempest, target = put(field, "Tempest", 1, 8.0, 8.0), still(field, "Hatchery", 2, 18.5, 8.5)
+        commands.attack_unit(field.world, [tempest], field.world.tag_of(target))
+        before = float(field.world.life[target])
+        for _ in field.loops(80):
+            if field.world.life[target] < before - 5.0:
+                break
+        taken.append(before - float(field.world.life[target]))
+    assert taken[1] - taken[0] == pytest.approx(40.0, abs=1.0)
+
+
 def test_a_phoenix_with_its_upgrade_reaches_two_farther(field: Any) -> None:
     phoenix = put(field, "Phoenix", 1, 8.0, 8.0)
     row = int(field.world.air_weapon[phoenix])
