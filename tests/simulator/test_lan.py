@@ -290,9 +290,9 @@ async def test_both_processes_have_the_same_world(port: int) -> None:
     strides = {players[0]: 3, players[1]: 5}
 
     async def play(player: Process) -> None:
-        tags = await player.own_tags()
         while player.loop < 480:
-            await player.act(command(23, tags, point=(4.0 + player.loop % 24, 16)))
+            if tags := await player.own_tags():
+                await player.act(command(23, tags, point=(4.0 + player.loop % 24, 16)))
             await player.step(strides[player])
 
     await asyncio.gather(*map(play, players))

@@ -57,7 +57,7 @@ SLOW = [
     "easy_scripted_test.TestEasy.test_defeat_roaches_raw",
 ]
 NOT_YET = {
-    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "builds on pixels where the shipped Flat64 has minerals",
+    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "builds where our Flat64 has minerals",
     "observer_test.TestObserver.test_observer": "needs a built-in AI that finishes games",
 }
 WITHOUT_A_GAME = {"dummy_observation_test"}
