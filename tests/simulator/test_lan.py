@@ -290,14 +290,14 @@ async def test_both_processes_have_the_same_world(port: int) -> None:
     strides = {players[0]: 3, players[1]: 5}
 
     async def play(player: Process) -> None:
-        while player.loop < 480:
+        while player.loop < 240:
             if tags := await player.own_tags():
                 await player.act(command(23, tags, point=(4.0 + player.loop % 24, 16)))
             await player.step(strides[player])
 
     await asyncio.gather(*map(play, players))
-    await asyncio.gather(*(player.step(500 - player.loop) for player in players))
-    assert players[0].loop == players[1].loop == 500
+    await asyncio.gather(*(player.step(250 - player.loop) for player in players))
+    assert players[0].loop == players[1].loop == 250
     assert players[0].digest == players[1].digest
     assert (await players[0].observe()).observation.score.score_details.total_damage_dealt.life > 0
 
