@@ -1,6 +1,6 @@
 """PySC2's own game tests, unmodified, on an install of the simulator.
 
-All of them are listed: those that pass, in the order of the time they take, and those that do not yet, with the reason.
+All of them are listed, in the order of the time they take.
 """
 
 import pkgutil
@@ -42,6 +42,10 @@ PASSED = [
     "obs_spec_test.TestObservationSpec.test_heterogeneous_observations",
     "host_remote_agent_test.TestHostRemoteAgent.testVsAgent",
     "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_passthrough_and_features",
+    "obs_test.ObsTest.test_active",
+    "obs_test.ObsTest.test_disable_fog",
+    "obs_test.ObsTest.test_hide_cloaked",
+    "obs_test.ObsTest.test_show_cloaked",
 ]
 SLOW = [
     "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_features_and_rgb",
@@ -55,11 +59,9 @@ SLOW = [
     "easy_scripted_test.TestEasy.test_collect_mineral_shards_feature_units",
     "easy_scripted_test.TestEasy.test_defeat_roaches",
     "easy_scripted_test.TestEasy.test_defeat_roaches_raw",
+    "replay_obs_test.ReplayObsTest.test_replay_observations_match",
+    "observer_test.TestObserver.test_observer",
 ]
-NOT_YET = {
-    "replay_obs_test.ReplayObsTest.test_replay_observations_match": "builds where our Flat64 has minerals",
-    "observer_test.TestObserver.test_observer": "needs a built-in AI that finishes games",
-}
 WITHOUT_A_GAME = {"dummy_observation_test"}
 
 
@@ -75,7 +77,7 @@ def _all_tests() -> Iterator[str]:
 
 @pytest.mark.filterwarnings("ignore")  # of PySC2 and what it imports
 def test_every_game_test_of_pysc2_is_listed_once() -> None:
-    assert sorted([*PASSED, *SLOW, *NOT_YET]) == sorted(_all_tests())
+    assert sorted([*PASSED, *SLOW]) == sorted(_all_tests())
 
 
 @pytest.mark.parametrize("name", [*PASSED, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
