@@ -42,10 +42,6 @@ PASSED = [
     "obs_spec_test.TestObservationSpec.test_heterogeneous_observations",
     "host_remote_agent_test.TestHostRemoteAgent.testVsAgent",
     "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_passthrough_and_features",
-    "obs_test.ObsTest.test_active",
-    "obs_test.ObsTest.test_disable_fog",
-    "obs_test.ObsTest.test_hide_cloaked",
-    "obs_test.ObsTest.test_show_cloaked",
 ]
 SLOW = [
     "multi_player_env_test.TestMultiplayerEnv.test_multi_player_env_features_and_rgb",
