@@ -36,6 +36,14 @@ class NobodyCameError(Exception):
     """The other processes of the game did not show up."""
 
 
+class Refused(Exception):
+    """A guest cannot be taken; `answer` tells it why."""
+
+    def __init__(self, answer: bytes) -> None:
+        super().__init__(answer)
+        self.answer = answer
+
+
 class Link(asyncio.Protocol):
     """Messages to and from another process; None is heard when it is gone.
 
@@ -139,13 +147,14 @@ async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]
 class Door:
     """Where the host takes in guests, until everybody is there.
 
-    `admit` is given what a guest said and returns its member number, or raises with the `answer` to send it away with;
-    `release` is given the number of a guest that went away again.
+    `admit` is given what a guest said and returns its member number, or raises `Refused`; `release` is given the number
+    of a guest that went away again.
     """
 
     def __init__(self, admit: Callable[[bytes], int], release: Callable[[int], None]) -> None:
         self.guests: dict[int, Link] = {}
         self._admit, self._release = admit, release
+        self._strangers: set[Link] = set()  # who has not said yet what they want
         self._changed = asyncio.Event()
 
     async def wait(self, port: int, patience_s: float, full: Callable[[], bool]) -> None:
@@ -169,6 +178,8 @@ class Door:
             raise
         finally:
             server.close()
+            for link in self._strangers:
+                link.close()
 
     def send_away(self) -> None:
         """Hangs up on all guests."""
@@ -179,9 +190,11 @@ class Door:
     def _open(self) -> Link:
         link = Link()
         link.listen(lambda message: self._hear(link, message))
+        self._strangers.add(link)
         return link
 
     def _hear(self, link: Link, message: bytes | None) -> None:
+        self._strangers.discard(link)
         number = next((number for number, guest in self.guests.items() if guest is link), None)
         if number is not None:  # gone, or it does not know its manners
             del self.guests[number]
@@ -194,14 +207,6 @@ class Door:
                 link.send(refused.answer)
                 link.close()
         self._changed.set()
-
-
-class Refused(Exception):
-    """A guest cannot be taken; `answer` tells it why."""
-
-    def __init__(self, answer: bytes) -> None:
-        super().__init__(answer)
-        self.answer = answer
 
 
 class Peers:

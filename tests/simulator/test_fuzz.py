@@ -2,6 +2,8 @@
 
 import asyncio
 import socket
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -96,11 +98,25 @@ def tame(kind: str, body: Any) -> None:
             assume(pixels.x * pixels.y < 2**16 or pixels.x > 2**20 or pixels.y > 2**20)
 
 
-@pytest.mark.parametrize("state", [s for s in Status if s is not Status.quit])
+def observe() -> Client:
+    """Somebody who observes a game of computers."""
+    client = Client()
+    players = [sc.PlayerSetup(type=kind) for kind in (sc.Computer, sc.Computer, sc.Observer)]
+    game_map = sc.LocalMap(map_path="llm_smac/2s3z")
+    client.ask(create_game=sc.RequestCreateGame(local_map=game_map, player_setup=players))
+    options = interface(screen=32, minimap=32)
+    client.ask(join_game=sc.RequestJoinGame(observed_player_id=0, options=options))
+    return client
+
+
+STARTS = {state.name: partial(prepare, state) for state in Status if state is not Status.quit} | {"observer": observe}
+
+
+@pytest.mark.parametrize("start", STARTS.values(), ids=STARTS)
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(data=st.data())
-def test_no_request_breaks_a_session(state: Status, data: st.DataObject) -> None:
-    client = prepare(state)
+def test_no_request_breaks_a_session(start: Callable[[], Client], data: st.DataObject) -> None:
+    client = start()
     for _ in range(6):
         kind = data.draw(st.sampled_from([k for k in KINDS if k != "quit"]))
         body = data.draw(REQUESTS[kind])
@@ -138,8 +154,7 @@ async def begin_over_lan() -> list[Session]:
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(data=st.data())
 def test_no_request_breaks_a_game_over_lan(data: st.DataObject) -> None:
-    async def play() -> None:
-        sessions = await begin_over_lan()
+    async def play(sessions: list[Session]) -> None:
         for _ in range(8):
             kind = data.draw(st.sampled_from([k for k in KINDS if k not in {"quit", "step"}]))
             body = data.draw(REQUESTS[kind])
@@ -150,8 +165,14 @@ def test_no_request_breaks_a_game_over_lan(data: st.DataObject) -> None:
         if all(playing is not None and playing.peers is not None for playing in worlds):
             first, second = (playing.game.world for playing in worlds if playing is not None)
             assert first.loop != second.loop or first.digest() == second.digest()
-        for session in sessions:
-            await answer(session, "quit", sc.RequestQuit())
-        await asyncio.sleep(0.01)  # a link is closed when the event loop has said so to both ends
 
-    asyncio.run(play())
+    async def play_and_leave() -> None:
+        sessions = await begin_over_lan()
+        try:
+            await play(sessions)
+        finally:  # a draw may end the example
+            for session in sessions:
+                session._process.play(None)
+            await asyncio.sleep(0.01)  # a link is closed when the event loop has said so to both ends
+
+    asyncio.run(play_and_leave())

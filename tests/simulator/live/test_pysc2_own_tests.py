@@ -56,7 +56,6 @@ SLOW = [
     "easy_scripted_test.TestEasy.test_defeat_roaches",
     "easy_scripted_test.TestEasy.test_defeat_roaches_raw",
     "replay_obs_test.ReplayObsTest.test_replay_observations_match",
-    "observer_test.TestObserver.test_observer",
 ]
 WITHOUT_A_GAME = {"dummy_observation_test"}
 
