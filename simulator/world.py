@@ -219,8 +219,11 @@ class World(UnitColumns):
         self._look_after(slot)
 
     def become(self, slot: int, unit: UnitType) -> None:
-        """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept."""
+        """Make a unit one of another type: same tag and place, life in proportion, orders, fights and what it was
+        set to use by itself are kept.
+        """
         owner = int(self.owner[slot])
+        known = {ability.id for ability in self.catalog.cards[int(self.type[slot])]}
         before = float(self.life_max[slot]) or 1.0
         had_energy = self.energy_max[slot] > 0.0
         self.type[slot] = unit.row
@@ -232,8 +235,12 @@ class World(UnitColumns):
         self.shields[slot] = min(float(self.shields[slot]), float(self.stats.shields_max[owner, unit.row]))
         energy = float(self.energy[slot] if had_energy else self.stats.energy_start[owner, unit.row])
         self.energy[slot] = min(energy, float(self.stats.energy_max[owner, unit.row]))
-        wanted = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
-        self.autocast.pop(slot, None)
+        chosen = self.autocast.pop(slot, ())
+        wanted = tuple(
+            ability.id
+            for ability in self.catalog.cards[unit.row]
+            if ability.id in chosen or (ability.autocast == "on" and ability.id not in known)
+        )
         if wanted:
             self.autocast[slot] = wanted
         self.nav_loop[slot] = 0

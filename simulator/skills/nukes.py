@@ -46,6 +46,9 @@ def _call(world: World, cast: Cast) -> None:
         memory={"down": down},
     )
     world.fields.append(strike)
+    for player in world.players[1:]:
+        if player.id != owner:
+            world.alert(player.id, "NuclearLaunchDetected")
 
 
 def _paint(world: World, cast: Cast) -> bool:

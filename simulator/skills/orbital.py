@@ -13,6 +13,8 @@ from simulator.skills.skill import Skill, number, place_of
 from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
 
     from simulator.casts import Cast
@@ -88,6 +90,12 @@ def _land_mule(world: World, item: Field) -> None:
         commands.smart(world, [mule], target=item.target)
 
 
+def _expire(world: World, slot: int) -> None:
+    """Tell the owner of a MULE whose time is over."""
+    if world.expires[slot] <= world.loop:
+        world.alert(int(world.owner[slot]), "MULEExpired")
+
+
 # extra supplies -------------------------------------------------------------------------------------------------------
 
 DEPOTS: Final = frozenset({"SupplyDepot", "SupplyDepotLowered"})
@@ -122,5 +130,6 @@ SKILLS: Final = {
     ),
     "supply_drop": Skill(_drop_supplies, refuse=_is_plain_depot),
 }
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = {"MULE": _expire}
 FIELDS: Final[dict[str, FieldRule]] = {"calldown_mule": _land_mule}
 ENDS: Final[dict[str, BuffRule]] = {ON_ITS_WAY: _arrive}

@@ -24,7 +24,10 @@ from simulator.skills import (
 from simulator.systems.damage import IMPACTS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
+    from simulator.world import World
 
 SKILLS: Final[dict[str, Skill]] = {
     **buildings.SKILLS,
@@ -54,6 +57,7 @@ FIELDS: Final[dict[str, FieldRule]] = {
 TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts.TICKS}
 ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}
 PASSIVES: Final[dict[str, UnitRule]] = {**buildings.PASSIVES, **mines.PASSIVES}
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = orbital.DEATHS
 SMARTS: Final[tuple[SmartRule, ...]] = repair.SMARTS
 
 IMPACTS.update(infantry.IMPACTS)

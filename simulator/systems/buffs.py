@@ -30,13 +30,14 @@ def run_out(world: World) -> None:
 
 
 def _tick(world: World) -> None:
+    """Run the rules of buffs whose period has come; one that another rule takes off meanwhile does nothing more."""
     due = which(world.buffs.rows["due"] <= world.loop)
-    for index in due.tolist():
-        row = world.buffs.rows[index]
-        kind = world.catalog.buffs[int(row["buff"])]
-        row["due"] += kind.period_loops
+    for row in world.buffs.rows[due]:
+        slot, kind = int(row["slot"]), world.catalog.buffs[int(row["buff"])]
+        index = world.buffs.find(slot, kind.row)
+        if index < 0:
+            continue
+        world.buffs.rows[index]["due"] += kind.period_loops
         rule = TICKS.get(kind.name)
         if rule is not None:
-            rule(world, int(row["slot"]), row.copy())
-        if index >= len(world.buffs.rows):
-            return  # a rule took buffs away; what is due is due in the next loop as well
+            rule(world, slot, world.buffs.rows[index].copy())

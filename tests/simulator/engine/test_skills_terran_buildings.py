@@ -97,6 +97,7 @@ def test_a_mule_comes_down_after_its_delay_and_lives_its_time(field: Any) -> Non
     gone = until(field, lambda: not world.alive[mule], 1500)
     lasts = ability.numbers["duration_loops"]
     assert lasts <= gone - landed <= lasts + ability.numbers["duration_random_loops"] + 1
+    assert [(a.player, a.name) for a in world.alerts] == [(1, "MULEExpired")]
 
 
 def test_a_mule_is_called_onto_minerals_that_it_mines(field: Any) -> None:

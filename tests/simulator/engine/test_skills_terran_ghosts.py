@@ -260,6 +260,13 @@ def test_a_nuke_comes_down_after_its_time_in_rings_of_damage(field: Any) -> None
     assert world.life[friend] == pytest.approx(400 - numbers["damage"])
 
 
+def test_the_enemy_is_warned_of_a_strike(field: Any) -> None:
+    ghost = armed(field)
+    field.order(ghost, NUKE, point=(17, 16))
+    field.play(2)
+    assert [(a.player, a.name) for a in field.world.alerts] == [(2, "NuclearLaunchDetected")]
+
+
 def test_structures_take_more_of_a_nuke(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(NUKE).numbers
     ghost, hall = armed(field), still(field, "CommandCenter", 2, 18.5, 16.5)

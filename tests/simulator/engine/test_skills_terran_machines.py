@@ -170,6 +170,16 @@ def test_a_burrowed_mine_is_hidden_and_fires_by_itself_after_taking_aim(field: A
     assert 500 - world.life[victim] == pytest.approx(ability.numbers["damage"])
 
 
+def test_a_mine_keeps_what_it_was_set_to_do_when_it_burrows(field: Any) -> None:
+    world = field.world
+    slot = field.put("WidowMine", 1, 10, 10)
+    assert world.autocast[slot] == (MINE_ATTACK,)
+    del world.autocast[slot]
+    field.order(slot, BURROW)
+    until(field, lambda: world.unit_type(slot).name == "WidowMineBurrowed")
+    assert slot not in world.autocast
+
+
 def test_a_mine_takes_more_from_shields(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(MINE_ATTACK).numbers
     mine(field)
