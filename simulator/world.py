@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
+    from simulator.census import Census
     from simulator.contacts import Bodies
     from simulator.fields import Field
     from simulator.maps import GameMap
@@ -145,6 +146,7 @@ class World(UnitColumns):
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
         self.settled = -1  # the population among which no body touched another when all last stood still
         self.bodies: Bodies | None = None  # of this population
+        self.census: Census | None = None  # of this population
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.harvesting = False  # whether anybody harvests
         self.mortal = False  # whether anybody's life is timed
@@ -413,6 +415,7 @@ class World(UnitColumns):
         self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.bodies = None
+        self.census = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
         self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
@@ -429,6 +432,7 @@ class World(UnitColumns):
         )
         self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
         self.bodies = None
+        self.census = None
         self.looked_at = -1
         self.scan_now = True
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator.arrays import some, which
+from simulator.census import census
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
@@ -154,12 +155,9 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
     wanted = gap <= sight
-    least = world.least_range.take(seekers)
-    if some(least > 0.0):
-        wanted &= gap >= least[:, None]
-    sparing = world.spares_structures.take(seekers)
-    if some(sparing):
-        wanted &= ~(sparing[:, None] & world.walled.take(foes))
+    if census(world).picky:
+        wanted &= (gap >= world.least_range[seekers, None]) | (world.least_range[seekers, None] <= 0.0)
+        wanted &= ~(world.spares_structures[seekers, None] & world.walled.take(foes))
     if world.fields and some(world.zone_radius.take(seekers) > 0.0):
         k, m = wanted.shape
         wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)

@@ -13,6 +13,7 @@ import numpy as np
 from simulator import casting, geometry
 from simulator.arrays import some, which
 from simulator.casts import Cast
+from simulator.census import census
 from simulator.columns import NOBODY
 from simulator.harvesting import Phase, reach_of
 from simulator.mechanics import MECHANICS
@@ -54,7 +55,8 @@ def measure(world: World) -> None:
     if some(wants):
         free = world.windup[:n] < 0.0
         free &= world.backswing[:n] <= 0.0
-        free |= world.rolling[:n]
+        if census(world).rolling_guns:
+            free |= world.rolling[:n]
         wants &= free
         wants &= world.step_max[:n] > 0.0
 
@@ -74,7 +76,9 @@ def _close_in(world: World, slots: Ints) -> None:
     gap = np.where(on_target, 0.0, distance) - bodies
     reach = world.reach.take(slots)
     swinging = world.windup.take(slots) >= 0.0
-    swinging |= world.beaming.take(slots)
+    kinds = census(world)
+    if kinds.beams:
+        swinging |= world.beaming.take(slots)
     allowed = reach + EDGE_TOLERANCE
     beyond = gap > allowed
     near = ~beyond
@@ -84,16 +88,17 @@ def _close_in(world: World, slots: Ints) -> None:
     near &= world.can_attack.take(slots)
     if world.fields:
         near &= inside_zone(world, slots, target)
-    world.beaming[slots] &= near
+    if kinds.beams:
+        world.beaming[slots] &= near
     world.gap[slots] = gap
     world.in_reach[slots] = near
-    beyond &= ~near | world.rolling.take(slots)
+    beyond &= ~near | world.rolling.take(slots) if kinds.rolling_guns else ~near
     beyond &= ~world.holds.take(slots)
-    passing = world.walks.take(slots) & ~world.looks_around.take(slots)
-    if some(passing):  # a unit that fires while it walks stays on its way
-        rest = which(~passing)
-        slots, goal, bodies = slots[rest], goal[rest], bodies[rest]
-        reach, beyond = reach[rest], beyond[rest]
+    if kinds.guns_walking:
+        rest = which(~world.walks.take(slots) | world.looks_around.take(slots))
+        if len(rest) < len(slots):  # who fires while it walks stays on its way
+            slots, goal, bodies = slots[rest], goal[rest], bodies[rest]
+            reach, beyond = reach[rest], beyond[rest]
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
     world.wants[slots] = beyond

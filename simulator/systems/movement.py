@@ -14,12 +14,14 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.census import census
 
 if TYPE_CHECKING:
     from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
     from simulator.world import World
 
+NOBODY_COASTS: Ints = np.zeros(0, dtype=np.int64)
 TURNING_CIRCLES = 4.0  # a flyer this many steps from its goal no longer swings around
 
 
@@ -29,10 +31,12 @@ def move(world: World) -> None:
     wants = world.wants[:n]
     coasting = _coasting(world)
     if some(wants) or coasting.size:
-        drift = _drift(world, coasting)
+        drift = _drift(world, coasting) if coasting.size else None
         world.speed[:n] *= wants
         world.intended[:n] = 0.0
-        _coast(world, coasting, drift)
+        if drift is not None:
+            world.intended[coasting] = drift
+            world.speed[coasting] = geometry.length(drift)
         walkers = which(wants)
         if walkers.size:
             _walk(world, walkers)
@@ -65,6 +69,8 @@ def _face_targets(world: World) -> None:
 
 def _coasting(world: World) -> Ints:
     """Flyers that have speed left and nowhere to go."""
+    if not census(world).gliders:
+        return NOBODY_COASTS
     n = world.top
     left = (world.speed[:n] > 0.0) & ~world.wants[:n]
     if some(left):
@@ -79,12 +85,6 @@ def _drift(world: World, slots: Ints) -> Floats:
     speed = np.maximum(world.speed.take(slots) - world.step_loss.take(slots), 0.0)
     drift: Floats = last * (speed / np.maximum(geometry.length(last), 1e-12))[:, None]
     return drift
-
-
-def _coast(world: World, slots: Ints, drift: Floats) -> None:
-    if slots.size:
-        world.intended[slots] = drift
-        world.speed[slots] = geometry.length(drift)
 
 
 # walkers --------------------------------------------------------------------------------------------------------------
@@ -116,6 +116,8 @@ def _walk(world: World, walkers: Ints) -> None:
 
 def _braked(world: World, walkers: Ints, speed: Floats, left: Floats, straight: Bools) -> Floats:
     """Speeds from which each walker can still stop at its goal; one with another order behind it does not."""
+    if not census(world).brakers:
+        return speed
     loss = world.step_loss.take(walkers)
     braking = np.isfinite(loss) & straight
     if not some(braking):

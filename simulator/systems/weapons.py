@@ -14,6 +14,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.census import census
 from simulator.columns import NOBODY
 from simulator.stats import GROUND_PLANE
 
@@ -43,9 +44,8 @@ def fire(world: World) -> None:
         _drop_lost(world, which(started & ~world.in_reach[:n]))
     fighters = world.fighters
     if fighters.size:
-        turreted = fighters[world.turreted.take(fighters)]
-        if turreted.size:
-            _turn_turrets(world, turreted)
+        if census(world).turrets:
+            _turn_turrets(world, fighters[world.turreted.take(fighters)])
         ready = world.in_reach.take(fighters)
         ready &= cooldown.take(fighters) <= 0.0
         ready &= ~started.take(fighters)
@@ -68,6 +68,8 @@ def _drop_lost(world: World, lost: Ints) -> None:
 
 def _turn_turrets(world: World, slots: Ints) -> None:
     """Turn the turrets of units that fight towards their targets."""
+    if not slots.size:
+        return
     world.turret[slots] = geometry.turn_towards(
         world.turret.take(slots, 0),
         world.toward.take(slots, 0),

@@ -1,0 +1,50 @@
+"""The census: which kinds of units live in a world now, so that laws can pass over what is not there.
+
+Taken anew when somebody is born, dies or changes; nothing here decides anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from simulator.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Census:
+    """Whether anybody living has what each field says."""
+
+    turrets: bool
+    beams: bool
+    rolling_guns: bool  # weapons that fire while the body goes where it wants
+    guns_walking: bool  # and at what the unit passes
+    gliders: bool  # flyers that need time to stop
+    brakers: bool  # anybody who does
+    picky: bool  # units that can't aim at what is near, or do not aim at structures
+
+    @classmethod
+    def of(cls, world: World) -> Census:
+        """Look at all living units."""
+        slots = world.live
+        units = [world.catalog.units[row] for row in sorted(set(world.type[slots].tolist()))]
+        weapons = [weapon for unit in units for weapon in unit.weapons]
+        return cls(
+            turrets=any(w.turret_deg_n is not None for w in weapons),
+            beams=any(w.is_beam for w in weapons),
+            rolling_guns=any(w.moves == "moving" for w in weapons),
+            guns_walking=bool(world.guns_walking[slots].any()),
+            gliders=bool(world.glides[slots].any()),
+            brakers=bool(np.isfinite(world.step_loss[slots]).any()),
+            picky=bool(world.spares_structures[slots].any() or (world.least_range[slots] > 0.0).any()),
+        )
+
+
+def census(world: World) -> Census:
+    """The census of a world, taken now if something has changed."""
+    if world.census is None:
+        world.census = Census.of(world)
+    return world.census
