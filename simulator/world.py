@@ -221,8 +221,9 @@ class World(UnitColumns):
         self._look_after(slot)
 
     def become(self, slot: int, unit: UnitType) -> None:
-        """Make a unit one of another type: same tag and place, life in proportion, orders, fights and what it was
-        set to use by itself are kept.
+        """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept.
+
+        What it was set to use by itself, or not to, stays so where its new type has it.
         """
         owner = int(self.owner[slot])
         known = {ability.id for ability in self.catalog.cards[int(self.type[slot])]}

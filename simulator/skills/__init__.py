@@ -128,4 +128,5 @@ DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
     **transports.DEATHS,
     **carrier.DEATHS,
     **zerg.DEATHS,
+    **terran.DEATHS,
 }
