@@ -33,10 +33,12 @@ def used(world: World, player: int) -> float:
 
 
 def begun(world: World, player: int) -> float:
-    """What is used by units that structures and eggs are making."""
-    if not world.jobs:
+    """What units use that structures and eggs are making, and what units use more that are growing into larger ones."""
+    if not (world.jobs or world.channelling):
         return 0.0
-    return sum(job.supply for jobs in world.jobs.values() for job in jobs if job.begun and job.owner == player)
+    jobs = sum(job.supply for jobs in world.jobs.values() for job in jobs if job.begun and job.owner == player)
+    growing = (c.ability for c in world.channelling.values() if c.ability.supply and world.owner[c.slot] == player)
+    return jobs + sum(ability.supply for ability in growing)
 
 
 def cap(world: World, player: int) -> float:
