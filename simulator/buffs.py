@@ -74,6 +74,7 @@ class Buff:
     shield_armor_add: float = 0.0
     sight_add: float = 0.0
     detect: float = 0.0
+    lights: float = 0.0  # radius around its bearer in which who laid it on sees the ground
     radar: float = 0.0
     supply: float = 0.0
     life_regen_n: float = 0.0

@@ -20,6 +20,7 @@ from simulator.traits import Layer
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from simulator.catalog import Catalog
     from simulator.world import World
 
 SEEN_BEFORE = 1
@@ -85,12 +86,11 @@ def _light(world: World, player: int) -> None:
     np.minimum(grid, SEEN_BEFORE, out=grid)
     height, width = grid.shape
     cliff = world.map.terrain.cliff
-    for item in world.fields:
-        if item.sights and item.owner == player:
-            cells = _disc(item.sights) + np.array(item.at).astype(np.int64)
-            x, y = cells[:, 0], cells[:, 1]
-            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-            grid[y[inside], x[inside]] = VISIBLE
+    for point, radius in _lights(world, player):
+        cells = _disc(radius) + np.array(point).astype(np.int64)
+        x, y = cells[:, 0], cells[:, 1]
+        inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        grid[y[inside], x[inside]] = VISIBLE
     for slot in world.units_of(player).tolist():
         cells = _disc(float(world.sight[slot])) + world.pos[slot].astype(np.int64)
         x, y = cells[:, 0], cells[:, 1]
@@ -102,6 +102,22 @@ def _light(world: World, player: int) -> None:
             low = cliff[y, x] < level
             x, y = x[low], y[low]
         grid[y, x] = VISIBLE
+
+
+def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]]:
+    """Places that a player sees without a unit there, with the radius: by his fields, and by his buffs on others."""
+    lights = [(item.at, item.sights) for item in world.fields if item.sights and item.owner == player]
+    rows = world.buffs.rows
+    for row in rows[np.isin(rows["buff"], _lighting(world.catalog)) & (rows["owner"] == player)] if len(rows) else ():
+        x, y = world.pos[int(row["slot"])].tolist()
+        lights.append(((x, y), world.catalog.buffs[int(row["buff"])].lights))
+    return lights
+
+
+@lru_cache(maxsize=4)
+def _lighting(catalog: Catalog) -> NDArray[np.int64]:
+    """Rows of the kinds of buffs that light the ground around their bearers."""
+    return np.array([kind.row for kind in catalog.buffs if kind.lights], dtype=np.int64)
 
 
 @lru_cache(maxsize=64)

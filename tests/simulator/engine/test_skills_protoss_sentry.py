@@ -225,6 +225,22 @@ def test_an_image_dies_when_its_time_is_over_and_nobody_s_score_knows(field: Any
     assert field.world.players[1].score.lost_units == 0
 
 
+def test_nobody_scores_by_killing_an_image(field: Any) -> None:
+    slot = sentry(field, 4.0, 4.0)
+    field.order(slot, 164)  # two Zealots
+    field.play(1)
+    image = next(s for s in field.world.live.tolist() if s != slot)
+    field.world.life[image] = field.world.shields[image] = 1.0
+    marine = field.put("Marine", 2, 5.0, 9.0)
+    commands.attack_unit(field.world, [marine], field.world.tag_of(image))
+    for _ in field.loops(60):
+        if not field.world.alive[image]:
+            break
+    assert not field.world.alive[image]
+    won, lost = field.world.players[2].score, field.world.players[1].score
+    assert (won.killed_units, won.killed_value_units, lost.lost_units) == (0, 0.0, 0)
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_an_image_takes_double_without_armor_and_deals_none(make_field: Any, version: str) -> None:
     field = make_field(version=version)

@@ -229,6 +229,20 @@ def test_a_revelation_shows_enemies_around_a_point_cloaked_ones_too(
     assert not field.world.visible[1, hidden]
 
 
+def test_who_revealed_a_unit_sees_the_ground_within_3_of_it_wherever_it_goes(make_field: Any) -> None:
+    field = make_field(fog=True)
+    oracle, marine = put(field, "Oracle", 1, 4.0, 8.0), still(field, "Marine", 2, 14.0, 8.0)
+    field.order(oracle, REVEAL, point=(14.0, 8.0))
+    field.play(2)
+    field.world.pos[oracle] = (2.0, 30.0)
+    field.world.pos[marine] = (26.5, 8.5)
+    field.play(5)
+    seen = field.world.visibility[1] == 2
+    assert seen[8, 26]
+    assert seen[8, 28]
+    assert not seen[8, 22]
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_stasis_trap_forms_in_80_loops_then_hides_and_lasts_238_seconds(make_field: Any, version: str) -> None:
     field = make_field(version=version)
