@@ -16,7 +16,7 @@ One module per group of units. Each offers some of these tables, and here they a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from simulator.skills import (
     addons,
@@ -46,19 +46,22 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 
-def _joined(*tables: dict[str, UnitRule]) -> dict[str, UnitRule]:
+T = TypeVar("T")
+
+
+def _joined(*tables: dict[str, Callable[[World, T], None]]) -> dict[str, Callable[[World, T], None]]:
     """The rules of several tables; a type that more than one of them names obeys all its rules in turn."""
-    rules: dict[str, list[UnitRule]] = {}
+    rules: dict[str, list[Callable[[World, T], None]]] = {}
     for table in tables:
         for name, rule in table.items():
             rules.setdefault(name, []).append(rule)
     return {name: found[0] if len(found) == 1 else _in_turn(found) for name, found in rules.items()}
 
 
-def _in_turn(rules: list[UnitRule]) -> UnitRule:
-    def all_of_them(world: World, slots: list[int]) -> None:
+def _in_turn(rules: list[Callable[[World, T], None]]) -> Callable[[World, T], None]:
+    def all_of_them(world: World, bearers: T) -> None:
         for rule in rules:
-            rule(world, slots)
+            rule(world, bearers)
 
     return all_of_them
 
@@ -124,9 +127,6 @@ SMARTS: Final[tuple[SmartRule, ...]] = (
     *production.SMARTS,
     *terran.SMARTS,
 )
-DEATHS: Final[dict[str, Callable[[World, int], None]]] = {
-    **transports.DEATHS,
-    **carrier.DEATHS,
-    **zerg.DEATHS,
-    **terran.DEATHS,
-}
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = _joined(
+    transports.DEATHS, carrier.DEATHS, zerg.DEATHS, terran.DEATHS
+)

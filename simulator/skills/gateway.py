@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from simulator.skills.skill import UnitRule
     from simulator.world import World
 
+CHARGE = 1819
 CHARGING = "Charging"
 SHIFTING = "AdeptPhaseShiftCaster"
 SHADE = "AdeptPhaseShift"
@@ -109,9 +110,6 @@ def _impact(world: World, slot: int) -> None:
     damage = number(world.catalog.ability(CHARGE), "damage")
     factor = float(world.dealt_factor[slot])
     wound(world, slot, int(world.owner[slot]), int(world.target[slot]), damage * factor)
-
-
-CHARGE = 1819
 
 
 # Phase Shift ----------------------------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ SHIELD_EFFECT = 2
 SHIELD_BUFF = "GuardianShield"
 SCRAMBLED = "RavenScramblerMissile"
 PUSHED_OUT_RADIUS = 4.0
-SHATTER_GAP = 1.0  # range of the force field's own ability "Shatter"
+FORCE_FIELD = 1526
 MASSIVE: Final = 1 << ATTRIBUTES.index("massive")
 
 
@@ -103,13 +103,13 @@ def _push_out(world: World, field: int) -> None:
 
 def _shatter_near_massive(world: World, slots: list[int]) -> None:
     """Break every force field that a massive ground unit comes near."""
-    reach = SHATTER_GAP + float(world.radius[slots[0]])
     live = world.live
     massive = live[
         (world.stats.attribute_bits[world.type[live]] & MASSIVE != 0) & (world.plane_bits[live] & GROUND_PLANE != 0)
     ]
     if not massive.size:
         return
+    reach = number(world.catalog.ability(FORCE_FIELD), "break_range") + float(world.radius[slots[0]])
     for slot in slots:
         offset = world.pos[massive] - world.pos[slot]
         near = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= (world.radius[massive] + reach) ** 2

@@ -11,7 +11,10 @@ Above: ``casting`` and ``systems.passives``. Below: ``teleport`` for where someb
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from simulator import buffs, commands
 from simulator.arrays import which
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from simulator.skills.skill import SmartRule, UnitRule
     from simulator.world import World
 
+FOLLOW = int(OrderKind.FOLLOW)
 BOARDING_GAP = 1.1  # a follower stops within this of whom it follows
 UNLOAD_REACH = 4.0  # MaxUnloadRange of the Nydus network; the others have none of their own
 UNLOADING = "unloading"
@@ -209,14 +213,15 @@ def _unload_unit(world: World, cast: Cast) -> None:
 
 def _carry(world: World, slots: list[int]) -> None:
     """Take in who stands beside the carrier and wants in, and let out who is due."""
-    following = world.order_kind[: world.top] == OrderKind.FOLLOW
-    boarders = which(following).tolist() if following.any() else []
-    for carrier in slots:
-        for slot in boarders:
-            if world.order_target[slot] == carrier and _boards(world, slot, carrier):
+    following = world.order_kind[: world.top] == FOLLOW
+    if np.count_nonzero(following):
+        for slot in which(following).tolist():
+            carrier = int(world.order_target[slot])
+            if carrier in slots and _boards(world, slot, carrier):
                 _let_in(world, slot, carrier)
-        due = world.timers.get(carrier, {}).get(UNLOADING)
-        if due is not None and due <= world.loop:
+    for carrier in slots:
+        timers = world.timers.get(carrier)
+        if timers and timers.get(UNLOADING, math.inf) <= world.loop:
             _let_out(world, carrier)
 
 
