@@ -12,6 +12,7 @@ import numpy as np
 
 from simulator import power
 from simulator.columns import NOBODY
+from simulator.orders import OrderKind
 from simulator.players import NEUTRAL
 from simulator.refusal import Refusal
 
@@ -135,6 +136,22 @@ def _of_power(world: World, player: int, unit: UnitType, point: Point) -> Refusa
     if unit.needs_power and power.best(world, player, point) is None:
         return Refusal.CANT_BUILD_TOO_FAR_FROM_POWER
     return None
+
+
+def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
+    """What a player's units are under way to build, and where, in the order of slots."""
+    found: list[tuple[UnitType, Point]] = []
+    for slot in world.units_of(player).tolist():
+        if not world.casts[slot] and not world.queue[slot]:
+            continue
+        for order in world.orders_of(slot):
+            ability = world.catalog.ability_of_id.get(order.ability)
+            unit = product(world, ability) if ability is not None and ability.does == "build" else None
+            victim = world.slot_of(order.target)
+            if unit is not None and order.kind is OrderKind.CAST and (order.point is not None or victim != NOBODY):
+                x, y = order.point or world.pos[victim].tolist()
+                found.append((unit, centre(world, unit, (x, y))))
+    return found
 
 
 # geysers --------------------------------------------------------------------------------------------------------------

@@ -58,7 +58,7 @@ class Units:
         for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
             unit = raw.units.add()
             _write_known(unit, *known)
-            if unit.display_type == raw_pb2.Snapshot:
+            if unit.display_type in {raw_pb2.Snapshot, raw_pb2.Placeholder}:
                 continue
             _write_vitals(unit, *vital)
             _write_side(unit, *side)

@@ -110,8 +110,14 @@ class Seat:
 
     def look(self, *, through_fog: bool = False) -> Sight:
         """What the player perceives now."""
-        show_cloaked, through = self.options.show_cloaked, through_fog or self.sees_all
-        return look(self.world, self.types, self.player, show_cloaked=show_cloaked, through_fog=through)
+        return look(
+            self.world,
+            self.types,
+            self.player,
+            show_cloaked=self.options.show_cloaked,
+            show_placeholders=self.options.show_placeholders,
+            through_fog=through_fog or self.sees_all,
+        )
 
     def on_screen(self, sight: Sight) -> NDArray[np.bool_]:
         """[n] whether each unit's centre is in the camera's view."""

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simulator import geometry
+from simulator import geometry, sites
 from simulator.orders import OrderKind
+from simulator.snapshots import INDEX_SHIFT, Snapshot
 from simulator.systems.vision import detected
 from simulator.world import NOBODY
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from simulator.api.types import Types
-    from simulator.snapshots import Snapshot
     from simulator.world import World
 
     Bools = NDArray[np.bool_]
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 API_NEUTRAL = 16
 EMPTY_SLOT = 0
+PLACEHOLDER_TAG = 3 << 32
 OBSERVER = 0  # the player id of a seat that owns nothing and sees everything
 _VISIBLE_CELL = 2
 
@@ -98,7 +99,15 @@ class Sight:
         return len(self.slot)
 
 
-def look(world: World, types: Types, player: int, *, show_cloaked: bool, through_fog: bool = False) -> Sight:
+def look(
+    world: World,
+    types: Types,
+    player: int,
+    *,
+    show_cloaked: bool,
+    show_placeholders: bool = False,
+    through_fog: bool = False,
+) -> Sight:
     """The units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
     seen = world.is_visible(player)
     owner = world.owner[world.live]
@@ -113,10 +122,24 @@ def look(world: World, types: Types, player: int, *, show_cloaked: bool, through
     fakes = _fakes(world, player, world.live[keep], own[keep])
     sight = _columns(world, types, keep, hidden, own[keep], known, fakes)
     shown = [] if through_fog else world.memories[player].shown
-    return _with_snapshots(sight, world, types, player, shown) if shown else sight
+    if shown:
+        sight = _with_snapshots(sight, world, types, player, shown, Display.SNAPSHOT)
+    if show_placeholders and (plans := _placeholders(world, player)):
+        sight = _with_snapshots(sight, world, types, player, plans, Display.PLACEHOLDER)
+    return sight
 
 
-def _with_snapshots(sight: Sight, world: World, types: Types, player: int, shown: list[Snapshot]) -> Sight:
+def _placeholders(world: World, player: int) -> list[Snapshot]:
+    """What the player's builders are under way to build, as if it stood there; the tags are made up."""
+    return [
+        Snapshot(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
+        for i, (unit, point) in enumerate(sites.planned(world, player))
+    ]
+
+
+def _with_snapshots(
+    sight: Sight, world: World, types: Types, player: int, shown: list[Snapshot], display: Display
+) -> Sight:
     """The sight with a row for each snapshot before the units; its slot is the empty one."""
     row = np.array([s.row for s in shown])
     owner = np.array([s.owner for s in shown])
@@ -129,7 +152,7 @@ def _with_snapshots(sight: Sight, world: World, types: Types, player: int, shown
         "type_id": types.id[row],
         "owner": np.where(owner == 0, API_NEUTRAL, owner),
         "alliance": _alliance(owner, owner == player),
-        "display": np.full(len(shown), Display.SNAPSHOT.value),
+        "display": np.full(len(shown), display.value),
         "cloak": np.full(len(shown), Cloak.UNKNOWN.value),
         "pos": pos,
         "z": world.map.terrain.ground_z(pos) + types.height[row],

@@ -127,6 +127,20 @@ def test_rally_points_are_told(table: Table) -> None:
     assert (rally.point.x, rally.point.y, rally.tag) == (37.0, 30.5, table.world.tag_of(field))
 
 
+@pytest.mark.parametrize("shown", [True, False])
+def test_what_is_going_to_be_built_has_a_placeholder(make_table: Callable[..., Table], shown: bool) -> None:
+    options = interface(screen=32)
+    options.show_placeholders = shown
+    table = make_table(options, "{flat: [64, 64]}")
+    table.world.players[1].minerals = 200.0
+    probe, pylon = table.put("Probe", 1, 16.0, 16.0), table.world.catalog.ability(881)
+    casting.use(table.world, [probe], pylon, point=(22.2, 16.0))
+    casting.use(table.world, [probe], pylon, point=(26.0, 16.0), queue=True)
+    told = [u for u in table.observe().raw_data.units if u.display_type == raw_pb2.Placeholder]
+    assert [(u.unit_type, u.pos.x, u.alliance) for u in told] == [(60, 22.0, 1), (60, 26.0, 1)] * shown
+    assert table.screen("placeholder").any() == shown
+
+
 # the player -----------------------------------------------------------------------------------------------------------
 
 
