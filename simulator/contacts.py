@@ -37,6 +37,7 @@ class Pairs:
 class Bodies:
     """What the pairs of living bodies have in common until somebody is born, dies or changes."""
 
+    rows: Ints  # (k,) those that can meet anybody
     separation: Floats  # (n,) of every living unit
     bits: Ints  # (n,) layers it collides in, 0 for what stands on a footprint: that is a wall, not a body
     flying: Bools  # (n,)
@@ -49,11 +50,12 @@ class Bodies:
         """The bodies of a world's living units."""
         slots = world.live
         bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
+        rows = which(bits != 0)
         separation = world.separation[slots]
         flying = world.layer[slots] == int(Layer.AIR)
         table = _table(separation, bits) if len(slots) <= TABLE_LIMIT else None
-        widest = float(separation[bits != 0].max(initial=0.0))
-        return cls(separation, bits, flying, bool(flying.any()), widest, table)
+        widest = float(separation[rows].max(initial=0.0))
+        return cls(rows, separation, bits, flying, bool(flying.any()), widest, table)
 
     def near(self, at: Floats) -> Pairs | None:
         """The pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch."""
@@ -74,7 +76,8 @@ class Bodies:
 
     def _neighbours(self, at: Floats) -> Pairs | None:
         """As ``near``, without a table."""
-        one, other, squared = within(at, 2.0 * self.widest + SKIN)
+        one, other, squared = within(at.take(self.rows, 0), 2.0 * self.widest + SKIN)
+        one, other = self.rows.take(one), self.rows.take(other)
         apart = self.separation.take(one) + self.separation.take(other)
         meets = (self.bits.take(one) & self.bits.take(other)) != 0
         meets &= squared < (apart + SKIN) ** 2

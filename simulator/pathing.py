@@ -94,8 +94,7 @@ class Surface:
 
     def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
         """The cell of a connected part nearest to ``point``; of nearly equal ones that on the side of ``start``."""
-        members = self._members[part]
-        centres = self.centre(members)
+        members, centres = self._members[part], self._centres[part]
         distance = geometry.length(centres - point)
         if start is not None:
             distance += NEAR_SIDE * geometry.length(centres - start)
@@ -154,12 +153,26 @@ class Surface:
             mine = goal_cell == goal
             steps[mine] = self._follow(here[mine], goal)
         ahead = self.centre(steps)  # (k, len(LOOK_AHEAD), 2)
-        k, m = steps.shape
-        seen = self.clear(np.repeat(start, m, axis=0), ahead.reshape(-1, 2)).reshape(k, m)
-        seen[:, 0] = True
-        farthest = m - 1 - np.argmax(seen[:, ::-1], axis=1)
-        result: Floats = ahead[np.arange(k), farthest]
+        result: Floats = ahead[np.arange(len(steps)), self._farthest(start, ahead)]
         return result
+
+    def _farthest(self, start: Floats, ahead: Floats) -> Ints:
+        """(k,) the last of the places ``ahead`` (k, m, 2) that each can walk to straight; the first one always is.
+
+        Found by halving: who can't get straight to one place is taken not to get to a later one.
+        """
+        k, m = ahead.shape[:2]
+        near = np.zeros(k, dtype=np.int64)
+        far = np.full(k, m - 1)
+        at = far.copy()
+        unsure = np.arange(k)
+        while unsure.size:
+            seen = self.clear(start[unsure], ahead[unsure, at[unsure]])
+            near[unsure[seen]] = at[unsure[seen]]
+            far[unsure[~seen]] = at[unsure[~seen]] - 1
+            at = (near + far + 1) // 2
+            unsure = which(near < far)
+        return near
 
     def distance(self, start: Floats, goal: Floats) -> float:
         """Length of the way between two points, 0 when there is none (the API's convention)."""
@@ -210,6 +223,11 @@ class Surface:
     def _members(self) -> list[Ints]:
         """The cells of each connected part, ascending."""
         return [np.flatnonzero(self.part == number) for number in range(int(self.part.max()) + 1)]
+
+    @cached_property
+    def _centres(self) -> list[Floats]:
+        """The centres of these cells."""
+        return [self.centre(members) for members in self._members]
 
 
 class _Field:
