@@ -66,8 +66,7 @@ def page() -> str:
         _sourced(),
         "## What is not modelled",
         _chapter("Not modelled by the rules yet"),
-        "Refused with a sentence that says so:",
-        "\n".join(f"* {text}" for text in _refusals()),
+        _refused(),
     )
 
 
@@ -163,6 +162,11 @@ def _chapter(title: str) -> str:
     """A chapter of the data's own account of its sources."""
     text = (resources.files("simulator.data") / SOURCES).read_text(encoding="utf-8")
     return prose(text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip())
+
+
+def _refused() -> str:
+    texts = _refusals()
+    return join("Refused with a sentence that says so:", "\n".join(f"* {text}" for text in texts)) if texts else ""
 
 
 def _refusals() -> list[str]:
