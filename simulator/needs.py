@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 ALIAS: Final = "Alias_"
 NATURES: Final[dict[str, Callable[[World, int], bool]]] = {
     "IsTransportOverlord": lambda world, slot: world.unit_type(slot).name == "OverlordTransport",
+    "WidowMineArmed": lambda world, slot: world.unit_type(slot).name == "WidowMineBurrowed",
     "QueenMustBeOnCreep": lambda world, slot: world.on_creep(slot),
 }
 """Behaviours that units have by their type or their place; they are never laid on as buffs."""

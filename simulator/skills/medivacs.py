@@ -8,17 +8,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator.casts import Cast
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.refusal import Refusal
 from simulator.skills.basics import on_self
-from simulator.skills.skill import Skill, gap, number
+from simulator.skills.skill import Skill, gap, nearest_hurt, number
+from simulator.stats import ATTRIBUTES
 
 if TYPE_CHECKING:
-    from simulator.casts import Cast
+    from simulator.abilities import Ability
     from simulator.world import World
 
 DONE: Final = 1e-9
+BIOLOGICAL: Final = 1 << ATTRIBUTES.index("biological")
 
 
 def _can_heal(world: World, cast: Cast) -> Refusal:
@@ -63,6 +66,12 @@ def resume(world: World, slot: int) -> None:
     world.cast_at[slot] = -1.0
 
 
+def _pick(world: World, slot: int, ability: Ability) -> int:
+    """The nearest friend who needs healing and whom nobody heals."""
+    hurt = nearest_hurt(world, slot, ability.autocast_range, BIOLOGICAL)
+    return next((other for other in hurt if _can_heal(world, Cast(slot, ability, other)) is Refusal.SUCCESS), NOBODY)
+
+
 def _begin(world: World, cast: Cast) -> None:
     """Give a friend life for energy, loop by loop, as long as both last and he can be followed."""
     _heal(world, cast)
@@ -73,6 +82,7 @@ SKILLS: Final = {
         _begin,
         refuse=_can_heal,
         hold=_heal,
+        pick=_pick,
         estimates=(
             "healing is given evenly in every loop",
             "a Medivac follows whom it heals at half the range at which it begins",

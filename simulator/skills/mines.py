@@ -22,14 +22,17 @@ if TYPE_CHECKING:
     from simulator.skills.skill import UnitRule
     from simulator.world import World
 
-MINES: Final = frozenset({"WidowMine", "WidowMineBurrowed"})
-ARMED: Final = "WidowMineArmed"
+BURROWED: Final = "WidowMineBurrowed"
+MINES: Final = frozenset({"WidowMine", BURROWED})
+LOOKED_AFTER: Final = 4
 SHOWN: Final = "WidowMineBurrowedCloakingBehavior"
 TIMER: Final = "WidowMineAttack"
 CLAWS: Final = "DrillClaws"
 
 
 def _no_larva(world: World, cast: Cast) -> Refusal:
+    if world.unit_type(cast.slot).name != BURROWED:
+        return Refusal.TECH_REQUIREMENTS_NOT_MET
     larva = cast.target != NOBODY and world.unit_type(cast.target).name == "Larva"
     return Refusal.CANT_TARGET_THAT_UNIT if larva else Refusal.SUCCESS
 
@@ -52,13 +55,14 @@ def _explode(world: World, missile: Field, target: int) -> None:
 
 
 def _keep_watch(world: World, slots: list[int]) -> None:
-    """Arm burrowed mines, and uncover those that reload; drilling claws may keep these hidden."""
+    """Uncover mines that reload, every few loops; drilling claws keep these hidden."""
+    if world.loop % LOOKED_AFTER:
+        return
     for slot in slots:
-        if not buffs.has(world, slot, ARMED):
-            buffs.apply(world, slot, ARMED)
-        reloads = world.timers.get(slot, {}).get(TIMER, 0.0) > world.loop and not _claws_hide(world, slot)
-        if reloads != buffs.has(world, slot, SHOWN):
-            (buffs.apply if reloads else buffs.remove)(world, slot, SHOWN)
+        if slot in world.timers:
+            reloads = world.timers[slot].get(TIMER, 0.0) > world.loop and not _claws_hide(world, slot)
+            if reloads != buffs.has(world, slot, SHOWN):
+                (buffs.apply if reloads else buffs.remove)(world, slot, SHOWN)
 
 
 def _claws_hide(world: World, slot: int) -> bool:
@@ -67,15 +71,15 @@ def _claws_hide(world: World, slot: int) -> bool:
 
 
 def _climb_out(world: World, slots: list[int]) -> None:
-    """Disarm mines that have come out of the ground."""
-    for slot in slots:
-        if len(world.buffs) and buffs.remove(world, slot, ARMED):
+    """Forget that a mine which has come out of the ground was uncovered."""
+    if len(world.buffs) and not world.loop % LOOKED_AFTER:
+        for slot in slots:
             buffs.remove(world, slot, SHOWN)
 
 
 SKILLS: Final = {
     "widow_mine_attack": Skill(_fire, refuse=_no_larva, estimates=("the speed of the Widow Mine's missile",)),
 }
-PASSIVES: Final[dict[str, UnitRule]] = {"WidowMineBurrowed": _keep_watch, "WidowMine": _climb_out}
+PASSIVES: Final[dict[str, UnitRule]] = {BURROWED: _keep_watch, "WidowMine": _climb_out}
 
 flight.ARRIVALS["widow_mine_attack"] = _explode

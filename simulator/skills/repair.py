@@ -13,15 +13,18 @@ from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.medivacs import resume
-from simulator.skills.skill import Skill, distance, number, touching
+from simulator.skills.skill import Skill, distance, nearest_hurt, number, touching
+from simulator.stats import ATTRIBUTES
 
 if TYPE_CHECKING:
+    from simulator.abilities import Ability
     from simulator.casts import Cast, Point
     from simulator.skills.skill import SmartRule
     from simulator.world import World
 
 DONE: Final = 1e-9
 REPAIRS: Final = ("repair", "mule_repair")
+MECHANICAL: Final = 1 << ATTRIBUTES.index("mechanical")
 
 
 def _can_repair(world: World, cast: Cast) -> Refusal:
@@ -85,6 +88,11 @@ def _begin(world: World, cast: Cast) -> None:
     _mend(world, cast)
 
 
+def _pick(world: World, slot: int, ability: Ability) -> int:
+    """The nearest machine or structure of the owner's that needs repair."""
+    return next(iter(nearest_hurt(world, slot, ability.autocast_range, MECHANICAL)), NOBODY)
+
+
 def _repair_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
     """A right click of workers on a damaged machine or structure of their own sends them to repair it."""
     if target == NOBODY or "mechanical" not in world.unit_type(target).attributes:
@@ -107,6 +115,7 @@ SKILLS: Final = {
         _begin,
         refuse=_can_repair,
         hold=_mend,
+        pick=_pick,
         estimates=("repair is given and paid for evenly in every loop; the game's rounding is not known",),
     )
     for name in REPAIRS

@@ -130,6 +130,19 @@ def distance(world: World, slot: int, point: Point) -> float:
     return math.hypot(point[0] - x, point[1] - y)
 
 
+def nearest_hurt(world: World, slot: int, reach: float, attribute: int) -> list[int]:
+    """The owner's other units with an attribute (bit) that lack life, within reach of a unit, the nearest first."""
+    friends = world.units_of(int(world.owner[slot]))
+    fits = (world.life[friends] < world.life_max[friends]) & (friends != slot) & (world.build_progress[friends] >= 1.0)
+    fits &= (world.stats.attribute_bits[world.type[friends]] & attribute) != 0
+    friends = friends[fits]
+    offset = world.pos[friends] - world.pos[slot]
+    away = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[friends] - world.radius[slot]
+    near = away <= reach
+    found: list[int] = friends[near][np.argsort(away[near], kind="stable")].tolist()
+    return found
+
+
 def touching(world: World, slot: int, other: int) -> float:
     """From centre to centre, how far apart two bodies are that can't come nearer to each other."""
     bodies = float(world.radius[slot] + world.radius[other])

@@ -87,8 +87,13 @@ def nearest(world: World, slot: int, ability: Ability) -> int:
 
 
 def _near(world: World, slot: int, ability: Ability) -> list[int]:
-    """The units that autocast looks at, the nearest first."""
+    """The units that autocast looks at, the nearest first: no foes or no friends where the filters leave these out."""
     slots = world.live
+    excluded = (*ability.filters.excluded, *ability.autocast_filters.excluded)
+    if "Player" in excluded:
+        slots = slots[world.owner[slots] != world.owner[slot]]
+    if "Enemy" in excluded:
+        slots = slots[(world.owner[slots] == world.owner[slot]) | (world.owner[slots] == 0)]
     offset = world.pos[slots] - world.pos[slot]
     gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[slots] - world.radius[slot]
     reach = ability.autocast_range or ability.range
