@@ -51,6 +51,13 @@ def engage(world: World, slot: int, target: int) -> bool:
     return True
 
 
+def take_other_weapon(world: World, slot: int) -> None:
+    """Go on with a fight with the weapons of another type, or end it when none fits."""
+    drop_attack(world, slot)
+    if not engage(world, slot, int(world.target[slot])):
+        disengage(world, slot)
+
+
 def measure_reach(world: World, slot: int) -> None:
     """Write the reach of the weapon at hand, with what buffs add to it or take from it."""
     plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])

@@ -28,6 +28,7 @@ from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
 from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.snapshots import Memory
 from simulator.stats import Stats
+from simulator.targets import take_other_weapon
 from simulator.traits import body_traits
 
 if TYPE_CHECKING:
@@ -246,6 +247,8 @@ class World(UnitColumns):
         )
         if wanted:
             self.autocast[slot] = wanted
+        if self.target[slot] != NOBODY:
+            take_other_weapon(self, slot)
         self.nav_loop[slot] = 0
         self._population_changed()
 

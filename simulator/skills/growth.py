@@ -53,22 +53,30 @@ def _can_grow(world: World, cast: Cast) -> Refusal:
     return Refusal.CANT_QUEUE_THAT_ORDER if busy else Refusal.SUCCESS
 
 
+def grows(world: World, slot: int) -> bool:
+    """Whether a unit is in the midst of such a morph."""
+    growing = world.channelling.get(slot)
+    return growing is not None and growing.ability.does == "grow"
+
+
+def call_off(world: World, slot: int) -> None:
+    """Make a growing unit what it was before; three quarters of the price come back."""
+    growing = world.channelling[slot]
+    was = world.catalog.units[growing.was]
+    if world.type[slot] != was.row:
+        _renewed(world, slot, was)
+    prices.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), prices.CANCELLED)
+    commands.begin_next(world, slot)
+
+
 def _call_off_growth(world: World, cast: Cast) -> None:
     """Become what it was before; three quarters of the price come back."""
-    growing = world.channelling.get(cast.slot)
-    if growing is None or growing.ability.does != "grow":
-        return
-    was = world.catalog.units[growing.was]
-    if world.type[cast.slot] != was.row:
-        _renewed(world, cast.slot, was)
-    prices.refund(world, int(world.owner[cast.slot]), prices.cost_of(growing.ability), prices.CANCELLED)
-    commands.begin_next(world, cast.slot)
+    if grows(world, cast.slot):
+        call_off(world, cast.slot)
 
 
 def _grows_now(world: World, cast: Cast) -> Refusal:
-    growing = world.channelling.get(cast.slot)
-    found = growing is not None and growing.ability.does == "grow"
-    return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
+    return Refusal.SUCCESS if grows(world, cast.slot) else Refusal.CANT_FIND_CANCEL_ORDER
 
 
 def _call_off_morph(world: World, cast: Cast) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import production
 from simulator.refusal import Refusal
+from simulator.skills import growth
 from simulator.skills.skill import Skill
 from simulator.world import NO_TAG, NOBODY, Rally
 
@@ -70,11 +71,14 @@ def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
 
 
 def cancel_last(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
-    """Call off the last job of a queue; an egg becomes a larva again."""
+    """Call off the last job of a queue; an egg becomes a larva again, and a cocoon what it was."""
+    growing = [slot for slot in slots if growth.grows(world, slot)]
+    for slot in growing:
+        growth.call_off(world, slot)
     taken = [slot for slot in slots if production.call_off(world, slot)]
     for slot in taken:
         _hatch_back(world, slot)
-    return taken
+    return growing + taken
 
 
 def cancel_at(world: World, slot: int, index: int) -> bool:
@@ -93,7 +97,8 @@ def _hatch_back(world: World, slot: int) -> None:
 
 def has_job(world: World, slot: int, _: Ability) -> Refusal:
     """Whether there is anything to call off."""
-    return Refusal.SUCCESS if slot in world.jobs else Refusal.CANT_FIND_CANCEL_ORDER
+    found = slot in world.jobs or growth.grows(world, slot)
+    return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
 
 
 # rally points ---------------------------------------------------------------------------------------------------------
