@@ -55,6 +55,8 @@ class Score:
     damage_taken: Vitals = field(default_factory=Vitals)
     healed: Vitals = field(default_factory=Vitals)
     deliveries: list[tuple[int, float, float]] = field(default_factory=list)  # loop, minerals, vespene: the last ones
+    idle_worker_s: float = 0.0  # normal seconds, summed over workers
+    idle_production_s: float = 0.0
     spent: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were charged
     curriculum: float = 0.0  # what the map's script gives
     collected: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were brought home

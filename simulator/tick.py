@@ -22,6 +22,7 @@ from simulator.systems import (
     fields,
     harvest,
     hits,
+    idleness,
     lifetimes,
     missiles,
     movement,
@@ -68,6 +69,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     hits.fall_due,
     fields.run,  # storms, scans and whatever else lies on the ground
     buffs.run_out,
+    idleness.count,
     regeneration.regenerate,
     creep.spread,
     lifetimes.run_out,

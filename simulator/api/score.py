@@ -78,8 +78,8 @@ class Holdings:
         """The score with its details."""
         counted, totals = self.player.score, self.totals
         details = score_pb2.ScoreDetails(
-            idle_production_time=0,
-            idle_worker_time=0,
+            idle_production_time=counted.idle_production_s,
+            idle_worker_time=counted.idle_worker_s,
             total_value_units=totals["value of units"],
             total_value_structures=totals["value of structures"],
             killed_value_units=counted.killed_value_units,

@@ -112,6 +112,8 @@ def _take(world: World, slot: int) -> None:
         harvesting.take_up(world, slot, amount, gas=gas, rich=unit.per_trip > ORDINARY_TRIP)
     world.harvest[slot] = Phase.LEAVING
     world.work_until[slot] = world.loop + MECHANICS.harvest_leaving
+    if amount and world.contents[patch] <= 0:
+        world.alert(int(world.owner[slot]), "VespeneExhausted" if gas else "MineralsExhausted")
     if world.contents[patch] <= 0 and not gas:
         world.deaths.append(Death(world.loop, world.tag_of(patch), unit.id, int(world.owner[patch]), NO_KILLER))
         world.remove(patch)

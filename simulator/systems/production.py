@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import casting, commands, production, supply
+from simulator import buffs, casting, commands, production, supply
 from simulator.columns import NOBODY
 from simulator.skills import carrier
 from simulator.systems import placement
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from simulator.world import Rally, World
 
 DOORSTEP: Final = 0.25  # from a structure's edge to the body of the unit that comes out
+CONTAMINATED: Final = "Contaminated"
 SOUTH: Final = (0.0, -1.0)
 STOWED: Final = frozenset({"Nuke"})
 
@@ -35,7 +36,8 @@ def run(world: World) -> None:
 
 
 def _works(world: World, slot: int) -> bool:
-    return bool(world.can_act[slot] and world.powered[slot])
+    able = bool(world.can_act[slot] and world.powered[slot])
+    return able and not buffs.has(world, slot, CONTAMINATED)
 
 
 def _advance(world: World, slot: int) -> None:

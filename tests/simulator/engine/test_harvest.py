@@ -128,6 +128,7 @@ def test_an_empty_field_vanishes_and_its_worker_finds_another(base: Base) -> Non
     base.first(lambda: base.minerals >= 7.0)
     assert base.world.slot_of(tag) < 0
     assert base.world.deaths[-1].tag == tag
+    assert [alert.name for alert in base.world.alerts] == ["MineralsExhausted"]
     base.first(lambda: base.minerals >= 12.0)
     assert base.world.patch[base.worker] == other
 

@@ -219,6 +219,26 @@ def test_a_gateway_becomes_a_warp_gate_by_itself(rich: Field) -> None:
     assert rich.world.unit_type(gateway).name == "WarpGate"
 
 
+def test_a_contaminated_structure_makes_nothing(rich: Field) -> None:
+    nexus = rich.put("Nexus", 1, 16.0, 16.0)
+    order(rich, [nexus], TRAIN["Probe"])
+    rich.play(10)
+    apply(rich.world, nexus, "Contaminated")
+    rich.play(100)
+    assert rich.world.jobs[nexus][0].done == 10
+
+
+def test_idle_workers_and_structures_are_counted(rich: Field) -> None:
+    nexus = rich.put("Nexus", 1, 16.0, 16.0)
+    rich.put("Probe", 1, 8.0, 8.0)
+    rich.play(160)
+    score = rich.world.players[1].score
+    assert (score.idle_worker_s, score.idle_production_s) == (10.0, 10.0)
+    order(rich, [nexus], TRAIN["Probe"])
+    rich.play(160)
+    assert (score.idle_worker_s, score.idle_production_s) == (20.0, 10.0)
+
+
 def test_the_dead_make_nothing(rich: Field) -> None:
     nexus = rich.put("Nexus", 1, 16.0, 16.0)
     order(rich, [nexus], TRAIN["Probe"])
