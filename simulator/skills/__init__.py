@@ -22,6 +22,7 @@ from simulator.skills import (
     addons,
     basics,
     battery,
+    bunkers,
     carrier,
     construction,
     gateway,
@@ -83,6 +84,7 @@ SKILLS: Final[dict[str, Skill]] = {
     **battery.SKILLS,
     **terran.SKILLS,
     **transports.SKILLS,
+    **bunkers.SKILLS,
     **carrier.SKILLS,
     **zerg.SKILLS,
 }

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting, harvesting, production
+from simulator import buffs, casting, commands, harvesting, production, targets
 from simulator.abilities import Aim
 from simulator.casts import Cast
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
@@ -122,6 +122,18 @@ def _fill(world: World, slot: int) -> None:
     """Put a passenger into a carrier."""
     passenger = world.spawn(world.catalog.unit("SCV"), 1, CENTRE)
     world.stow(passenger, slot)
+
+
+def _man(world: World, slot: int) -> None:
+    """Put soldiers with stimpacks into a Bunker, and an enemy before it."""
+    commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
+    for name in ("Marine", "Marauder"):
+        world.stow(world.spawn(world.catalog.unit(name), 1, CENTRE), slot)
+    x, y = world.pos[slot].tolist()
+    for passenger in world.passengers(slot):
+        world.pos[passenger] = x, y
+        world.refresh(passenger)
+    targets.engage(world, world.passengers(slot)[0], world.spawn(world.catalog.unit("Roach"), 2, (x, y + 4.0)))
 
 
 def _worker(world: World, slot: int) -> None:
@@ -275,6 +287,7 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
     "stop_recharging": _recharge,
     "battery_overcharge": _battery,
     "load_all": _worker,
+    **dict.fromkeys(("redirect_attack", "redirect_stop", "redirect_stim"), _man),
     **dict.fromkeys(("unload_all", "unload_all_at", "unload_unit"), _fill),
 }
 """By a skill's name: what has to be the case before a unit can use it."""

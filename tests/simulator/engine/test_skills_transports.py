@@ -305,3 +305,44 @@ def test_who_sits_in_a_medivac_does_not_shoot(field: Any) -> None:
     before = float(field.world.life[enemy])
     field.play(60)
     assert field.world.life[enemy] >= before
+
+
+# orders that a Bunker hands on ----------------------------------------------------------------------------------------
+
+SHOOT, STIM_MARINES, CEASE = 1682, 1683, 1691
+
+
+def test_a_bunker_s_passengers_shoot_at_whom_it_is_told_to(field: Any) -> None:
+    bunker = put(field, "Bunker", 1, 8.5, 8.5)
+    marines = [put(field, "Marine", 1, 11.0, 7.0 + i) for i in range(2)]
+    right_click(field, marines, bunker)
+    field.play(40)
+    near, far = put(field, "Roach", 2, 13.0, 8.5), put(field, "Roach", 2, 8.5, 14.5)
+    beyond = put(field, "Roach", 2, 30.0, 8.5)
+    field.play(10)
+    assert {int(field.world.target[m]) for m in marines} == {near}
+    assert field.order(bunker, SHOOT, far)
+    assert {int(field.world.target[m]) for m in marines} == {far}
+    field.play(30)
+    assert field.world.life[far] < 145.0
+    assert field.why_not(bunker, SHOOT, beyond) is Refusal.TARGET_IS_OUT_OF_RANGE
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_bunker_s_marines_use_their_stimpacks_when_it_is_told_so(make_field: Any, version: str) -> None:
+    field = make_field(version=version)
+    bunker = put(field, "Bunker", 1, 8.5, 8.5)
+    marine, marauder = fill(field, bunker, "Marine", "Marauder")
+    assert field.why_not(bunker, STIM_MARINES) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    field.research(1, "Stimpack")
+    assert field.order(bunker, STIM_MARINES)
+    assert buffs.has(field.world, marine, "Stimpack")
+    assert not buffs.has(field.world, marauder, "StimpackMarauder")
+    assert field.world.life[marine] == 35.0
+
+
+def test_an_empty_bunker_shoots_at_nobody(field: Any) -> None:
+    bunker = put(field, "Bunker", 1, 8.5, 8.5)
+    roach = put(field, "Roach", 2, 13.0, 8.5)
+    assert field.why_not(bunker, SHOOT, roach) is Refusal.CANT_ATTACK_WEAPONS_DISABLED
+    assert field.why_not(bunker, CEASE) is Refusal.CANT_ATTACK_WEAPONS_DISABLED
