@@ -7,24 +7,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, commands
 from simulator.columns import NOBODY
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
+from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills import flight
 from simulator.skills.skill import Skill, around, number
 from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
-    from simulator.casts import Cast
+    from simulator.casts import Cast, Point
     from simulator.fields import Field
-    from simulator.skills.skill import UnitRule
+    from simulator.skills.skill import SmartRule, UnitRule
     from simulator.world import World
 
 BURROWED: Final = "WidowMineBurrowed"
 MINES: Final = frozenset({"WidowMine", BURROWED})
 LOOKED_AFTER: Final = 4
+MISSILE: Final = 2099  # the ability's id
 SHOWN: Final = "WidowMineBurrowedCloakingBehavior"
 TIMER: Final = "WidowMineAttack"
 CLAWS: Final = "DrillClaws"
@@ -77,6 +79,20 @@ def _climb_out(world: World, slots: list[int]) -> None:
             buffs.remove(world, slot, SHOWN)
 
 
+def _fire_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
+    """A right click of burrowed mines on a foe sends their missiles."""
+    if target == NOBODY or world.unit_type(target).structure:
+        return []
+    taken: list[int] = []
+    for slot in slots:
+        foe = commands.is_enemy(world, int(world.owner[slot]), int(world.owner[target]))
+        if foe and world.unit_type(slot).name == BURROWED:
+            order = Order(OrderKind.CAST, MISSILE, target=world.tag_of(target))
+            taken += commands.give(world, [slot], order, queue=queue)
+    return taken
+
+
+SMARTS: Final[tuple[SmartRule, ...]] = (_fire_by_click,)
 SKILLS: Final = {
     "widow_mine_attack": Skill(_fire, refuse=_no_larva, estimates=("the speed of the Widow Mine's missile",)),
 }

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, sites
+from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
@@ -37,7 +38,9 @@ def _place_turret(world: World, cast: Cast) -> None:
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     turret = world.spawn(unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
     room.make(world, turret)
-    lasts = number(cast, "duration_loops") + world.rng.random() * number(cast, "duration_random_loops")
+    more = world.stats.changed(int(world.owner[turret]), "behavior", "AutoTurretTimedLife", "Duration", 0.0)
+    lasts = number(cast, "duration_loops") + more * LOOPS_PER_NORMAL_SECOND
+    lasts += world.rng.random() * number(cast, "duration_random_loops")
     teleport.live_until(world, turret, world.loop + lasts)
 
 

@@ -58,6 +58,6 @@ TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts
 ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}
 PASSIVES: Final[dict[str, UnitRule]] = {**buildings.PASSIVES, **mines.PASSIVES}
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = orbital.DEATHS
-SMARTS: Final[tuple[SmartRule, ...]] = repair.SMARTS
+SMARTS: Final[tuple[SmartRule, ...]] = (*repair.SMARTS, *mines.SMARTS)
 
 IMPACTS.update(infantry.IMPACTS)

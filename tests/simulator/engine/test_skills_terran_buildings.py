@@ -462,6 +462,19 @@ def test_upgrades_change_the_numbers_of_units(field: Any, upgrade: str, name: st
     assert getattr(world.stats, column)[at] == pytest.approx(before + more)
 
 
+@pytest.mark.parametrize(
+    ("version", "upgrade", "name"),
+    [("4.10", "RavenCorvidReactor", "Raven"), ("5.0.13", "RavenCorvidReactor", "Raven"),
+     ("4.10", "GhostMoebiusReactor", "Ghost")],
+)  # fmt: skip
+def test_reactors_let_casters_start_with_more_energy(make_field: Any, version: str, upgrade: str, name: str) -> None:
+    field = make_field(version=version)
+    start = field.world.catalog.unit(name).energy_start
+    assert field.world.energy[field.put(name, 1, 10, 10)] == start
+    field.research(1, upgrade)
+    assert field.world.energy[field.put(name, 1, 12, 10)] == start + 25
+
+
 def test_infernal_flames_burn_light_units_more(field: Any) -> None:
     world = field.world
     row = next(w.row for w in world.catalog.weapons if w.id == "InfernalFlameThrower")

@@ -180,6 +180,17 @@ def test_a_mine_keeps_what_it_was_set_to_do_when_it_burrows(field: Any) -> None:
     assert slot not in world.autocast
 
 
+def test_a_right_click_of_a_burrowed_mine_on_a_foe_fires(field: Any) -> None:
+    world = field.world
+    slot = mine(field)
+    world.autocast.pop(slot)
+    near, friend = still(field, "Ultralisk", 2, 15, 10), still(field, "Marine", 1, 12, 12)
+    assert casting.smart(world, [slot], target=world.tag_of(friend)) != [slot] or not world.casts[slot]
+    casting.smart(world, [slot], target=world.tag_of(near))
+    assert [o.ability for o in world.orders_of(slot)] == [MINE_ATTACK]
+    until(field, lambda: world.life[near] < 500)
+
+
 def test_a_mine_takes_more_from_shields(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(MINE_ATTACK).numbers
     mine(field)
