@@ -94,6 +94,24 @@ def test_an_archon_shocks_in_rings_of_falling_damage(field: Any) -> None:
     assert lost(field, slots, 145) == pytest.approx([full - 1, full - 1, full / 2 - 1, full / 4 - 1, 0])
 
 
+@pytest.mark.parametrize(("attacker", "radius", "per_shot"), [("Thor", 0.5, 4 * (6 + 6)), ("Liberator", 1.5, 2 * 5)])
+def test_missiles_at_flyers_burst_among_flyers(field: Any, attacker: str, radius: float, per_shot: float) -> None:
+    """Whoever hovers within the radius takes as much as the target; what walks below takes nothing."""
+    world = field.world
+    body = world.catalog.unit("Mutalisk").radius
+    target = dummy(field, "Mutalisk", 14, 16)
+    near = dummy(field, "Mutalisk", 14, 16 + radius + body - 0.05)
+    far = dummy(field, "Mutalisk", 14, 16 - radius - body - 0.1)
+    below = dummy(field, "Zergling", 14, 16)
+    for slot in (target, near, far):
+        commands.hold(world, [slot])  # so that they do not drift apart
+        world.acquires[slot] = False
+    slot = shot_at(field, attacker, 9, target)
+    one_shot(field, slot)
+    assert lost(field, [target, near, far], 120) == pytest.approx([per_shot, per_shot, 0])
+    assert world.life[below] == 35
+
+
 def test_spines_travel_and_one_can_walk_out_of_their_way(field: Any) -> None:
     world = field.world
     near, middle, far = (dummy(field, "Zealot", x, 16) for x in (12, 15, 18))
