@@ -342,7 +342,7 @@ def cases() -> Iterator[Any]:
             yield pytest.param(version, a, id=f"{version}-{a.id}-{a.does}", marks=marks)
 
 
-@pytest.mark.parametrize(("version", "ability"), cases())
+@pytest.mark.parametrize(("version", "ability"), list(cases()))
 def test_an_ability_with_a_rule_changes_the_world(
     version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch
 ) -> None:
