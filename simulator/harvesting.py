@@ -193,6 +193,7 @@ def leave(world: World, slot: int) -> None:
     if world.carrier[slot] != NOBODY and world.carrier[slot] == patch:
         x, y = _door(world, slot, patch)
         world.unstow(slot, (x, y))
+        world.looks_around[slot] = False
 
 
 def _door(world: World, slot: int, patch: int) -> tuple[float, float]:

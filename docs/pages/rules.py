@@ -127,7 +127,7 @@ def _ability_row(ability: Ability, names: set[str]) -> tuple[object, ...]:
 def _rule(ability: Ability) -> str:
     """The first sentence of the rule's own account of itself."""
     skill = SKILLS.get(ability.does)
-    text = inspect.getdoc(skill.effect) if skill is not None else ""
+    text = inspect.getdoc(skill.give or skill.effect) if skill is not None else ""
     return (text or "").split("\n\n", maxsplit=1)[0]
 
 

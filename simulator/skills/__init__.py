@@ -130,5 +130,5 @@ SMARTS: Final[tuple[SmartRule, ...]] = (
     *terran.SMARTS,
 )
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = _joined(
-    transports.DEATHS, carrier.DEATHS, zerg.DEATHS, terran.DEATHS
+    harvest.DEATHS, transports.DEATHS, carrier.DEATHS, zerg.DEATHS, terran.DEATHS
 )

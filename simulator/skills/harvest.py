@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 
 
 def _gather(world: World, slots: list[int], _: Ability, target: int, __: Point | None, queue: bool) -> list[int]:
+    """Harvest a mineral field or a gas structure, and bring home what it gives, until told otherwise."""
     return commands.gather(world, slots, target, queue=queue)
 
 
 def _return(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, queue: bool) -> list[int]:
+    """Carry what is loaded to the nearest town hall, and go on harvesting."""
     return commands.return_cargo(world, slots, queue=queue)
 
 
@@ -39,6 +41,15 @@ def _can_return(world: World, cast: Cast) -> Refusal:
     return Refusal.SUCCESS if found else Refusal.CANT_FIND_DROP_OFF
 
 
+def _let_out(world: World, slot: int) -> None:
+    """Who is in a gas structure when it is destroyed comes out of it."""
+    for worker in world.passengers(slot):
+        commands.begin(world, worker, None)
+
+
+DEATHS: Final = dict.fromkeys(
+    ("Assimilator", "AssimilatorRich", "Extractor", "ExtractorRich", "Refinery", "RefineryRich"), _let_out
+)
 SKILLS: Final = {
     "gather": Skill(give=_gather, refuse=_can_gather),
     "return": Skill(give=_return, refuse=_can_return),

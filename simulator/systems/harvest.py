@@ -19,6 +19,8 @@ from simulator.world import Death
 if TYPE_CHECKING:
     from simulator.world import World
 
+TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
+AT_RESOURCE, LEAVING = int(Phase.AT_RESOURCE), int(Phase.LEAVING)
 NO_KILLER: Final = -1
 REMEMBERED_LOOPS: Final = 160  # how long deliveries count for the rate of collection
 RETRY_LOOPS: Final = 8  # how often a worker before a taken field looks for another one
@@ -35,10 +37,10 @@ def run(world: World) -> None:
         world.harvesting = False
         return
     phase = phase.take(workers)
-    there = (phase == Phase.TO_RESOURCE) | (phase == Phase.TO_HALL)
+    there = (phase == TO_RESOURCE) | (phase == TO_HALL)
     there &= ~world.wants.take(workers)  # as ``engagement`` measured it
     there &= world.can_act.take(workers)
-    done = ~there & ((phase == Phase.AT_RESOURCE) | (phase == Phase.LEAVING))
+    done = (phase == AT_RESOURCE) | (phase == LEAVING)
     done &= world.work_until.take(workers) <= world.loop
     due = there | done
     if some(due):

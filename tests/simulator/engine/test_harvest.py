@@ -150,6 +150,16 @@ def test_a_worker_in_a_gas_structure_is_out_of_sight(field: Field) -> None:
     assert done - began == pytest.approx(1.981 * 16, abs=1.0)
 
 
+def test_who_is_in_a_gas_structure_survives_it_and_keeps_out_of_fights(field: Field) -> None:
+    base = Base(field, "SCV", "Refinery")
+    base.gather()
+    base.first(lambda: base.world.carrier[base.worker] == base.resource)
+    base.world.life[base.resource] = 0.0
+    field.play(1)
+    assert base.worker in base.world.live
+    assert base.world.harvest[base.worker] == harvesting.Phase.NONE
+
+
 def test_workers_on_their_round_pass_through_each_other_and_others_do_not(base: Base) -> None:
     assert base.world.layer_bits[base.worker]
     base.gather()
