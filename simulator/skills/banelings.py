@@ -12,6 +12,7 @@ from simulator.skills.skill import Skill
 from simulator.systems.damage import hit_with
 
 if TYPE_CHECKING:
+    from simulator.abilities import Ability
     from simulator.casts import Cast
     from simulator.world import World
 
@@ -53,17 +54,17 @@ def _spare_buildings(world: World, cast: Cast) -> None:
     buffs.remove(world, cast.slot, BUILDINGS)
 
 
-def _not_yet(world: World, cast: Cast) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, cast.slot, BUILDINGS) else Refusal.SUCCESS
+def _not_yet(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.ERROR if buffs.has(world, slot, BUILDINGS) else Refusal.SUCCESS
 
 
-def _already(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, cast.slot, BUILDINGS) else Refusal.ERROR
+def _already(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.SUCCESS if buffs.has(world, slot, BUILDINGS) else Refusal.ERROR
 
 
 SKILLS: Final = {
     "explode": Skill(_explode),
-    "volatile_burst_building_on": Skill(_aim_at_buildings, refuse=_not_yet),
-    "volatile_burst_building_off": Skill(_spare_buildings, refuse=_already),
+    "volatile_burst_building_on": Skill(_aim_at_buildings, ready=_not_yet),
+    "volatile_burst_building_off": Skill(_spare_buildings, ready=_already),
 }
 DEATHS: Final = {"Baneling": _dies, "BanelingBurrowed": _dies}

@@ -14,6 +14,7 @@ from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
+    from simulator.abilities import Ability
     from simulator.casts import Cast
     from simulator.records import UnitType
     from simulator.world import World
@@ -48,9 +49,8 @@ def _renewed(world: World, slot: int, unit: UnitType) -> None:
     )
 
 
-def _can_grow(world: World, cast: Cast) -> Refusal:
-    busy = cast.slot in world.jobs
-    return Refusal.CANT_QUEUE_THAT_ORDER if busy else Refusal.SUCCESS
+def _can_grow(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.CANT_QUEUE_THAT_ORDER if slot in world.jobs or grows(world, slot) else Refusal.SUCCESS
 
 
 def grows(world: World, slot: int) -> bool:
@@ -75,8 +75,8 @@ def _call_off_growth(world: World, cast: Cast) -> None:
         call_off(world, cast.slot)
 
 
-def _grows_now(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if grows(world, cast.slot) else Refusal.CANT_FIND_CANCEL_ORDER
+def _grows_now(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.SUCCESS if grows(world, slot) else Refusal.CANT_FIND_CANCEL_ORDER
 
 
 def _call_off_morph(world: World, cast: Cast) -> None:
@@ -84,8 +84,7 @@ def _call_off_morph(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _morphs_now(world: World, cast: Cast) -> Refusal:
-    slot = cast.slot
+def _morphs_now(world: World, slot: int, _: Ability) -> Refusal:
     under_way = world.casts[slot] and world.bound[slot] and not world.channels[slot]
     return Refusal.SUCCESS if under_way else Refusal.CANT_FIND_CANCEL_ORDER
 
@@ -93,7 +92,7 @@ def _morphs_now(world: World, cast: Cast) -> Refusal:
 SKILLS: Final = {
     "grow": Skill(
         _grow,
-        refuse=_can_grow,
+        ready=_can_grow,
         hold=_grows,
         binds=True,
         estimates=(
@@ -101,6 +100,6 @@ SKILLS: Final = {
             "that the new unit has its starting energy",
         ),
     ),
-    "cancel_growth": Skill(_call_off_growth, refuse=_grows_now, estimates=("the share of the price that comes back",)),
-    "cancel_morph": Skill(_call_off_morph, refuse=_morphs_now),
+    "cancel_growth": Skill(_call_off_growth, ready=_grows_now, estimates=("the share of the price that comes back",)),
+    "cancel_morph": Skill(_call_off_morph, ready=_morphs_now),
 }

@@ -23,6 +23,7 @@ from simulator.targets import disengage
 if TYPE_CHECKING:
     import numpy as np
 
+    from simulator.abilities import Ability
     from simulator.casts import Cast
     from simulator.world import World
 
@@ -124,8 +125,8 @@ def _break_off(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _is_holding(world: World, cast: Cast) -> Refusal:
-    held = world.channelling.get(cast.slot)
+def _is_holding(world: World, slot: int, _: Ability) -> Refusal:
+    held = world.channelling.get(slot)
     holding = held is not None and held.ability.does == "neural_parasite"
     return Refusal.SUCCESS if holding else Refusal.CANT_FIND_CANCEL_ORDER
 
@@ -195,7 +196,7 @@ SKILLS: Final = {
         end=_let_go,
         estimates=(SPEED_UNKNOWN, "that the victim counts its new owner's upgrades"),
     ),
-    "cancel_neural_parasite": Skill(_break_off, refuse=_is_holding),
+    "cancel_neural_parasite": Skill(_break_off, ready=_is_holding),
     "infested_terrans": Skill(
         _infested_terrans, estimates=(SPEED_UNKNOWN, "how long an infested terran lives: 480 loops")
     ),

@@ -17,6 +17,7 @@ from simulator.skills import teleport
 from simulator.skills.skill import Skill, number
 
 if TYPE_CHECKING:
+    from simulator.abilities import Ability
     from simulator.casts import Cast
     from simulator.world import World
 
@@ -41,12 +42,12 @@ def _stop_creep(world: World, cast: Cast) -> None:
     world.growth.looked_at = -1
 
 
-def _dry(world: World, cast: Cast) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, cast.slot, GENERATING) else Refusal.SUCCESS
+def _dry(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.ERROR if buffs.has(world, slot, GENERATING) else Refusal.SUCCESS
 
 
-def _generating(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, cast.slot, GENERATING) else Refusal.ERROR
+def _generating(world: World, slot: int, _: Ability) -> Refusal:
+    return Refusal.SUCCESS if buffs.has(world, slot, GENERATING) else Refusal.ERROR
 
 
 # changelings ----------------------------------------------------------------------------------------------------------
@@ -103,8 +104,8 @@ def _contaminate(world: World, cast: Cast) -> None:
 
 
 SKILLS: Final = {
-    "generate_creep_on": Skill(_let_creep_fall, refuse=_dry, estimates=("which cells the creep covers",)),
-    "generate_creep_off": Skill(_stop_creep, refuse=_generating),
+    "generate_creep_on": Skill(_let_creep_fall, ready=_dry, estimates=("which cells the creep covers",)),
+    "generate_creep_off": Skill(_stop_creep, ready=_generating),
     "spawn_changeling": Skill(_spawn_changeling, estimates=("that enemies see a changeling as what it is",)),
     "contaminate": Skill(_contaminate),
 }

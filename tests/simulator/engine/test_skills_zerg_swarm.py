@@ -371,3 +371,38 @@ def test_a_lurker_that_holds_its_fire_picks_nobody(field: Any) -> None:
     assert field.order(slot, FREE_FIRE)
     field.play(20)
     assert world.target[slot] == enemy
+
+
+# Ultralisk, Overseer --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["Slow", "FungalGrowthSlowMovement", "OracleStasisTrapTarget", "TemporalField", "NeuralParasite", "Yoink"]
+)
+def test_nothing_holds_or_slows_an_ultralisk(field: Any, name: str) -> None:
+    for unit, bears in (("Ultralisk", False), ("UltraliskBurrowed", False), ("Roach", True)):
+        slot = field.put(unit, 1, 32, 32)
+        buffs.apply(field.world, slot, name)
+        assert buffs.has(field.world, slot, name) is bears
+
+
+def test_an_overseer_on_watch_sees_farther_and_stays(field: Any) -> None:
+    world, slot = field.world, field.put("Overseer", 1, 32, 32)
+    assert field.order(slot, 3743)
+    field.play(int(world.catalog.ability(3743).loops) + 2)
+    watch, plain = world.catalog.unit("OverseerSiegeMode"), world.catalog.unit("Overseer")
+    assert world.unit_type(slot) is watch
+    assert world.detects[slot] == watch.detect > plain.detect
+    assert world.sight[slot] == watch.sight > plain.sight
+    assert not commands.move(world, [slot], (40.0, 32.0))
+
+
+def test_fungal_growth_uncovers_what_is_burrowed(field: Any) -> None:
+    world, slot = field.world, field.put("Infestor", 1, 26, 32)
+    world.energy[slot] = 100.0
+    roach = field.put("RoachBurrowed", 2, 32, 32)
+    field.play(4)
+    assert not world.visible[1, roach]
+    assert field.order(slot, 74, point=(32.0, 32.0))
+    field.play(20)
+    assert world.visible[1, roach]
