@@ -10,6 +10,8 @@ from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from simulator.abilities import Ability
     from simulator.casts import Cast, Point
     from simulator.world import World
@@ -47,7 +49,7 @@ def _let_out(world: World, slot: int) -> None:
         commands.begin(world, worker, None)
 
 
-DEATHS: Final = dict.fromkeys(
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = dict.fromkeys(
     ("Assimilator", "AssimilatorRich", "Extractor", "ExtractorRich", "Refinery", "RefineryRich"), _let_out
 )
 SKILLS: Final = {
