@@ -1,7 +1,9 @@
 """How many game loops per second the simulator's engine plays, without the SC2 API around it.
 
-Each shipped map is played with both sides on attack-move, restarted with the next seed when it ends; then armies of 10
-to 400 units meet on an open map. Run ``python -m bench.simulator_engine``, with ``--json`` for one JSON object.
+Some shipped maps are played with both sides on attack-move, restarted with the next seed when they end; then armies of
+10 to 400 units meet on an open map, which shows how the cost grows: `us per unit` is the time of a loop by the units
+that live in it, in the mean. `MB` is what the process holds at the end of a row. Run
+``python -m bench.simulator_engine``, with ``--json`` for one JSON object.
 """
 
 from __future__ import annotations
@@ -11,13 +13,14 @@ import json
 import sys
 import time
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from simulator import commands
-from simulator.maps import load_map, map_names
+from simulator.maps import load_map
 from simulator.systems.placement import free_places
 from simulator.systems.triggers import players_of
 from simulator.tick import advance, new_game
@@ -27,7 +30,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 LOOPS_PER_STEP = 8
-ARMY_SIZES = (10, 20, 50, 100, 200, 400)
+ARMY_SIZES = (10, 25, 50, 100, 200, 400)
+MAPS = (
+    "llm_smac/2s3z", "llm_smac/3s5z", "llm_smac/1c3s5z", "llm_smac/2c_vs_64zg", "SMAC_Maps/27m_vs_30m",
+    "SMAC_Maps/bane_vs_bane", "llm_pysc2/pvz_task1_level1", "llm_pysc2/pvz_task6_level1", "mini_games/DefeatRoaches",
+)  # fmt: skip
 
 
 def battle(name: str, seed: int) -> World:
@@ -57,7 +64,7 @@ def armies(units: int, seed: int) -> World:
 
 def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440) -> dict[str, float]:
     """Play fresh games until enough CPU time is used; the making of worlds is timed apart."""
-    loops = seed = 0
+    loops = seed = lived = 0
     playing = making = 0.0
     units: list[int] = []
     while playing < seconds:
@@ -67,7 +74,9 @@ def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440)
         ready = time.process_time()
         making += ready - began
         while not world.ended and world.loop < max_loops and playing + time.process_time() - ready < 2 * seconds:
-            loops += advance(world, LOOPS_PER_STEP)
+            done = advance(world, LOOPS_PER_STEP)
+            loops += done
+            lived += done * len(world.live)
         playing += time.process_time() - ready
         seed += 1
     return {
@@ -75,28 +84,46 @@ def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440)
         "loops": loops,
         "loops_per_s": round(loops / playing, 1),
         "ms_per_loop": round(playing / loops * 1e3, 4),
+        "us_per_unit": round(playing / max(lived, 1) * 1e6, 2),
         "ms_to_make": round(making / seed * 1e3, 2),
         "games": seed,
+        "mb": round(resident_mb(), 1),
     }
+
+
+def resident_mb() -> float:
+    """Resident memory of this process."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
     parser.add_argument("--seconds", type=float, default=2.0, help="CPU seconds per row")
-    parser.add_argument("--maps", nargs="*", default=list(map_names()), help="maps to play; none: only the armies")
+    parser.add_argument("--maps", nargs="*", default=list(MAPS), help="maps to play; none: only the armies")
     parser.add_argument("--sizes", nargs="*", type=int, default=list(ARMY_SIZES), help="units in the open battles")
     options = parser.parse_args()
     rows = {name: measure(partial(battle, name), options.seconds) for name in options.maps}
     for size in options.sizes:
-        rows[f"open field, {size} units"] = measure(partial(armies, size), options.seconds, max_loops=400)
+        rows[f"armies of {size // 2}"] = measure(partial(armies, size), options.seconds, max_loops=400)
     if options.json:
         json.dump({"command": " ".join(sys.argv), "rows": rows}, sys.stdout)
         return
-    table = Table("battle", "units", "loops/s", "ms per loop", "ms to make", title="simulator engine, one core")
+    table = Table(
+        "battle",
+        "units",
+        "loops/s",
+        "ms per loop",
+        "us per unit",
+        "ms to make",
+        "MB",
+        title="simulator engine, one core",
+    )
     for name, row in rows.items():
-        cells = (row["units"], row["loops_per_s"], row["ms_per_loop"], row["ms_to_make"])
-        table.add_row(name, *(f"{cell:g}" for cell in cells))
+        names = ("units", "loops_per_s", "ms_per_loop", "us_per_unit", "ms_to_make", "mb")
+        cells = (row[name] for name in names)
+        table.add_row(name.rpartition("/")[2], *(f"{cell:g}" for cell in cells))
     Console().print(table)
 
 
