@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 LOOPS_PER_STEP = 8
 ARMY_SIZES = (10, 25, 50, 100, 200, 400)
 MAPS = (
-    "llm_smac/2s3z", "llm_smac/3s5z", "llm_smac/1c3s5z", "llm_smac/2c_vs_64zg", "SMAC_Maps/27m_vs_30m",
-    "SMAC_Maps/bane_vs_bane", "llm_pysc2/pvz_task1_level1", "llm_pysc2/pvz_task6_level1", "mini_games/DefeatRoaches",
+    "llm_smac/2s3z", "llm_smac/3s5z", "llm_smac/1c3s5z", "llm_smac/2c_vs_64zg", "llm_pysc2/pvz_task1_level1",
+    "llm_pysc2/pvz_task6_level1", "mini_games/DefeatRoaches",
 )  # fmt: skip
 
 
