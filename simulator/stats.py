@@ -38,6 +38,10 @@ AIR_PLANE: Final = 2
 INSTANT_ACCELERATION_N: Final = 1000.0
 
 
+MORPH_TIME: Final = (
+    "InfoArray[0].SectionArray[Stats].DurationArray[Delay]",
+    "InfoArray[0].SectionArray[Stats].DurationArray[Duration]",
+)
 READ: Final = {
     "unit": {
         "Acceleration", "EnergyMax", "EnergyStart", "LifeArmor", "LifeMax", "LifeRegenRate", "LifeStart", "ShieldArmor",
@@ -45,7 +49,11 @@ READ: Final = {
     },
     "weapon": {"MinScanRange", "Range", "RateMultiplier"},
     "effect": {"Amount"},
-    "behavior": {"Modification.MoveSpeedMultiplier", "Modification.AccelerationMultiplier"},
+    "behavior": {
+        "Modification.MoveSpeedMultiplier", "Modification.AccelerationMultiplier",
+        "Modification.StateFlags[SuppressCloak]",
+    },
+    "abil": {"Range[0]", "AutoCastRange", "Cost[0].Cooldown.TimeUse", "InfoArray[0].RandomDelayMax", *MORPH_TIME},
 }  # fmt: skip
 """The fields whose changes by upgrades have an effect here; attribute bonuses of effects as well."""
 
@@ -182,10 +190,6 @@ class _Changes:
         prefix = "AttributeBonus["
         fields = (f for c, e, f in self._by_field if c == "effect" and e == effect)
         return [f[len(prefix) : -1].lower() for f in fields if f.startswith(prefix)]
-
-
-MORPH_TIME: Final = ("InfoArray[0].SectionArray[Stats].DurationArray[Delay]",
-                     "InfoArray[0].SectionArray[Stats].DurationArray[Duration]")  # fmt: skip
 
 
 def _ability(ability: Ability, changes: _Changes) -> Ability:

@@ -23,6 +23,7 @@ def on_self(buff: str) -> Effect:
     """An effect that lays a buff on the caster, for as long as the ability or else the buff says."""
 
     def effect(world: World, cast: Cast) -> None:
+        """Bear a buff for a time."""
         loops = cast.ability.numbers.get("duration_loops")
         buffs.apply(world, cast.slot, buff, source=cast.slot, loops=loops)
 
@@ -33,6 +34,7 @@ def on_target(buff: str) -> Effect:
     """An effect that lays a buff on the target."""
 
     def effect(world: World, cast: Cast) -> None:
+        """Lay a buff on the target for a time."""
         loops = cast.ability.numbers.get("duration_loops")
         buffs.apply(world, cast.target, buff, source=cast.slot, loops=loops)
 
@@ -43,6 +45,7 @@ def off_self(buff: str) -> Effect:
     """An effect that takes a buff off the caster."""
 
     def effect(world: World, cast: Cast) -> None:
+        """Lay down a buff."""
         buffs.remove(world, cast.slot, buff)
 
     return effect

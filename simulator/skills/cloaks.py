@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from simulator.casts import Cast
-    from simulator.skills.skill import BuffRule
+    from simulator.skills.skill import BuffRule, Effect
     from simulator.world import World
 
 
@@ -32,15 +32,31 @@ def _with(buff: str) -> Callable[[World, Cast], Refusal]:
     return lambda world, cast: Refusal.SUCCESS if buffs.has(world, cast.slot, buff) else Refusal.ERROR
 
 
+def _cloak(buff: str) -> Effect:
+    def effect(world: World, cast: Cast) -> None:
+        """Be seen by detectors only, as long as the energy lasts."""
+        on_self(buff)(world, cast)
+
+    return effect
+
+
+def _uncloak(buff: str) -> Effect:
+    def effect(world: World, cast: Cast) -> None:
+        """Be seen again, and save the energy."""
+        off_self(buff)(world, cast)
+
+    return effect
+
+
 def _uncloak_exhausted(world: World, slot: int, row: np.void) -> None:
     if world.energy[slot] <= 0.0:
         buffs.remove(world, slot, world.catalog.buffs[int(row["buff"])].name)
 
 
 SKILLS: Final = {
-    "ghost_cloak_on": Skill(on_self("GhostCloak"), refuse=_unless("GhostCloak")),
-    "ghost_cloak_off": Skill(off_self("GhostCloak"), refuse=_with("GhostCloak")),
-    "banshee_cloak_on": Skill(on_self("BansheeCloak"), refuse=_unless("BansheeCloak")),
-    "banshee_cloak_off": Skill(off_self("BansheeCloak"), refuse=_with("BansheeCloak")),
+    "ghost_cloak_on": Skill(_cloak("GhostCloak"), refuse=_unless("GhostCloak")),
+    "ghost_cloak_off": Skill(_uncloak("GhostCloak"), refuse=_with("GhostCloak")),
+    "banshee_cloak_on": Skill(_cloak("BansheeCloak"), refuse=_unless("BansheeCloak")),
+    "banshee_cloak_off": Skill(_uncloak("BansheeCloak"), refuse=_with("BansheeCloak")),
 }
 TICKS: Final[dict[str, BuffRule]] = {"GhostCloak": _uncloak_exhausted, "BansheeCloak": _uncloak_exhausted}

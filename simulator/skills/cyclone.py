@@ -134,8 +134,8 @@ SKILLS: Final = {
     "lock_on": Skill(
         _lock,
         estimates=(
-            "the first of Lock On's missiles leaves after one period in 4.10, at once in 5.0.13",
-            "the leash is measured from centre to centre, in every loop",
+            "The first of Lock On's missiles leaves after one period in 4.10, at once in 5.0.13.",
+            "The leash is measured from centre to centre, in every loop.",
         ),
     ),
     "cancel_lock_on_cancel": Skill(_call_off),

@@ -109,10 +109,10 @@ SKILLS: Final = {
         _take_aim,
         hold=_hold_aim,
         end=_lower_aim,
-        estimates=("the distance at which a snipe's target has got away is measured from centre to centre",),
+        estimates=("The distance at which a snipe's target has got away is measured from centre to centre.",),
     ),
     "cancel_channel_snipe": dropping("channel_snipe"),
-    "emp": Skill(_fire_emp, estimates=("the EMP round's speed",)),
+    "emp": Skill(_fire_emp, estimates=("The EMP round's speed.",)),
     "ghost_hold_fire": Skill(_hold_fire),
     "ghost_weapons_free": Skill(_free_weapons),
 }

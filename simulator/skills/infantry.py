@@ -25,6 +25,19 @@ if TYPE_CHECKING:
     from simulator.skills.skill import FieldRule
     from simulator.world import World
 
+# stimpack -------------------------------------------------------------------------------------------------------------
+
+
+def _stim(world: World, cast: Cast) -> None:
+    """Walk and fire faster for a time; the price is paid in life."""
+    on_self("Stimpack")(world, cast)
+
+
+def _stim_marauder(world: World, cast: Cast) -> None:
+    """Walk and fire faster for a time; the price is paid in life."""
+    on_self("StimpackMarauder")(world, cast)
+
+
 # concussive shells ----------------------------------------------------------------------------------------------------
 
 SHELLS: Final = "PunisherGrenades"
@@ -132,13 +145,13 @@ def _fly_back(world: World, item: Field) -> None:
 
 
 SKILLS: Final = {
-    "stimpack": Skill(on_self("Stimpack")),
-    "stimpack_marauder": Skill(on_self("StimpackMarauder")),
+    "stimpack": Skill(_stim),
+    "stimpack_marauder": Skill(_stim_marauder),
     "kd8_charge": Skill(
         _throw_charge,
         estimates=(
-            "a KD8 charge lies at its place at once; in the game it is thrown there",
-            "a thrown unit moves evenly for a fixed time and stops at the first cell that it can't walk on",
+            "A KD8 charge lies at its place at once; in the game it is thrown there.",
+            "A thrown unit moves evenly for a fixed time and stops at the first cell that it can't walk on.",
         ),
     ),
 }

@@ -92,6 +92,6 @@ SKILLS: Final = {
         _settle,
         refuse=_can_land,
         binds=True,
-        estimates=("a landing structure that finds its place taken in the end stays in the air",),
+        estimates=("A landing structure that finds its place taken in the end stays in the air.",),
     ),
 }

@@ -99,7 +99,7 @@ def _morph(world: World, slot: int, link: str) -> None:
 SKILLS: Final = {
     "liberator_ag_target": Skill(
         _lay_out,
-        estimates=("a Liberator that is carried away from its zone leaves its mode when it is free to do so",),
+        estimates=("A Liberator that is carried away from its zone leaves its mode when it is free to do so.",),
     ),
     "liberator_aa_target": Skill(_take_off),
 }

@@ -77,6 +77,11 @@ def _begin(world: World, cast: Cast) -> None:
     _heal(world, cast)
 
 
+def _ignite(world: World, cast: Cast) -> None:
+    """Fly faster for a time."""
+    on_self("MedivacSpeedBoost")(world, cast)
+
+
 SKILLS: Final = {
     "medivac_heal": Skill(
         _begin,
@@ -84,9 +89,9 @@ SKILLS: Final = {
         hold=_heal,
         pick=_pick,
         estimates=(
-            "healing is given evenly in every loop",
-            "a Medivac follows whom it heals at half the range at which it begins",
+            "Healing is given evenly in every loop.",
+            "A Medivac follows whom it heals at half the range at which it begins.",
         ),
     ),
-    "medivac_speed_boost": Skill(on_self("MedivacSpeedBoost")),
+    "medivac_speed_boost": Skill(_ignite),
 }

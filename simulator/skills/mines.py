@@ -94,7 +94,7 @@ def _fire_by_click(world: World, slots: list[int], target: int, _: Point | None,
 
 SMARTS: Final[tuple[SmartRule, ...]] = (_fire_by_click,)
 SKILLS: Final = {
-    "widow_mine_attack": Skill(_fire, refuse=_no_larva, estimates=("the speed of the Widow Mine's missile",)),
+    "widow_mine_attack": Skill(_fire, refuse=_no_larva, estimates=("The speed of the Widow Mine's missile.",)),
 }
 PASSIVES: Final[dict[str, UnitRule]] = {BURROWED: _keep_watch, "WidowMine": _climb_out}
 

@@ -125,7 +125,7 @@ SKILLS: Final = {
         _call_mule,
         refuse=_can_call,
         estimates=(
-            "a MULE is in the world from the moment it lands, at the free place nearest to where it was called",
+            "A MULE is in the world from the moment it lands, at the free place nearest to where it was called.",
         ),
     ),
     "supply_drop": Skill(_drop_supplies, refuse=_is_plain_depot),

@@ -121,10 +121,10 @@ SKILLS: Final = {
     "build_auto_turret": Skill(
         _place_turret,
         refuse=_has_room,
-        estimates=("an auto-turret stands and fires at once; in the game it is dropped from the Raven",),
+        estimates=("An auto-turret stands and fires at once; in the game it is dropped from the Raven.",),
     ),
-    "raven_scrambler_missile": Skill(_jam, refuse=_can_be_jammed, estimates=("the interference matrix' speed",)),
-    "raven_shredder_missile": Skill(_send_shredder, estimates=("the anti-armor missile's speed",)),
+    "raven_scrambler_missile": Skill(_jam, refuse=_can_be_jammed, estimates=("The interference matrix' speed.",)),
+    "raven_shredder_missile": Skill(_send_shredder, estimates=("The anti-armor missile's speed.",)),
 }
 FIELDS: Final[dict[str, FieldRule]] = {"shredder": _chase}
 

@@ -116,7 +116,7 @@ SKILLS: Final = {
         refuse=_can_repair,
         hold=_mend,
         pick=_pick,
-        estimates=("repair is given and paid for evenly in every loop; the game's rounding is not known",),
+        estimates=("Repair is given and paid for evenly in every loop; the game's rounding is not known.",),
     )
     for name in REPAIRS
 }

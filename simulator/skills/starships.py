@@ -94,12 +94,12 @@ def _appear(world: World, cast: Cast) -> None:
 
 
 SKILLS: Final = {
-    "yamato": Skill(_charge, hold=_hold_charge, estimates=("the speed of the Yamato cannon's missile",)),
+    "yamato": Skill(_charge, hold=_hold_charge, estimates=("The speed of the Yamato cannon's missile.",)),
     "hyperjump": Skill(
         _begin_jump,
         refuse=_may_jump,
         hold=_jump,
-        estimates=("a ship on its jump is at its goal, untouchable and in sight, from the moment it leaves",),
+        estimates=("A ship on its jump is at its goal, untouchable and in sight, from the moment it leaves.",),
     ),
 }
 
