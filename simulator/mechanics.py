@@ -81,6 +81,7 @@ class Mechanics:
     larva_rest_loops: int
     larva_step: float
     larva_leash: float
+    larva_home: float
     broodling_random_loops: float
     swoop_speed_n: float
 

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs
+from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.refusal import Refusal
-from simulator.skills.skill import Skill, number
+from simulator.skills.skill import Skill, distance, number
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -59,14 +60,16 @@ def _hatch_by_nature(world: World, slots: list[int]) -> None:
     """A finished town hall with less than three larvae hatches the next one after a while."""
     live = world.live
     larvae = live[world.type[live] == _larva(world)]
+    for larva in larvae[world.home[larvae] < 0].tolist():
+        _adopt(world, larva, slots)
     counts = np.bincount(world.home[larvae][world.home[larvae] >= 0], minlength=world.capacity)
     for slot in slots:
         if world.build_progress[slot] < 1.0:
             continue
         timers = world.timers.setdefault(slot, {})
         if world.loop == 1 and NEXT not in timers:
-            hatch(world, slot, MECHANICS.larvae_natural)
-            counts[slot] = MECHANICS.larvae_natural
+            hatch(world, slot, max(MECHANICS.larvae_natural - int(counts[slot]), 0))
+            counts[slot] = max(MECHANICS.larvae_natural, int(counts[slot]))
         if counts[slot] >= MECHANICS.larvae_natural:
             timers[NEXT] = math.inf
         elif timers.get(NEXT, math.inf) == math.inf:
@@ -78,6 +81,15 @@ def _hatch_by_nature(world: World, slots: list[int]) -> None:
             timers[NEXT] = (
                 math.inf if counts[slot] + 1 >= MECHANICS.larvae_natural else world.loop + MECHANICS.larva_loops
             )
+
+
+def _adopt(world: World, larva: int, halls: list[int]) -> None:
+    """A larva without a home belongs to the nearest town hall of its owner, if that is near."""
+    x, y = world.pos[larva].tolist()
+    mine = [(distance(world, hall, (x, y)), hall) for hall in halls if world.owner[hall] == world.owner[larva]]
+    away, hall = min(mine, default=(math.inf, NOBODY))
+    if away <= MECHANICS.larva_home:
+        world.home[larva] = hall
 
 
 # injections -----------------------------------------------------------------------------------------------------------
@@ -95,6 +107,7 @@ def _is_hall(world: World, cast: Cast) -> Refusal:
 
 def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     """The larvae come one after the other, and the next injection begins."""
+    world.alert(int(world.owner[slot]), "LarvaHatched")
     numbers = world.catalog.ability(INJECT)
     count, gap = int(number(numbers, "larva")), MECHANICS.injected_larva_loops
     world.fields.append(

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, construction, sites
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, number, place_of
-from simulator.systems.placement import snapped
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,9 +18,6 @@ if TYPE_CHECKING:
 
 TRANSFUSION = 1664
 PLANT, BURROW = 1733, 1662
-HALF_CELL = (1, 1)
-SEEN = 2
-FIRST_PROGRESS = 1e-3
 
 
 # Transfusion ----------------------------------------------------------------------------------------------------------
@@ -55,27 +51,16 @@ def _heal(world: World, slot: int, amount: float) -> None:
 def _plant(world: World, cast: Cast) -> None:
     """Plant a creep tumor, which grows by itself and then burrows."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
-    tumor = world.spawn(unit, int(world.owner[slot]), snapped(place_of(world, cast), HALF_CELL))
-    world.build_progress[tumor] = FIRST_PROGRESS
-    world.build_loops[tumor] = cast.ability.loops
-    world.self_made[tumor] = True
-    world.refresh(tumor)
+    place = sites.centre(world, unit, place_of(world, cast))
+    construction.begin(world, unit, int(world.owner[slot]), place, loops=cast.ability.loops, paid=(0.0, 0.0))
     if cast.ability.id == PLANT:
         world.timers.setdefault(slot, {})[cast.ability.timer] = math.inf  # a tumor plants one other in its life
 
 
 def _room_for_tumor(world: World, cast: Cast) -> Refusal:
-    """Creep that is seen, and no structure there."""
-    x, y = snapped(place_of(world, cast), HALF_CELL)
-    width, height = world.map.terrain.size
-    if not (0 <= x < width and 0 <= y < height):
-        return Refusal.CANT_FIND_PLACEMENT_LOCATION
-    row, column = int(y), int(x)
-    if world.visibility[int(world.owner[cast.slot]), row, column] != SEEN and cast.ability.id == PLANT:
-        return Refusal.CANT_SEE_BUILD_LOCATION
-    if not world.creep[row, column]:
-        return Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE
-    return Refusal.SUCCESS if world.ground.walk[row, column] else Refusal.CANT_FIND_PLACEMENT_LOCATION
+    """Creep without a structure on it; the tumor's own must be in sight."""
+    unit = world.catalog.unit(cast.ability.unit)
+    return sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
 
 
 def _burrow_when_grown(world: World, slots: list[int]) -> None:

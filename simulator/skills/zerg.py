@@ -13,6 +13,7 @@ from simulator.skills import (
     infestors,
     larvae,
     lurkers,
+    nydus,
     overlords,
     queens,
     ravagers,
@@ -62,6 +63,7 @@ FINALS: Final[dict[str, BuffRule]] = {
 }
 PASSIVES: Final[dict[str, UnitRule]] = {
     **larvae.PASSIVES,
+    **nydus.PASSIVES,
     **overlords.PASSIVES,
     **queens.PASSIVES,
 }

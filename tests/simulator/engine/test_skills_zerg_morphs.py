@@ -285,8 +285,8 @@ def test_a_crawler_walks_to_another_place_and_takes_root_there(
     [
         ((40.0, 32.0), Refusal.SUCCESS),
         ((60.0, 60.0), Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
-        ((32.5, 40.5), Refusal.CANT_FIND_PLACEMENT_LOCATION),
-        ((0.0, 0.0), Refusal.CANT_FIND_PLACEMENT_LOCATION),
+        ((32.5, 40.5), Refusal.CANT_BUILD_ON_THAT),
+        ((0.0, 0.0), Refusal.CANT_BUILD_LOCATION_INVALID),
     ],
 )
 def test_a_crawler_takes_root_on_free_creep_only(
@@ -340,8 +340,8 @@ def test_a_tumor_grows_burrows_and_plants_one_other(make_field: Callable[..., An
     [
         ((34.0, 32.0), Refusal.SUCCESS),
         ((60.0, 60.0), Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
-        ((32.5, 40.5), Refusal.CANT_FIND_PLACEMENT_LOCATION),
-        ((-3.0, 5.0), Refusal.CANT_FIND_PLACEMENT_LOCATION),
+        ((32.5, 40.5), Refusal.CANT_BUILD_ON_THAT),
+        ((-3.0, 5.0), Refusal.CANT_BUILD_LOCATION_INVALID),
     ],
 )
 def test_a_tumor_needs_free_creep(make_field: Callable[..., Any], point: tuple[float, float], why: Refusal) -> None:

@@ -67,6 +67,16 @@ def test_a_game_begins_with_three_larvae_at_every_hall(field: Any) -> None:
     assert len(larvae.of(field.world, slot)) == MECHANICS.larvae_natural
 
 
+def test_larvae_that_a_map_has_belong_to_the_hall_beside_them(field: Any) -> None:
+    slot = field.put("Hatchery", 1, 32.5, 32.5)
+    mine = [field.put("Larva", 1, 31.0 + i, 29.0) for i in range(3)]
+    field.put("Hatchery", 2, 12.5, 12.5)
+    stranger = field.put("Larva", 2, 32.0, 28.0)
+    field.play(2)
+    assert larvae.of(field.world, slot).tolist() == mine
+    assert field.world.home[stranger] == NOBODY
+
+
 def test_a_larva_that_is_used_is_replaced(field: Any) -> None:
     slot = field.put("Hatchery", 1, 32.5, 32.5)
     field.play(100)
@@ -334,6 +344,16 @@ def test_a_contaminated_structure_neither_hatches_nor_trains(field: Any) -> None
     field.play(MECHANICS.larva_loops + 60)
     assert len(larvae.of(world, hall)) == 1
     assert world.work_rate[hall] == 1.0
+
+
+def test_a_nydus_worm_is_hardened_until_it_is_finished(field: Any) -> None:
+    world, slot = field.world, field.put("NydusCanal", 1, 32.5, 32.5)
+    world.build_progress[slot], more = 0.5, world.catalog.buff("NydusWormArmor").armor_add
+    field.play(2)
+    assert world.armor_add[slot] == more > 0.0
+    world.build_progress[slot] = 1.0
+    field.play(2)
+    assert world.armor_add[slot] == 0.0
 
 
 # Corruptor, Lurker ----------------------------------------------------------------------------------------------------
