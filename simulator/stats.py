@@ -45,7 +45,7 @@ MORPH_TIME: Final = (
 READ: Final = {
     "unit": {
         "Acceleration", "EnergyMax", "EnergyStart", "LifeArmor", "LifeMax", "LifeRegenRate", "LifeStart", "ShieldArmor",
-        "ShieldsMax", "Sight", "Speed",
+        "ShieldsMax", "Sight", "Speed", "SpeedMultiplierCreep",
     },
     "weapon": {"MinScanRange", "Range", "RateMultiplier"},
     "effect": {"Amount"},
@@ -96,6 +96,7 @@ class Stats:
         self.shield_armor: Floats = np.zeros(shape_u)
         self.sight: Floats = np.zeros(shape_u)
         self.step: Floats = np.zeros(shape_u)  # world units per loop
+        self.creep_factor: Floats = np.ones(shape_u)  # on creep times that
         self.step_gain: Floats = np.zeros(shape_u)  # world units per loop, gained per loop; inf is at once
         self.life_regen: Floats = np.zeros(shape_u)  # per loop
         self.shield_regen: Floats = np.zeros(shape_u)  # per loop
@@ -148,6 +149,7 @@ class Stats:
         self.shield_armor[at] = value("ShieldArmor", unit.shield_armor)
         self.sight[at] = value("Sight", unit.sight)
         self.step[at] = value("Speed", unit.speed_n) / second
+        self.creep_factor[at] = value("SpeedMultiplierCreep", unit.creep_factor)
         self.step_gain[at] = math.inf if acceleration >= INSTANT_ACCELERATION_N else acceleration / second**2
         self.life_regen[at] = value("LifeRegenRate", unit.life_regen_n) / second
         self.shield_regen[at] = unit.shield_regen_n / second

@@ -60,7 +60,7 @@ def body_traits(world: World, slot: int) -> None:
     _turning(world, slot, unit)
     world.step_loss[slot] = _braking(unit)
     world.glides[slot] = unit.flying and math.isfinite(world.step_loss[slot])
-    world.creep_factor[slot] = unit.creep_factor
+    world.creep_factor[slot] = world.stats.creep_factor[at]
     world.walled[slot] = len(world.footprint_cells(slot)) > 0
     world.priority[slot] = unit.priority
     world.targetable[slot] = not (unit.invulnerable or (unit.untargetable and not unit.weapons))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
-from simulator.damage import wound
 from simulator.skills.skill import Skill, gap, number
+from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -38,5 +38,5 @@ def _stops(world: World, cast: Cast) -> None:
 
 
 SKILLS: Final = {
-    "caustic_spray": Skill(_spray, hold=_sprays, end=_stops, estimates=("that the spray takes no time to arrive",)),
+    "caustic_spray": Skill(_spray, hold=_sprays, end=_stops, estimates=("The spray takes no time to arrive.",)),
 }

@@ -96,10 +96,9 @@ SKILLS: Final = {
         hold=_grows,
         binds=True,
         estimates=(
-            "that a cocoon, and what comes out of it, has all of its life",
-            "that the new unit has its starting energy",
+            "A cocoon, and what comes out of it, has all of its life, and the energy that its type starts with.",
         ),
     ),
-    "cancel_growth": Skill(_call_off_growth, ready=_grows_now, estimates=("the share of the price that comes back",)),
+    "cancel_growth": Skill(_call_off_growth, ready=_grows_now, estimates=("Three quarters of the price come back.",)),
     "cancel_morph": Skill(_call_off_morph, ready=_morphs_now),
 }

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
-from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.orders import OrderKind
-from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, gap, number, place_of
 from simulator.skills.throws import SPEED_UNKNOWN, throw
+from simulator.systems.damage import wound
+from simulator.systems.placement import free_places
 from simulator.targets import disengage
 
 if TYPE_CHECKING:
@@ -194,12 +194,10 @@ SKILLS: Final = {
         refuse=_can_reach,
         hold=_controls,
         end=_let_go,
-        estimates=(SPEED_UNKNOWN, "that the victim counts its new owner's upgrades"),
+        estimates=(SPEED_UNKNOWN, "The victim has its new owner's upgrades."),
     ),
     "cancel_neural_parasite": Skill(_break_off, ready=_is_holding),
-    "infested_terrans": Skill(
-        _infested_terrans, estimates=(SPEED_UNKNOWN, "how long an infested terran lives: 480 loops")
-    ),
+    "infested_terrans": Skill(_infested_terrans, estimates=(SPEED_UNKNOWN, "An infested terran lives for 480 loops.")),
     "amorphous_armorcloud": Skill(_shroud),
 }
 FIELDS: Final = {

@@ -161,7 +161,7 @@ def _step(world: World, slot: int, x: float, y: float) -> None:
 
 
 SKILLS: Final = {
-    "spawn_larva": Skill(_inject, refuse=_is_hall, estimates=("how larvae wander",)),
+    "spawn_larva": Skill(_inject, refuse=_is_hall, estimates=("How larvae wander.",)),
 }
 FIELDS: Final = {"injected_larvae": _one_hatches}
 ENDS: Final = {INJECTED: _injection_is_over}

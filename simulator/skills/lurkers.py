@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from simulator.skills.basics import off_self, on_self
+from simulator import buffs
 from simulator.skills.skill import Skill
 
+if TYPE_CHECKING:
+    from simulator.casts import Cast
+    from simulator.world import World
+
+HELD = "LurkerHoldFireB"
+
+
+def _hold_fire(world: World, cast: Cast) -> None:
+    """Attack nobody without being told."""
+    buffs.apply(world, cast.slot, HELD, source=cast.slot)
+
+
+def _fire_at_will(world: World, cast: Cast) -> None:
+    """Attack whoever comes near again."""
+    buffs.remove(world, cast.slot, HELD)
+
+
 SKILLS: Final = {
-    "lurker_hold_fire": Skill(on_self("LurkerHoldFireB")),
-    "lurker_remove_hold_fire": Skill(off_self("LurkerHoldFireB")),
+    "lurker_hold_fire": Skill(_hold_fire),
+    "lurker_remove_hold_fire": Skill(_fire_at_will),
 }

@@ -104,9 +104,9 @@ def _contaminate(world: World, cast: Cast) -> None:
 
 
 SKILLS: Final = {
-    "generate_creep_on": Skill(_let_creep_fall, ready=_dry, estimates=("which cells the creep covers",)),
+    "generate_creep_on": Skill(_let_creep_fall, ready=_dry, estimates=("Which cells the creep covers.",)),
     "generate_creep_off": Skill(_stop_creep, ready=_generating),
-    "spawn_changeling": Skill(_spawn_changeling, estimates=("that enemies see a changeling as what it is",)),
+    "spawn_changeling": Skill(_spawn_changeling, estimates=("Enemies see a changeling as what it is.",)),
     "contaminate": Skill(_contaminate),
 }
 PASSIVES: Final = {CHANGELING: _disguise}

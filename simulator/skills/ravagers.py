@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.skills.skill import Skill, around, number, place_of
+from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -47,8 +47,6 @@ def _falls(world: World, item: Field) -> None:
 
 
 SKILLS: Final = {
-    "ravager_corrosive_bile": Skill(
-        _bile, estimates=("how long the bile falls after its two seconds in the air: 8 loops",)
-    ),
+    "ravager_corrosive_bile": Skill(_bile, estimates=("The bile falls for 8 loops after its two seconds in the air.",)),
 }
 FIELDS: Final = {"corrosive_bile": _falls}

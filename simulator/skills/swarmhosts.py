@@ -9,12 +9,12 @@ from simulator import buffs, commands
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
-from simulator.launchers import LAUNCHERS
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
-from simulator.placement import free_places
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
+from simulator.systems.placement import free_places
+from simulator.systems.weapons import LAUNCHERS
 
 if TYPE_CHECKING:
     from simulator.casts import Cast, Point
@@ -100,10 +100,10 @@ LAUNCHERS["LocustMPFlyingSwoopWeapon"] = _swoop_on
 SKILLS: Final = {
     "spawn_locusts_targeted": Skill(
         _spawn_locusts,
-        estimates=("where exactly the locusts hatch, and that they need no time to fall out of the host",),
+        estimates=("Where exactly the locusts hatch; they need no time to fall out of the host.",),
     ),
-    "locust_mp_flying_swoop": Skill(_swoop, estimates=("how fast a locust swoops down",)),
-    "locust_mp_flying_swoop_attack": Skill(_swoop, estimates=("how fast a locust swoops down",)),
+    "locust_mp_flying_swoop": Skill(_swoop, estimates=("How fast a locust swoops down.",)),
+    "locust_mp_flying_swoop_attack": Skill(_swoop, estimates=("How fast a locust swoops down.",)),
     "land_locust": Skill(_land),
 }
 FIELDS: Final = {"locust_ready": _ready, "swoop": _glides}

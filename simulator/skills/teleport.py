@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry, placement
+from simulator import geometry
+from simulator.systems import placement
 
 if TYPE_CHECKING:
     from simulator.casts import Point

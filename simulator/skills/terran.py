@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.damage import IMPACTS
 from simulator.skills import (
     buildings,
     cloaks,
@@ -22,6 +21,7 @@ from simulator.skills import (
     repair,
     starships,
 )
+from simulator.systems.damage import IMPACTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from simulator.casts import Cast
     from simulator.world import World
 
-SPEED_UNKNOWN = "how fast the missile flies"
+SPEED_UNKNOWN = "How fast the missile flies."
 
 
 def flight_loops(world: World, cast: Cast) -> int:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs, commands
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.damage import wound
 from simulator.fields import Field, source_slot
-from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
 from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
+from simulator.systems.damage import wound
+from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
     import numpy as np
@@ -191,9 +191,9 @@ def _ends_draining(world: World, cast: Cast) -> None:
 SKILLS: Final = {
     "blinding_cloud": Skill(_cloud),
     "yoink": Skill(
-        _reach_out, refuse=_can_pull, estimates=(SPEED_UNKNOWN, "how fast the victim is pulled: 20 per normal second")
+        _reach_out, refuse=_can_pull, estimates=(SPEED_UNKNOWN, "The victim is pulled by 20 per normal second.")
     ),
-    "parasitic_bomb": Skill(_bomb, estimates=(SPEED_UNKNOWN, "that its time begins after the delay of one second")),
+    "parasitic_bomb": Skill(_bomb, estimates=(SPEED_UNKNOWN, "Its time begins after a delay of one second.")),
     "viper_consume_structure": Skill(
         _consume, refuse=_can_consume, hold=_drains, end=_ends_draining, estimates=(SPEED_UNKNOWN,)
     ),

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 VERSIONS = ("4.10", "5.0.13")
 GENERATE, STOP = 1692, 1693
+FLAT = "{flat: [64, 64]}"
 
 
 def table(version: str) -> Any:
@@ -37,7 +38,7 @@ def mask(version: str, unit: str, stage: str) -> int:
 @pytest.fixture(params=VERSIONS)
 def ground(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any:
     """Level ground of each version, wide enough for all of a town hall's creep."""
-    return make_field("{flat: [64, 64]}", version=request.param)
+    return make_field(FLAT, version=request.param)
 
 
 def covered(field: Any) -> int:
@@ -130,6 +131,22 @@ def test_creep_quickens_zerg_on_the_ground(ground: Any, unit: str) -> None:
     ground.play(8)
     far_on, far_off = (math.dist(world.pos[slot], start[slot]) for slot in (on, off))
     assert far_on == pytest.approx(far_off * world.catalog.unit(unit).creep_factor, rel=1e-6)
+
+
+@pytest.mark.parametrize(("unit", "upgrade"), [("Hydralisk", "EvolveMuscularAugments"),
+                                               ("Ultralisk", "AnabolicSynthesis")])  # fmt: skip
+def test_an_upgrade_can_change_what_creep_does(make_field: Callable[..., Any], unit: str, upgrade: str) -> None:
+    field = make_field(FLAT, version="5.0.13")
+    slot = field.put(unit, 1, 32, 32)
+    change = next(
+        c for c in field.world.catalog.upgrade(upgrade).changes if (c.entry, c.field) == (unit, "SpeedMultiplierCreep")
+    )
+    plain = field.world.catalog.unit(unit).creep_factor
+    assert field.world.creep_factor[slot] == plain
+    field.research(1, upgrade)
+    expected = {"set": change.value, "add": plain + change.value, "subtract": plain - change.value}[change.op]
+    assert field.world.creep_factor[slot] == pytest.approx(expected)
+    assert expected != plain
 
 
 # structures that need it ----------------------------------------------------------------------------------------------

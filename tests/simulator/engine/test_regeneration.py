@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from simulator import commands, damage
+from simulator import commands
+from simulator.systems import damage
 
 
 def hit_once(field: Any, attacker: str, victim: int) -> None:
