@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.arrays import some
+from simulator.arrays import some, which
 from simulator.columns import NOBODY
 from simulator.skills import DEATHS, FINALS
 from simulator.world import Death
@@ -18,25 +18,33 @@ NO_KILLER = -1
 
 
 def bury(world: World) -> None:
-    """Remove every unit whose life is used up, in the order of slots."""
-    slots = world.live
-    dead = world.life.take(slots) <= 0.0
-    if not some(dead):
-        return
-    for slot in slots[dead].tolist():
-        attacker = int(world.attacker[slot])
-        killer = int(world.owner[attacker]) if attacker != NOBODY else NO_KILLER
-        name = world.unit_type(slot).name
-        if name in DEATHS:
-            DEATHS[name](world, slot)
-        if len(world.buffs):
-            _last_of_buffs(world, slot)
-        _note(world, slot, killer)
-        for passenger in world.passengers(slot):
-            world.life[passenger] = 0.0
-            _note(world, passenger, killer)
-            world.remove(passenger)
-        world.remove(slot)
+    """Remove every unit whose life is used up, in the order of slots, and whom their deaths kill in turn."""
+    killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
+    while True:
+        slots = world.live
+        dead = world.life.take(slots) <= 0.0
+        if not some(dead):
+            return
+        for slot in slots[dead].tolist():
+            _bury(world, slot, killers)
+
+
+def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
+    attacker, owner = int(world.attacker[slot]), int(world.owner[slot])
+    killer = int(world.owner[attacker]) if attacker != NOBODY else killers.get(slot, NO_KILLER)
+    name = world.unit_type(slot).name
+    if name in DEATHS:
+        DEATHS[name](world, slot)
+    if len(world.buffs):
+        _last_of_buffs(world, slot)
+    _note(world, slot, killer)
+    for passenger in world.passengers(slot):
+        world.life[passenger] = 0.0
+        _note(world, passenger, killer)
+        world.remove(passenger)
+    n = world.top
+    killers.update(dict.fromkeys(which((world.attacker[:n] == slot) & (world.life[:n] <= 0.0)).tolist(), owner))
+    world.remove(slot)
 
 
 def _last_of_buffs(world: World, slot: int) -> None:

@@ -278,6 +278,19 @@ def test_a_baneling_bursts_once(field: Any, name: str, how: str) -> None:
 
 
 @pytest.mark.usefixtures("peace")
+def test_banelings_set_each_other_off_and_are_credited_with_whom_they_kill(field: Any) -> None:
+    world = field.world
+    first, marine = field.put("Baneling", 1, 32, 32), field.put("Marine", 2, 33, 32)
+    enemy, own = field.put("Baneling", 2, 31, 32), field.put("Zergling", 1, 29.5, 32)
+    world.life[marine] = world.life[enemy] = world.life[own] = 5.0
+    commands.debug_kill(world, [world.tag_of(first)])
+    field.play(1)
+    assert not world.alive[[first, marine, enemy, own]].any()
+    assert world.players[1].score.killed_units == 2
+    assert world.players[2].score.killed_units == 1
+
+
+@pytest.mark.usefixtures("peace")
 def test_a_baneling_attacks_structures_when_it_is_told_to_look_for_them(field: Any) -> None:
     slot = field.put("Baneling", 1, 32, 32)
     assert field.why_not(slot, BUILDINGS_OFF) is Refusal.ERROR
