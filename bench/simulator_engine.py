@@ -21,7 +21,7 @@ from rich.table import Table
 
 from simulator import commands
 from simulator.maps import load_map
-from simulator.systems.placement import free_places
+from simulator.placement import free_places
 from simulator.systems.triggers import players_of
 from simulator.tick import advance, new_game
 from simulator.world import World

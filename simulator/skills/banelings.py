@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
+from simulator.damage import hit_with
 from simulator.refusal import Refusal
 from simulator.shots import Shot
 from simulator.skills.skill import Skill
-from simulator.systems.damage import hit_with
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability

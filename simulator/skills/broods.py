@@ -12,10 +12,10 @@ from simulator import commands
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
+from simulator.launchers import LAUNCHERS
 from simulator.mechanics import MECHANICS
+from simulator.placement import free_places
 from simulator.skills import teleport
-from simulator.systems.placement import free_places
-from simulator.systems.weapons import LAUNCHERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

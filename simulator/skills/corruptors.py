@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
+from simulator.damage import wound
 from simulator.skills.skill import Skill, gap, number
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field
 from simulator.skills import flight
 from simulator.skills.skill import Skill, distance, number
 from simulator.stats import ATTRIBUTES
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number, place_of
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.skills import flight
 from simulator.skills.drops import dropping
 from simulator.skills.skill import Skill, around, distance, number
-from simulator.systems.damage import wound
 from simulator.targets import disengage
 
 if TYPE_CHECKING:

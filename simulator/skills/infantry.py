@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.mechanics import MECHANICS
 from simulator.skills.basics import on_self
 from simulator.skills.skill import Skill, around, number, place_of
-from simulator.systems.damage import wound
 from simulator.traits import Layer
 
 if TYPE_CHECKING:

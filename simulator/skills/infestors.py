@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.orders import OrderKind
+from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, gap, number, place_of
 from simulator.skills.throws import SPEED_UNKNOWN, throw
-from simulator.systems.damage import wound
-from simulator.systems.placement import free_places
 from simulator.targets import disengage
 
 if TYPE_CHECKING:

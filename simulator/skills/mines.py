@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills import flight
 from simulator.skills.skill import Skill, around, number
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast, Point

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator.casts import Cast
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.skills.drops import dropping
 from simulator.skills.skill import Skill, around, number
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.skills.skill import FieldRule

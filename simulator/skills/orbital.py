@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs, commands
 from simulator.columns import NOBODY
 from simulator.fields import Field
+from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
-from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.skills.skill import Skill, around, number, place_of
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast

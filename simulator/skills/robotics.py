@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.skills.skill import Skill, around, number, place_of
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, geometry
+from simulator import buffs, geometry, placement
 from simulator.columns import NOBODY
 from simulator.fields import Field, source_slot
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, friends, number, place_of
 from simulator.stats import ATTRIBUTES, GROUND_PLANE
-from simulator.systems import placement
 
 if TYPE_CHECKING:
     from simulator.casts import Cast

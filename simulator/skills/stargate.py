@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, targets
+from simulator import buffs, commands, placement, targets
 from simulator.columns import NOBODY
 from simulator.fields import Field, source_slot
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
-from simulator.systems import placement
 
 if TYPE_CHECKING:
     import numpy as np

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.refusal import Refusal
 from simulator.skills import flight, teleport
 from simulator.skills.skill import Skill, gap, number
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast

@@ -9,12 +9,12 @@ from simulator import buffs, commands
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
+from simulator.launchers import LAUNCHERS
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
+from simulator.placement import free_places
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
-from simulator.systems.placement import free_places
-from simulator.systems.weapons import LAUNCHERS
 
 if TYPE_CHECKING:
     from simulator.casts import Cast, Point

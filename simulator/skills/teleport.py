@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
-from simulator.systems import placement
+from simulator import geometry, placement
 
 if TYPE_CHECKING:
     from simulator.casts import Point

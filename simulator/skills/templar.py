@@ -13,11 +13,11 @@ import numpy as np
 from simulator import buffs, commands
 from simulator.arrays import which
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, around, number, place_of
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.casts import Cast

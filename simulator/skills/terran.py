@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator.damage import IMPACTS
 from simulator.skills import (
     buildings,
     cloaks,
@@ -21,7 +22,6 @@ from simulator.skills import (
     repair,
     starships,
 )
-from simulator.systems.damage import IMPACTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, commands
+from simulator import buffs, commands, placement
 from simulator.arrays import which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
@@ -24,7 +24,6 @@ from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap
-from simulator.systems import placement
 
 if TYPE_CHECKING:
     from collections.abc import Callable

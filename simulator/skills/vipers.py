@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs, commands
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.fields import Field, source_slot
+from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
 from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
-from simulator.systems.damage import wound
-from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
     import numpy as np

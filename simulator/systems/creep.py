@@ -13,8 +13,8 @@ import numpy as np
 from simulator import buffs
 from simulator.columns import NOBODY
 from simulator.creep import GENERATING, spreads
+from simulator.damage import wound
 from simulator.mechanics import MECHANICS
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from simulator.catalog import Catalog

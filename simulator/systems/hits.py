@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simulator import damage
 from simulator.arrays import some
 from simulator.columns import NOBODY
 from simulator.shots import shot_of
-from simulator.systems import damage, missiles, sweeps
+from simulator.systems import missiles, sweeps
 
 if TYPE_CHECKING:
     from simulator.world import World

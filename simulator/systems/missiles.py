@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import damage, geometry
 from simulator.arrays import some, which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.shots import Shot, shot_of
 from simulator.stats import INSTANT_ACCELERATION_N
-from simulator.systems import damage
 
 if TYPE_CHECKING:
     from simulator.records import Hit

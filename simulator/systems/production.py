@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, casting, commands, production, supply
+from simulator import buffs, casting, commands, placement, production, supply
 from simulator.columns import NOBODY
 from simulator.skills import carrier
-from simulator.systems import placement
 
 if TYPE_CHECKING:
     from simulator.production import Job

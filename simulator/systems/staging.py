@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from simulator import casting, commands, melee
+from simulator.placement import free_places
 from simulator.places import Column, Grid, RandomPlace, kind_of_place
 from simulator.players import NEUTRAL, GameResult
 from simulator.scenario import MELEE_MINERALS
 from simulator.script import AddScore, Create, Draw, Give, Order, Regroup, Remove, Result, Select, Spawn
-from simulator.systems.placement import free_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import damage, geometry
 from simulator.arrays import which
 from simulator.columns import NOBODY
 from simulator.shots import Sweep
-from simulator.systems import damage
 
 if TYPE_CHECKING:
     from simulator import records

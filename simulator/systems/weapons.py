@@ -16,6 +16,7 @@ from simulator import geometry
 from simulator.arrays import some, which
 from simulator.census import census
 from simulator.columns import NOBODY
+from simulator.launchers import LAUNCHERS
 from simulator.stats import GROUND_PLANE
 
 if TYPE_CHECKING:
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
 
 NOT_STARTED = -1.0
 LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadiusLarge
-
-LAUNCHERS: Final[dict[str, Callable[[World, int, int], None]]] = {}
-"""What happens at the damage point of a weapon that launches units: a function of the world, attacker and target."""
 
 
 def fire(world: World) -> None:

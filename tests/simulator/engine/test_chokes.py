@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from simulator import commands
-from simulator.systems.placement import free_places
+from simulator.placement import free_places
 from simulator.traits import Layer
 
 if TYPE_CHECKING:

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands
+from simulator import commands, damage
 from simulator.catalog import load_catalog
 from simulator.stats import ATTRIBUTES, Stats, bit_set
-from simulator.systems import damage
 
 if TYPE_CHECKING:
     from collections.abc import Callable

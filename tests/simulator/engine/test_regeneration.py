@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
-from simulator.systems import damage
+from simulator import commands, damage
 
 
 def hit_once(field: Any, attacker: str, victim: int) -> None:

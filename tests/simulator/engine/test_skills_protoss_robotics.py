@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
+from simulator.damage import wound
 from simulator.refusal import Refusal
-from simulator.systems.damage import wound
 
 VERSIONS = ("4.10", "5.0.13")
 NOVA, SURVEY, OBSERVE, PHASE, TRANSPORT = 2346, 3741, 3739, 1528, 1530

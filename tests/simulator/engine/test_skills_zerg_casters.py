@@ -9,9 +9,9 @@ import pytest
 
 from simulator import buffs, commands, tick
 from simulator.columns import NOBODY
+from simulator.damage import wound
 from simulator.refusal import Refusal
 from simulator.systems import acquire
-from simulator.systems.damage import wound
 
 if TYPE_CHECKING:
     from collections.abc import Callable

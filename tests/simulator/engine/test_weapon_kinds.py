@@ -10,7 +10,7 @@ import pytest
 
 from simulator import commands
 from simulator.armament import set_weapon
-from simulator.systems import weapons
+from simulator.launchers import LAUNCHERS
 
 
 def dummy(field: Any, name: str, x: float, y: float, owner: int = 2) -> int:
@@ -319,7 +319,7 @@ def test_a_unit_that_may_not_attack_does_not(field: Any) -> None:
 def test_a_weapon_that_launches_units_calls_its_launcher(field: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     target = dummy(field, "SpineCrawler", 15, 16)
     launched: list[tuple[int, int]] = []
-    monkeypatch.setitem(weapons.LAUNCHERS, "BroodlingStrike", lambda _, source, aim: launched.append((source, aim)))
+    monkeypatch.setitem(LAUNCHERS, "BroodlingStrike", lambda _, source, aim: launched.append((source, aim)))
     lord = shot_at(field, "BroodLord", 8, target)
     one_shot(field, lord)
     assert launched == [(lord, target)]

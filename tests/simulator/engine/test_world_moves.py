@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from simulator import commands
 from simulator.maps import load_map
-from simulator.systems.placement import free_places
+from simulator.placement import free_places
 from simulator.tick import advance, new_game
 from simulator.traits import Layer
 
