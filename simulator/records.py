@@ -170,8 +170,9 @@ class UnitType:
     """A unit type; ``row`` is its index in ``Catalog.units``, ``id`` the number that the API uses.
 
     ``cost`` is cumulative (a Baneling's includes its Zergling), as the API tells it; what one production charges
-    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type that
-    is ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast of their own accord.
+    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type
+    that is ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast of their own
+    accord.
     """
 
     row: int

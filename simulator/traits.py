@@ -12,7 +12,7 @@ from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
-from simulator.targets import measure_reach
+from simulator.targets import disengage, engage, measure_reach, weapon_for
 
 if TYPE_CHECKING:
     from simulator.buffs import Buff
@@ -77,7 +77,18 @@ def body_traits(world: World, slot: int) -> None:
         world.can_attack[slot] = world.acquires[slot] = False
     if world.carrier[slot] != NOBODY:
         _sheltered(world, slot)
-    if world.weapon[slot] >= 0:
+    if world.target[slot] != NOBODY:
+        _rearm(world, slot, int(world.target[slot]))
+
+
+def _rearm(world: World, slot: int, target: int) -> None:
+    """Go on with a fight as the unit is armed now: another weapon, another range, or none any more."""
+    row = weapon_for(world, slot, target)
+    if row < 0:
+        disengage(world, slot)
+    elif int(world.weapon[slot]) not in (row, int(world.close_weapon[slot])):
+        engage(world, slot, target)
+    else:
         measure_reach(world, slot)
 
 

@@ -55,10 +55,13 @@ def _face_targets(world: World) -> None:
     turning &= ~world.turreted.take(fighters)
     turning &= ~world.wants.take(fighters)
     slots = fighters[turning]
-    if slots.size:
+    if not slots.size:
+        return
+    facing, wanted = world.heading.take(slots, 0), world.toward.take(slots, 0)
+    if np.count_nonzero(facing != wanted):
         world.heading[slots] = geometry.turn_towards(
-            world.heading.take(slots, 0),
-            world.toward.take(slots, 0),
+            facing,
+            wanted,
             world.turn_still_cos.take(slots),
             world.turn_still_sin.take(slots),
         )

@@ -199,9 +199,20 @@ def test_a_weapon_that_is_off_can_be_switched_on(field: Any) -> None:
         field.play(1)
     assert world.life[target] == 35 - (15 + 7)
     set_weapon(world, oracle, "Oracle", on=False)
-    commands.stop(world, [oracle])
-    field.play(20)
-    assert world.life[target] > 0
+    before = float(world.life[target])
+    field.play(30)
+    assert world.life[target] == before
+    assert world.target[oracle] == -1
+
+
+def test_a_unit_that_changes_its_form_in_a_fight_goes_on_with_its_new_weapon(field: Any) -> None:
+    world = field.world
+    target = dummy(field, "Marauder", 16, 16)
+    tank = shot_at(field, "SiegeTank", 8, target)
+    one_shot(field, tank)
+    world.become(tank, world.catalog.unit("SiegeTankSieged"))
+    assert world.catalog.weapons[int(world.weapon[tank])].id == "CrucioShockCannon"
+    assert world.reach[tank] == 13
 
 
 def test_a_phoenix_fires_at_what_it_passes_and_flies_on(field: Any) -> None:
