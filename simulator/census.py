@@ -24,6 +24,7 @@ class Census:
     guns_walking: bool  # and at what the unit passes
     gliders: bool  # flyers that need time to stop
     brakers: bool  # anybody who does
+    pushovers: bool  # units of less push priority than the ordinary
     picky: bool  # units that can't aim at what is near, or do not aim at structures
 
     @classmethod
@@ -39,6 +40,7 @@ class Census:
             guns_walking=bool(world.guns_walking[slots].any()),
             gliders=bool(world.glides[slots].any()),
             brakers=bool(np.isfinite(world.step_loss[slots]).any()),
+            pushovers=bool((world.lightness[slots] != 1.0).any()),
             picky=bool(world.spares_structures[slots].any() or (world.least_range[slots] > 0.0).any()),
         )
 

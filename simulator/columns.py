@@ -135,6 +135,7 @@ class UnitColumns:
     radius: Floats = trait(float)  # body for ranges
     separation: Floats = trait(float)  # body for pushing
     clearance: Floats = trait(float)  # body for cliffs
+    lightness: Floats = trait(float, 1)  # how much more easily it is pushed than an ordinary unit
     layer: Ints = trait(int)  # Layer the unit moves on
     layer_bits: Ints = trait(int)  # stats.LAYERS it collides in
     plane_bits: Ints = trait(int)  # planes on which it can be hit

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 INSTANT_TURN_DEG: Final = 180.0
+ORDINARY_PUSH: Final = 10  # push priority of every type but the wild animals
 BUNKER: Final = "Bunker"
 DISGUISE: Final = "Changeling"  # types that look armed and are not
 
@@ -47,6 +48,7 @@ def body_traits(world: World, slot: int) -> None:
     world.radius[slot] = unit.radius
     world.separation[slot] = unit.separation
     world.clearance[slot] = min(unit.separation if unit.inner is None else unit.inner, MECHANICS.body_clearance)
+    world.lightness[slot] = ORDINARY_PUSH / unit.push
     world.layer[slot] = layer_of(unit)
     world.layer_bits[slot] = 0 if world.harvest[slot] or unit.underfoot else world.stats.layer_bits[unit.row]
     world.plane_bits[slot] = world.stats.plane_bits[unit.row]

@@ -17,6 +17,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.arrays import some, which
+from simulator.census import census
 from simulator.columns import NOBODY
 from simulator.contacts import OVERLAP_ALLOWED, Bodies, Pairs
 from simulator.mechanics import MECHANICS
@@ -180,14 +181,16 @@ def _left(world: World, slots: Ints) -> Floats:
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
     """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
     firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
+    if census(world).pushovers:
+        firm *= world.lightness.take(slots)
     immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
     if some(immobile):
         firm[immobile] = IMMOBILE_YIELDING
     idle = world.target.take(slots) == NOBODY
     if not some(idle):
         return firm, None
-    idle &= firm == MECHANICS.push_firm
-    return firm, np.where(idle, MECHANICS.push_idle, firm)
+    idle &= ~world.wants.take(slots) & ~immobile
+    return firm, np.where(idle, MECHANICS.push_idle * world.lightness.take(slots), firm)
 
 
 def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:

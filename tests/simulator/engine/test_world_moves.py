@@ -217,3 +217,15 @@ def test_bodies_hardly_overlap_even_in_battle(name: str) -> None:
         advance(world)
         deepest = max(deepest, deepest_overlap(world))
     assert deepest < 0.15
+
+
+def test_a_unit_of_less_push_priority_gives_way_further(field: Any) -> None:
+    """Of two bodies that stand in each other the wild animal, of priority 5, goes twice as far."""
+    world = field.world
+    dog, zealot = field.put("Dog", 1, 16, 16), field.put("Zealot", 1, 16.4, 16)
+    world.separation[[dog, zealot]] = 0.3
+    world.bodies = None
+    field.play(30)
+    went = 16 - float(world.pos[dog, 0]), float(world.pos[zealot, 0]) - 16.4
+    assert sum(went) == pytest.approx(0.2, abs=0.01)
+    assert went[0] == pytest.approx(2 * went[1], rel=0.05)
