@@ -205,8 +205,8 @@ def crowd(task: TaskConfig, agents: int) -> TaskConfig:
 
 def _card(run: str, task: TaskConfig) -> Run:
     return Run(
-        run=run, task=task.name, map_name=task.map_spec.name, map_sha256="", seed=0, episodes=1, game="none", executor="raw",
-        clock=task.clock, agents=(), catalogue_sha256="", versions={},
+        run=run, task=task.name, map_name=task.map_spec.name, map_sha256="", seed=0, episodes=1, game="none",
+        executor="raw", clock=task.clock, agents=(), catalogue_sha256="", versions={},
     )  # fmt: skip
 
 

@@ -15,9 +15,7 @@ _UNITS: dict[int, str] = {
     int(member): member.name for race in (units.Neutral, units.Protoss, units.Terran, units.Zerg) for member in race
 }
 _COPIES = ("Colossus", "Stalker", "Zealot", "Marauder", "Marine", "Medivac", "Baneling", "Zergling", "Hydralisk")
-_UNITS |= dict(
-    enumerate(_COPIES, start=1962)
-)  # on SMAC's maps, in the simulator's numbers; PySC2's end there
+_UNITS |= dict(enumerate(_COPIES, start=1962))  # on SMAC's maps, in the simulator's numbers; PySC2's end there
 _BUFFS: dict[int, str] = {int(member): member.name for member in buffs.Buffs}
 _UPGRADES: dict[int, str] = {int(member): member.name for member in upgrades.Upgrades}
 _FORM = re.compile(r"_(pt|unit|quick|autocast)$")  # how a raw function takes its target

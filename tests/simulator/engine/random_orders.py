@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import casting
 from simulator.abilities import Aim
 from simulator.api import abilities
 from simulator.maps import load_map
