@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 ANYWHERE: Final = 500.0
 ORDINARY: Final = frozenset({"smart", "stop", "move", "patrol", "hold_position", "scan_move", "attack"})
 """What ``commands`` carries out; everything else is a skill."""
+WALKS: Final = frozenset({"move", "patrol", "hold_position", "scan_move"})
 MORPHS: Final = frozenset({"morph", "grow", "root", "burrow_tumor", "lift", "land"})
 """Abilities whose time, or a random part of it, passes before they take effect."""
 PAID_FIRST: Final = frozenset({"grow"})
@@ -69,7 +70,7 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
     if not is_modelled(ability):
         return Refusal.NOT_SUPPORTED
     if ability.does in ORDINARY:
-        return Refusal.SUCCESS if world.build_progress[slot] >= 1.0 else Refusal.BUILDING_IS_UNDER_CONSTRUCTION
+        return _ordinary_refusal(world, slot, ability)
     why = _unready(world, slot, ability)
     return why if free or why is not Refusal.SUCCESS else _unaffordable(world, slot, ability)
 
@@ -83,6 +84,13 @@ def _unready(world: World, slot: int, ability: Ability) -> Refusal:
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
         return Refusal.TECH_REQUIREMENTS_NOT_MET
     return Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
+
+
+def _ordinary_refusal(world: World, slot: int, ability: Ability) -> Refusal:
+    if world.build_progress[slot] < 1.0:
+        return Refusal.BUILDING_IS_UNDER_CONSTRUCTION
+    stuck = ability.does in WALKS and not commands.can_move(world, slot)
+    return Refusal.UNIT_CANT_MOVE if stuck else Refusal.SUCCESS
 
 
 def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import commands, supply
+from simulator import casting, commands, supply
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND, load_catalog
 from simulator.columns import NOBODY
-from simulator.orders import OrderKind
+from simulator.orders import MOVE, OrderKind
 from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -140,10 +140,12 @@ def test_burrowed_roaches_heal_and_walk_with_their_upgrade(make_field: Callable[
     world, slot = field.world, field.put("RoachBurrowed", 1, *CENTRE)
     world.life[slot] = 50.0
     assert commands.move(world, [slot], (40.0, 32.5)) == []
+    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is Refusal.UNIT_CANT_MOVE
     field.play(32)
     healed = world.catalog.unit("RoachBurrowed").life_regen_n / LOOPS_PER_NORMAL_SECOND * 32
     assert world.life[slot] == pytest.approx(50.0 + healed)
     field.research(1, "TunnelingClaws")
+    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is Refusal.SUCCESS
     assert commands.move(world, [slot], (40.0, 32.5)) == [slot]
     field.play(32)
     claws = next(c.value for c in world.catalog.upgrade("TunnelingClaws").changes if c.field == "Speed")
