@@ -132,8 +132,11 @@ def distance(world: World, slot: int, point: Point) -> float:
 
 def nearest_hurt(world: World, slot: int, reach: float, attribute: int) -> list[int]:
     """The owner's other units with an attribute (bit) that lack life, within reach of a unit, the nearest first."""
-    friends = world.units_of(int(world.owner[slot]))
-    fits = (world.life[friends] < world.life_max[friends]) & (friends != slot) & (world.build_progress[friends] >= 1.0)
+    hurt = world.live[world.life[world.live] < world.life_max[world.live]]
+    friends = hurt[world.owner[hurt] == world.owner[slot]]
+    if not friends.size:
+        return []
+    fits = (friends != slot) & (world.build_progress[friends] >= 1.0)
     fits &= (world.stats.attribute_bits[world.type[friends]] & attribute) != 0
     friends = friends[fits]
     offset = world.pos[friends] - world.pos[slot]
