@@ -354,7 +354,7 @@ def test_repair_puts_a_fire_out(field: Any) -> None:
 def test_structures_of_others_do_not_burn(field: Any, name: str) -> None:
     world = field.world
     slot = field.put(name, 1, 10.5, 10.5)
-    world.creep[:] = True
+    world.growth.paint(0, 0, 32, 32)
     world.life[slot] = 100.0
     field.play(60)
     assert world.life[slot] >= 100.0

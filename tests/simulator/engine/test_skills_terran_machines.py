@@ -212,9 +212,8 @@ def test_a_mine_hurts_who_is_beside_its_target_but_no_structure_and_no_mine_of_i
     radius = world.catalog.unit(name).radius
     other = still(field, name, owner, 15, 10 + numbers["splash_radius"] + radius - 0.1)
     world.autocast.pop(other, None)
-    creep = world.creep if name == "SpineCrawler" else None
-    if creep is not None:
-        creep[:] = True
+    if name == "SpineCrawler":
+        world.growth.paint(0, 0, 32, 32)
     before = world.life[other]
     until(field, lambda: world.life[victim] < 500)
     assert before - world.life[other] == (numbers["splash_damage"] if hurt else 0)

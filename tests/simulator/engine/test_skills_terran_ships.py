@@ -162,7 +162,7 @@ def test_a_liberator_fires_only_at_who_touches_its_zone(field: Any, y: float, *,
 
 @pytest.mark.parametrize("name", ["Mutalisk", "SpineCrawler"])
 def test_a_liberator_on_guard_spares_flyers_and_structures(field: Any, name: str) -> None:
-    field.world.creep[:] = True
+    field.world.growth.paint(0, 0, 32, 32)
     guarding(field)
     victim = still(field, name, 2, 14, 10)
     life = field.world.life[victim]
