@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from simulator.opponent import melee
 from simulator.opponent.levels import level_of
+from simulator.opponent.plans import PLANS
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -25,5 +26,6 @@ def _led(world: World) -> list[int]:
     specs = world.map.scenario.players
     return [
         player.id for player in world.players[1:]
-        if player.control == "computer" and player.id in specs and specs[player.id].ai == "melee"
+        if player.control == "computer" and player.race in PLANS and player.id in specs
+        and specs[player.id].ai == "melee"
     ]  # fmt: skip

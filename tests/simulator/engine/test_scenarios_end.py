@@ -28,8 +28,9 @@ def kill(world: World, player: int, *names: str, leave: int = 0) -> None:
 
 
 def calm(name: str) -> World:
-    """A game in which nobody has a weapon that he would use."""
+    """A game in which nobody has a weapon that he would use, and no computer player makes anything new."""
     world = new_game(load_map(name))
+    world.opponents = ()
     world.stats.range[:] = -100.0
     world.stats.scan[:] = -100.0
     for slot in world.live.tolist():
