@@ -195,12 +195,18 @@ def test_a_charge_throws_units_away_from_it_by_its_distance(field: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["Ultralisk", "Bunker", "Larva"])
-def test_a_charge_does_not_move_what_is_massive_built_or_a_larva(field: Any, name: str) -> None:
+def test_a_charge_does_not_throw_what_is_massive_built_or_a_larva(field: Any, name: str) -> None:
+    world = field.world
+    world.growth.paint(0, 0, 32, 32)
     reaper, victim = still(field, "Reaper", 1, 10, 10), still(field, name, 2, 15.5, 10.5)
-    place = field.world.pos[victim].tolist()
+    before = world.life[victim]
     field.order(reaper, KD8, point=(14, 10))
-    field.play(32 + MECHANICS.knockback_loops + 2)
-    assert math.dist(field.world.pos[victim].tolist(), place) < 1.0
+    for _ in field.loops(40):
+        if world.life[victim] < before:
+            break
+    assert world.life[victim] < before
+    assert not buffs.has(world, victim, "ReaperKD8Knockback")
+    assert not [item for item in world.fields if item.does == "knockback"]
 
 
 def test_a_charge_is_a_body_that_nobody_can_touch_and_is_gone_with_its_explosion(field: Any) -> None:
