@@ -13,6 +13,7 @@ import numpy as np
 from simulator import power
 from simulator.columns import NOBODY
 from simulator.orders import OrderKind
+from simulator.placement import snapped
 from simulator.players import NEUTRAL
 from simulator.refusal import Refusal
 
@@ -27,12 +28,6 @@ CAPS: Final = "Footprint3x3CappedGeyser"
 ON_GEYSER: Final = 0.5  # how far from a geyser's middle a gas structure may be asked for
 
 
-def snapped(point: Point, footprint: Footprint) -> Point:
-    """The centre nearest to ``point`` at which a footprint lies on the grid of cells."""
-    x, y = (round(v - s / 2.0) + s / 2.0 for v, s in zip(point, footprint.size, strict=True))
-    return x, y
-
-
 def footprint_of(world: World, unit: UnitType) -> Footprint | None:
     """The cells that a structure needs; for an add-on those of its own only."""
     name = unit.footprint if "AddOn" in unit.placement else unit.placement or unit.footprint
@@ -43,7 +38,7 @@ def footprint_of(world: World, unit: UnitType) -> Footprint | None:
 def centre(world: World, unit: UnitType, point: Point) -> Point:
     """Where exactly a structure that is asked for at a point would stand."""
     footprint = footprint_of(world, unit)
-    return point if footprint is None else snapped(point, footprint)
+    return point if footprint is None else snapped(point, footprint.size)
 
 
 def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
@@ -54,7 +49,7 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
     if footprint.id == CAPS:
         free = geyser_at(world, point)
         return Refusal.SUCCESS if free != NOBODY else Refusal.CANT_BUILD_LOCATION_INVALID
-    x, y = snapped(point, footprint)
+    x, y = snapped(point, footprint.size)
     cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
     return (
         _of_ground(world, player, footprint, cells)

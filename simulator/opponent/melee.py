@@ -18,6 +18,7 @@ from simulator.mechanics import MECHANICS
 from simulator.opponent.levels import level_of
 from simulator.opponent.plans import PLANS
 from simulator.orders import OrderKind
+from simulator.placement import snapped
 from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -205,7 +206,7 @@ def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | N
     live = world.live
     fields = world.pos[live[resources[world.type[live]]]]
     for dx, dy in _spiral():
-        x, y = sites.snapped((float(centre[0] + dx), float(centre[1] + dy)), footprint)
+        x, y = snapped((float(centre[0] + dx), float(centre[1] + dy)), footprint.size)
         between = fields.size and float(np.hypot(fields[:, 0] - x, fields[:, 1] - y).min()) < NEAREST_SITE
         roomy = not between and _has_margin(world, (x, y), footprint.size)
         if roomy and sites.refusal(world, player, unit, (x, y)) is Refusal.SUCCESS:
