@@ -121,6 +121,7 @@ PASSIVES: Final[dict[str, UnitRule]] = _joined(
     transports.PASSIVES,
     carrier.PASSIVES,
     zerg.PASSIVES,
+    warpgate.PASSIVES,
 )
 SMARTS: Final[tuple[SmartRule, ...]] = (
     *construction.SMARTS,

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     from simulator.abilities import Ability
     from simulator.casts import Cast, Point
     from simulator.records import UnitType
+    from simulator.skills.skill import UnitRule
     from simulator.world import World
 
 FAST_LOOPS: Final = 80.0
+TIMER: Final = "WarpGateTrain"
 
 
 def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
@@ -68,6 +70,17 @@ def _is_free(world: World, unit: UnitType, point: Point) -> bool:
     return not bool((offset[:, 0] ** 2 + offset[:, 1] ** 2 < apart**2).any())
 
 
+def _hurry(world: World, slots: list[int]) -> None:
+    """Let a gate be ready sooner as long as its work passes faster, as under Chrono Boost."""
+    if not len(world.buffs):
+        return
+    for slot in slots:
+        waits, rate = world.timers.get(slot, {}), float(world.work_rate[slot])
+        if rate != 1.0 and waits.get(TIMER, 0.0) > world.loop:
+            waits[TIMER] -= rate - 1.0
+
+
+PASSIVES: Final[dict[str, UnitRule]] = {"WarpGate": _hurry}
 SKILLS: Final = {
     "warp_in": Skill(
         give=_warp_in,
@@ -75,7 +88,6 @@ SKILLS: Final = {
         estimates=(
             "Of several Warp Gates the first that is ready warps in.",
             "A unit that is being warped in has all its life and shields from the beginning.",
-            "Chrono Boost does not shorten the time between two warp-ins of a gate.",
         ),
     )
 }

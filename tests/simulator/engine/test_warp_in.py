@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting, supply
+from simulator.buffs import apply
 from simulator.casts import Cast
 from simulator.catalog import load_catalog
 from simulator.refusal import Refusal
@@ -74,6 +75,16 @@ def test_the_gate_is_ready_again_after_the_time_of_the_unit(gate: Gate, number: 
     assert casting.refusal(gate.world, gate.slot, ability) is Refusal.COOLDOWN
     gate.field.play(1)
     assert casting.refusal(gate.world, gate.slot, ability) is Refusal.SUCCESS
+
+
+def test_chrono_boost_makes_the_gate_ready_sooner(gate: Gate) -> None:
+    gate.warp(ZEALOT, (50.0, 47.0))
+    apply(gate.world, gate.slot, "ChronoBoostEnergyCost")
+    ready = CATALOG.ability(ZEALOT)
+    for loop in gate.field.loops(448):
+        if casting.refusal(gate.world, gate.slot, ready) is Refusal.SUCCESS:
+            break
+    assert loop - 1 == pytest.approx(448 / 1.5, abs=1.5)
 
 
 @pytest.mark.parametrize(
