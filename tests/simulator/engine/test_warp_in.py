@@ -81,10 +81,9 @@ def test_chrono_boost_makes_the_gate_ready_sooner(gate: Gate) -> None:
     gate.warp(ZEALOT, (50.0, 47.0))
     apply(gate.world, gate.slot, "ChronoBoostEnergyCost")
     ready = CATALOG.ability(ZEALOT)
-    for loop in gate.field.loops(448):
-        if casting.refusal(gate.world, gate.slot, ready) is Refusal.SUCCESS:
-            break
-    assert loop - 1 == pytest.approx(448 / 1.5, abs=1.5)
+    loops = gate.field.loops(448)
+    done = next(loop for loop in loops if casting.refusal(gate.world, gate.slot, ready) is Refusal.SUCCESS)
+    assert done - 1 == pytest.approx(448 / 1.5, abs=1.5)
 
 
 @pytest.mark.parametrize(
