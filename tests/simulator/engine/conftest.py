@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, commands
+from simulator import buffs, casting, commands
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, load_catalog
 from simulator.columns import NOBODY
@@ -53,6 +53,15 @@ class Field:
             self._paint_creep(x, y)
         return self.world.spawn(unit, owner, (x, y), facing)
 
+    def still(self, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
+        """Put a unit that stays where it is and fights nobody."""
+        slot = self.put(name, owner, x, y)
+        self.world.looks_around[slot] = False
+        buffs.apply(self.world, slot, "LurkerHoldFireB")
+        if energy is not None:
+            self.world.energy[slot] = energy
+        return slot
+
     def _paint_creep(self, x: float, y: float) -> None:
         """Put creep under the middle of a structure, so that it does not wither."""
         covered = self.world.growth.covered.copy()
@@ -88,6 +97,13 @@ class Field:
         for _ in range(count):
             advance(self.world)
             yield self.world.loop
+
+    def until(self, holds: Callable[[], object], most: int = 500) -> int:
+        """Play until something holds; the loop at which it did."""
+        for loop in self.loops(most):
+            if holds():
+                return loop
+        pytest.fail(f"not within {most} loops")
 
     def vitals(self, slot: int) -> float:
         return float(self.world.life[slot] + self.world.shields[slot])

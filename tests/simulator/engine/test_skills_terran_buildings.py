@@ -30,22 +30,6 @@ def foggy(request: pytest.FixtureRequest, make_field: Any) -> Any:
     return make_field(version=request.param, fog=True)
 
 
-def still(field: Any, name: str, owner: int, x: float, y: float) -> int:
-    """A unit that stays where it is and fights nobody."""
-    slot: int = field.put(name, owner, x, y)
-    field.world.looks_around[slot] = False
-    buffs.apply(field.world, slot, "LurkerHoldFireB")
-    return slot
-
-
-def until(field: Any, holds: Any, most: int = 500) -> int:
-    """Play until something holds; the loop at which it did."""
-    for loop in field.loops(most):
-        if holds():
-            return int(loop)
-    pytest.fail(f"not within {most} loops")
-
-
 def orbital(field: Any) -> int:
     slot: int = field.put("OrbitalCommand", 1, 5.5, 5.5)
     field.world.energy[slot] = 60.0
@@ -57,7 +41,7 @@ def orbital(field: Any) -> int:
 
 def test_a_sweep_shows_what_is_cloaked_in_its_circle_for_its_time(foggy: Any) -> None:
     world, ability = foggy.world, foggy.world.catalog.ability(SCAN)
-    slot, hidden = orbital(foggy), still(foggy, "DarkTemplar", 2, 26, 26)
+    slot, hidden = orbital(foggy), foggy.still("DarkTemplar", 2, 26, 26)
     foggy.play(5)
     assert not world.visible[1, hidden]
     assert foggy.order(slot, SCAN, point=(24, 24))
@@ -90,11 +74,11 @@ def test_a_mule_comes_down_after_its_delay_and_lives_its_time(field: Any) -> Non
     world, ability = field.world, field.world.catalog.ability(MULE)
     slot = orbital(field)
     assert field.order(slot, MULE, point=(20, 20))
-    landed = until(field, lambda: any(world.unit_type(s).name == "MULE" for s in world.live.tolist()))
+    landed = field.until(lambda: any(world.unit_type(s).name == "MULE" for s in world.live.tolist()))
     assert landed == ability.numbers["delay_loops"]
     mule = next(s for s in world.live.tolist() if world.unit_type(s).name == "MULE")
     assert world.owner[mule] == 1
-    gone = until(field, lambda: not world.alive[mule], 1500)
+    gone = field.until(lambda: not world.alive[mule], 1500)
     lasts = ability.numbers["duration_loops"]
     assert lasts <= gone - landed <= lasts + ability.numbers["duration_random_loops"] + 1
     assert [(a.player, a.name) for a in world.alerts] == [(1, "MULEExpired")]
@@ -110,7 +94,7 @@ def test_a_mule_is_called_onto_minerals_that_it_mines(field: Any) -> None:
 
 
 def test_a_mule_is_not_called_onto_units_or_into_the_fog(foggy: Any) -> None:
-    slot, marine = orbital(foggy), still(foggy, "Marine", 1, 12, 5)
+    slot, marine = orbital(foggy), foggy.still("Marine", 1, 12, 5)
     foggy.play(5)
     assert foggy.why_not(slot, MULE, marine) is Refusal.MUST_TARGET_RESOURCES
     assert foggy.why_not(slot, MULE, point=(29, 29)) is Refusal.MUST_TARGET_VISIBLE_LOCATION
@@ -139,7 +123,7 @@ def test_extra_supplies_arrive_once_per_depot(field: Any) -> None:
 
 
 def worker(field: Any, x: float, y: float, minerals: float = 500, vespene: float = 500) -> int:
-    slot = still(field, "SCV", 1, x, y)
+    slot: int = field.still("SCV", 1, x, y)
     field.world.players[1].minerals, field.world.players[1].vespene = minerals, vespene
     return slot
 
@@ -147,11 +131,11 @@ def worker(field: Any, x: float, y: float, minerals: float = 500, vespene: float
 @pytest.mark.parametrize("name", ["SiegeTank", "SiegeTankSieged", "Battlecruiser", "WidowMine", "Hellion"])
 def test_one_worker_mends_at_the_rate_and_price_of_the_tables(field: Any, name: str) -> None:
     world, unit = field.world, field.world.catalog.unit(name)
-    other = still(field, name, 1, 12, 10)
+    other = field.still(name, 1, 12, 10)
     slot = worker(field, 12 - unit.radius - 0.4, 10)
     world.life[other] = unit.life / 2
     assert field.order(slot, REPAIR, other)
-    begun = until(field, lambda: world.life[other] > unit.life / 2)
+    begun = field.until(lambda: world.life[other] > unit.life / 2)
     field.play(40)
     mended = world.life[other] - unit.life / 2
     assert mended == pytest.approx((world.loop - begun + 1) * unit.life / unit.repair_loops)
@@ -163,13 +147,13 @@ def test_one_worker_mends_at_the_rate_and_price_of_the_tables(field: Any, name: 
 
 def test_two_workers_mend_twice_as_fast_and_stop_when_it_is_whole(field: Any) -> None:
     world, unit = field.world, field.world.catalog.unit("Hellion")
-    other = still(field, "Hellion", 1, 12, 10)
+    other = field.still("Hellion", 1, 12, 10)
     pair = [worker(field, 10.9, 10), worker(field, 13.1, 10)]
     world.life[other] = 10.0
     for slot in pair:
         field.order(slot, REPAIR, other)
-    begun = until(field, lambda: world.life[other] > 10.0)
-    done = until(field, lambda: world.life[other] == unit.life)
+    begun = field.until(lambda: world.life[other] > 10.0)
+    done = field.until(lambda: world.life[other] == unit.life)
     assert done - begun == pytest.approx((unit.life - 10) / unit.life * unit.repair_loops / 2, abs=3)
     field.play(2)
     assert [world.order_kind[s] for s in pair] == [0, 0]
@@ -177,7 +161,7 @@ def test_two_workers_mend_twice_as_fast_and_stop_when_it_is_whole(field: Any) ->
 
 def test_repair_stops_when_the_money_is_gone(field: Any) -> None:
     world = field.world
-    other = still(field, "Battlecruiser", 1, 12, 10)
+    other = field.still("Battlecruiser", 1, 12, 10)
     slot = worker(field, 10.3, 10, minerals=1.0, vespene=1.0)
     world.life[other] = 100.0
     field.order(slot, REPAIR, other)
@@ -195,12 +179,12 @@ def test_a_worker_comes_to_a_structure_from_any_side(field: Any, start: tuple[fl
     world.life[hall] = 1000.0
     slot = worker(field, *start)
     field.order(slot, REPAIR, hall)
-    until(field, lambda: world.life[hall] > 1000.0, 300)
+    field.until(lambda: world.life[hall] > 1000.0, 300)
 
 
 def test_a_worker_follows_what_drives_away(field: Any) -> None:
     world = field.world
-    other = still(field, "SiegeTank", 1, 8, 10)
+    other = field.still("SiegeTank", 1, 8, 10)
     slot = worker(field, 6.5, 10)
     world.life[other] = 50.0
     field.order(slot, REPAIR, other)
@@ -218,24 +202,24 @@ def test_a_worker_follows_what_drives_away(field: Any) -> None:
      ("SiegeTank", 1, 175, Refusal.REQUIRES_REPAIR_TARGET), ("SiegeTank", 1, 10, Refusal.SUCCESS)],
 )  # fmt: skip
 def test_what_can_be_repaired(field: Any, name: str, owner: int, life: float, why: Refusal) -> None:
-    slot, other = worker(field, 10, 10), still(field, name, owner, 12, 10)
+    slot, other = worker(field, 10, 10), field.still(name, owner, 12, 10)
     field.world.life[other] = life
     assert field.why_not(slot, REPAIR, other) is why
 
 
 def test_a_worker_with_autocast_repairs_by_itself(field: Any) -> None:
     world = field.world
-    slot, other = worker(field, 10, 10), still(field, "SiegeTank", 1, 14, 10)
+    slot, other = worker(field, 10, 10), field.still("SiegeTank", 1, 14, 10)
     world.life[other] = 100.0
     field.play(60)
     assert world.life[other] == 100.0
     world.autocast[slot] = (REPAIR,)
-    until(field, lambda: world.life[other] > 100.0, 100)
+    field.until(lambda: world.life[other] > 100.0, 100)
 
 
 def test_a_right_click_on_what_is_damaged_means_repair(field: Any) -> None:
     world = field.world
-    slot, other = worker(field, 10, 10), still(field, "SiegeTank", 1, 12, 10)
+    slot, other = worker(field, 10, 10), field.still("SiegeTank", 1, 12, 10)
     casting.smart(world, [slot], target=world.tag_of(other))
     assert [o.ability for o in world.orders_of(slot)] == [16]
     world.life[other] = 100.0
@@ -245,11 +229,11 @@ def test_a_right_click_on_what_is_damaged_means_repair(field: Any) -> None:
 
 def test_a_mule_repairs_too(field: Any) -> None:
     world = field.world
-    slot, other = still(field, "MULE", 1, 10, 10), still(field, "SiegeTank", 1, 12, 10)
+    slot, other = field.still("MULE", 1, 10, 10), field.still("SiegeTank", 1, 12, 10)
     world.life[other] = 100.0
     world.players[1].minerals = world.players[1].vespene = 100.0
     assert field.order(slot, MULE_REPAIR, other)
-    until(field, lambda: world.life[other] > 100.0, 100)
+    field.until(lambda: world.life[other] > 100.0, 100)
 
 
 # flying structures ----------------------------------------------------------------------------------------------------
@@ -261,12 +245,12 @@ def test_a_structure_lifts_off_flies_and_lands_again(field: Any, name: str, lift
     slot = field.put(name, 1, 10.5, 10.5)
     world.life[slot] = 700.0
     assert field.order(slot, lift)
-    until(field, lambda: world.unit_type(slot).flying)
+    field.until(lambda: world.unit_type(slot).flying)
     assert world.loop == pytest.approx(1 + world.catalog.ability(lift).loops, abs=1.5)
     assert not world.footprint_cells(slot).size
     assert world.ground.walk[10, 10]
     assert field.order(slot, land, point=(20.4, 20.7))
-    until(field, lambda: not world.unit_type(slot).flying, 900)
+    field.until(lambda: not world.unit_type(slot).flying, 900)
     assert world.unit_type(slot).name == name
     assert world.pos[slot].tolist() == [20.5, 20.5]
     assert world.life[slot] == 700.0
@@ -277,10 +261,10 @@ def test_landing_takes_its_time_above_the_place(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(LAND_BARRACKS)
     slot = field.put("BarracksFlying", 1, 12.5, 10.5)
     field.order(slot, LAND_BARRACKS, point=(15.5, 10.5))
-    until(field, lambda: world.bound[slot])
+    field.until(lambda: world.bound[slot])
     begun = world.loop
     assert world.pos[slot].tolist() == pytest.approx([15.5, 10.5], abs=0.01)
-    done = until(field, lambda: not world.unit_type(slot).flying)
+    done = field.until(lambda: not world.unit_type(slot).flying)
     assert done - begun == ability.loops
 
 
@@ -297,13 +281,13 @@ def test_an_add_on_stays_behind_and_serves_who_lands_beside_it(field: Any) -> No
     slot, lab = field.put("Barracks", 1, 10.5, 10.5), field.put("BarracksTechLab", 1, 13, 10)
     world.addon[slot] = lab
     field.order(slot, LIFT_BARRACKS)
-    until(field, lambda: world.unit_type(slot).flying)
+    field.until(lambda: world.unit_type(slot).flying)
     assert world.addon[slot] == NOBODY
     assert world.unit_type(lab).name == "TechLab"
     factory = field.put("FactoryFlying", 1, 10.5, 14.5)
     assert field.order(factory, 520, point=(10.5, 10.5))
     commands.move(world, [slot], (20, 20))
-    until(field, lambda: world.unit_type(factory).name == "Factory", 600)
+    field.until(lambda: world.unit_type(factory).name == "Factory", 600)
     assert world.addon[factory] == lab
     assert world.unit_type(lab).name == "FactoryTechLab"
 
@@ -316,7 +300,7 @@ def test_a_structure_below_a_third_of_its_life_burns(field: Any, share: float, *
     world = field.world
     slot, kind = field.put("Barracks", 1, 10.5, 10.5), world.catalog.buff("TerranBuildingBurnDown")
     world.life[slot] = share * 1000
-    begun = until(field, lambda: buffs.has(world, slot, kind.name), 8) if burns else 0
+    begun = field.until(lambda: buffs.has(world, slot, kind.name), 8) if burns else 0
     field.play(160)
     lost = share * 1000 - world.life[slot]
     assert lost == (pytest.approx((world.loop - begun) / kind.period_loops, abs=1) if burns else 0)
@@ -326,7 +310,7 @@ def test_a_burning_structure_burns_down_and_nobody_is_credited(field: Any) -> No
     world = field.world
     slot = field.put("SupplyDepot", 1, 10, 10)
     world.life[slot] = 3.0
-    until(field, lambda: not world.alive[slot], 60)
+    field.until(lambda: not world.alive[slot], 60)
     assert world.deaths[-1].killer == -1
 
 
@@ -390,7 +374,7 @@ def test_a_bunker_with_somebody_inside_is_not_salvaged(field: Any) -> None:
 def test_units_walk_over_a_lowered_depot_and_not_over_a_raised_one(field: Any) -> None:
     world = field.world
     depots = [field.put("SupplyDepot", 1, 15, y) for y in range(1, 32, 2)]
-    marine = still(field, "Marine", 1, 10, 15)
+    marine = field.still("Marine", 1, 10, 15)
     commands.move(world, [marine], (20, 15))
     field.play(120)
     assert world.pos[marine, 0] < 14
@@ -405,7 +389,7 @@ def test_units_walk_over_a_lowered_depot_and_not_over_a_raised_one(field: Any) -
 
 def test_a_rising_depot_moves_aside_who_stands_on_it(field: Any) -> None:
     world = field.world
-    depot, marine = field.put("SupplyDepotLowered", 1, 15, 15), still(field, "Marine", 1, 15.2, 15.1)
+    depot, marine = field.put("SupplyDepotLowered", 1, 15, 15), field.still("Marine", 1, 15.2, 15.1)
     field.order(depot, RAISE)
     field.play(40)
     assert world.unit_type(depot).name == "SupplyDepot"

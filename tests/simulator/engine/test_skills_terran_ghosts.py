@@ -22,23 +22,13 @@ def field(request: pytest.FixtureRequest, make_field: Any) -> Any:
     return make_field(version=request.param)
 
 
-def still(field: Any, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
-    """A unit that stays where it is and fights nobody."""
-    slot: int = field.put(name, owner, x, y)
-    field.world.looks_around[slot] = False
-    buffs.apply(field.world, slot, "LurkerHoldFireB")
-    if energy is not None:
-        field.world.energy[slot] = energy
-    return slot
-
-
 # snipe ----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["Marine", "Ultralisk", "HighTemplar", "Ghost"])
 def test_a_snipe_hits_after_its_channel_and_ignores_armor(field: Any, name: str) -> None:
     world, ability = field.world, field.world.catalog.ability(SNIPE)
-    ghost, victim = still(field, "Ghost", 1, 6, 10, energy=100), still(field, name, 2, 12, 10)
+    ghost, victim = field.still("Ghost", 1, 6, 10, energy=100), field.still(name, 2, 12, 10)
     psionic = "psionic" in world.unit_type(victim).attributes
     damage = ability.numbers["damage"] + (ability.numbers.get("bonus_psionic", 0) if psionic else 0)
     before = field.vitals(victim)
@@ -56,8 +46,8 @@ def test_a_snipe_hits_after_its_channel_and_ignores_armor(field: Any, name: str)
 
 def test_a_ghost_that_is_hurt_loses_the_shot_and_gets_its_energy_back(field: Any) -> None:
     world = field.world
-    ghost, victim = still(field, "Ghost", 1, 6, 10, energy=60), still(field, "Ultralisk", 2, 14, 10)
-    marine = still(field, "Marine", 2, 6, 14)
+    ghost, victim = field.still("Ghost", 1, 6, 10, energy=60), field.still("Ultralisk", 2, 14, 10)
+    marine = field.still("Marine", 2, 6, 14)
     field.order(ghost, SNIPE, victim)
     field.play(10)
     assert buffs.has(world, ghost, "ChannelSnipeCombat")
@@ -69,7 +59,7 @@ def test_a_ghost_that_is_hurt_loses_the_shot_and_gets_its_energy_back(field: Any
 
 def test_a_new_order_drops_the_shot_and_gives_the_energy_back(field: Any) -> None:
     world = field.world
-    ghost, victim = still(field, "Ghost", 1, 6, 10, energy=60), still(field, "Ultralisk", 2, 14, 10)
+    ghost, victim = field.still("Ghost", 1, 6, 10, energy=60), field.still("Ultralisk", 2, 14, 10)
     field.order(ghost, SNIPE, victim)
     field.play(10)
     commands.move(world, [ghost], (6, 12))
@@ -88,18 +78,18 @@ def test_a_new_order_drops_the_shot_and_gives_the_energy_back(field: Any) -> Non
     ],
 )
 def test_whom_a_snipe_may_be_aimed_at(field: Any, name: str, owner: int, why: Refusal) -> None:
-    ghost, victim = still(field, "Ghost", 1, 6, 10, energy=60), still(field, name, owner, 12.5, 10.5)
+    ghost, victim = field.still("Ghost", 1, 6, 10, energy=60), field.still(name, owner, 12.5, 10.5)
     assert field.why_not(ghost, SNIPE, victim) is why
 
 
 def test_a_snipe_needs_energy(field: Any) -> None:
-    ghost, victim = still(field, "Ghost", 1, 6, 10, energy=49), still(field, "Marine", 2, 12, 10)
+    ghost, victim = field.still("Ghost", 1, 6, 10, energy=49), field.still("Marine", 2, 12, 10)
     assert field.why_not(ghost, SNIPE, victim) is Refusal.NOT_ENOUGH_ENERGY
 
 
 def test_a_snipe_is_lost_on_a_target_beyond_the_leash_where_there_is_one(field: Any) -> None:
     world, leash = field.world, field.world.catalog.ability(SNIPE).numbers.get("leash_range")
-    ghost, victim = still(field, "Ghost", 1, 2, 10, energy=60), still(field, "Ultralisk", 2, 11, 10)
+    ghost, victim = field.still("Ghost", 1, 2, 10, energy=60), field.still("Ultralisk", 2, 11, 10)
     field.order(ghost, SNIPE, victim)
     field.play(5)
     world.pos[victim] = (17.5, 10)
@@ -113,9 +103,9 @@ def test_a_snipe_is_lost_on_a_target_beyond_the_leash_where_there_is_one(field: 
 
 def test_an_emp_takes_shields_and_energy_up_to_a_hundred_from_friend_and_foe_around(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(EMP)
-    ghost = still(field, "Ghost", 1, 4, 10, energy=100)
-    archon, templar = still(field, "Archon", 2, 12, 10), still(field, "HighTemplar", 2, 12, 11.2, energy=160)
-    friend, far = still(field, "Ghost", 1, 11, 10, energy=80), still(field, "Zealot", 2, 12, 14)
+    ghost = field.still("Ghost", 1, 4, 10, energy=100)
+    archon, templar = field.still("Archon", 2, 12, 10), field.still("HighTemplar", 2, 12, 11.2, energy=160)
+    friend, far = field.still("Ghost", 1, 11, 10, energy=80), field.still("Zealot", 2, 12, 14)
     assert field.order(ghost, EMP, point=(12, 10))
     field.play(2)
     assert world.energy[ghost] == pytest.approx(100 - ability.energy, abs=0.1)
@@ -132,7 +122,7 @@ def test_an_emp_takes_shields_and_energy_up_to_a_hundred_from_friend_and_foe_aro
 
 def test_an_emp_uncovers_who_is_cloaked_for_its_time(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(EMP).numbers
-    ghost, templar = still(field, "Ghost", 1, 8, 10, energy=100), still(field, "DarkTemplar", 2, 12, 10)
+    ghost, templar = field.still("Ghost", 1, 8, 10, energy=100), field.still("DarkTemplar", 2, 12, 10)
     field.play(4)
     assert not world.visible[1, templar]
     field.order(ghost, EMP, point=(12, 10))
@@ -147,7 +137,7 @@ def test_an_emp_uncovers_who_is_cloaked_for_its_time(field: Any) -> None:
 
 @pytest.mark.parametrize(("away", "hurt"), [(1.5 + 0.5 - 0.01, True), (1.5 + 0.5 + 0.01, False)])
 def test_an_emp_reaches_its_radius_to_the_edge(field: Any, away: float, *, hurt: bool) -> None:
-    ghost, zealot = still(field, "Ghost", 1, 8, 10, energy=100), still(field, "Zealot", 2, 12, 10 + away)
+    ghost, zealot = field.still("Ghost", 1, 8, 10, energy=100), field.still("Zealot", 2, 12, 10 + away)
     field.order(ghost, EMP, point=(12, 10))
     field.play(20)
     assert bool(field.world.shields[zealot] < 50) is hurt
@@ -164,7 +154,7 @@ def test_a_cloak_hides_its_bearer_until_the_energy_is_used_up(
     field: Any, name: str, number: int, research: str, buff: str
 ) -> None:
     world, ability = field.world, field.world.catalog.ability(number)
-    slot = still(field, name, 1, 10, 10, energy=40)
+    slot: int = field.still(name, 1, 10, 10, energy=40)
     assert field.why_not(slot, number) is Refusal.TECH_REQUIREMENTS_NOT_MET
     field.research(1, research)
     assert field.order(slot, number)
@@ -184,7 +174,7 @@ def test_a_cloak_hides_its_bearer_until_the_energy_is_used_up(
 
 def test_a_cloak_is_put_on_once_and_taken_off_at_once(field: Any) -> None:
     field.research(1, "PersonalCloaking")
-    slot = still(field, "Ghost", 1, 10, 10, energy=100)
+    slot: int = field.still("Ghost", 1, 10, 10, energy=100)
     assert field.why_not(slot, UNCLOAK) is Refusal.TECH_REQUIREMENTS_NOT_MET
     field.order(slot, CLOAK)
     assert field.why_not(slot, CLOAK) is Refusal.TECH_REQUIREMENTS_NOT_MET
@@ -194,7 +184,7 @@ def test_a_cloak_is_put_on_once_and_taken_off_at_once(field: Any) -> None:
 
 def test_a_detector_sees_a_cloaked_ghost(field: Any) -> None:
     field.research(1, "PersonalCloaking")
-    slot = still(field, "Ghost", 1, 10, 10, energy=100)
+    slot: int = field.still("Ghost", 1, 10, 10, energy=100)
     field.order(slot, CLOAK)
     field.put("Observer", 2, 16, 10)
     field.play(5)
@@ -206,7 +196,7 @@ def test_a_detector_sees_a_cloaked_ghost(field: Any) -> None:
 
 def test_a_ghost_that_holds_its_fire_fights_only_when_told(field: Any) -> None:
     world = field.world
-    ghost, victim = field.put("Ghost", 1, 10, 10), still(field, "Hatchery", 2, 16, 10)
+    ghost, victim = field.put("Ghost", 1, 10, 10), field.still("Hatchery", 2, 16, 10)
     assert field.why_not(ghost, FREE) is Refusal.TECH_REQUIREMENTS_NOT_MET
     field.order(ghost, HOLD_FIRE)
     field.play(60)
@@ -217,7 +207,7 @@ def test_a_ghost_that_holds_its_fire_fights_only_when_told(field: Any) -> None:
 
 
 def test_weapons_free_ends_holding_fire(field: Any) -> None:
-    ghost, victim = field.put("Ghost", 1, 10, 10), still(field, "Roach", 2, 15, 10)
+    ghost, victim = field.put("Ghost", 1, 10, 10), field.still("Roach", 2, 15, 10)
     field.order(ghost, HOLD_FIRE)
     field.play(20)
     field.order(ghost, FREE)
@@ -230,8 +220,8 @@ def test_weapons_free_ends_holding_fire(field: Any) -> None:
 
 def armed(field: Any) -> int:
     """A Ghost whose owner has a Nuke ready."""
-    slot = still(field, "Ghost", 1, 6, 16)
-    academy = still(field, "GhostAcademy", 1, 4.5, 28.5)
+    slot: int = field.still("Ghost", 1, 6, 16)
+    academy = field.still("GhostAcademy", 1, 4.5, 28.5)
     nuke = field.put("Nuke", 1, 4.5, 28.5)
     field.world.stow(nuke, academy)
     return slot
@@ -243,9 +233,9 @@ def test_a_nuke_comes_down_after_its_time_in_rings_of_damage(field: Any) -> None
     point = (18.0, 16.0)
     victims = {}
     for ring, away in zip(numbers["area"], (2.0, 5.5, 7.5), strict=True):
-        slot = still(field, "Ultralisk", 2, point[0], point[1] + away + world.catalog.unit("Ultralisk").radius)
+        slot = field.still("Ultralisk", 2, point[0], point[1] + away + world.catalog.unit("Ultralisk").radius)
         victims[slot] = ring["fraction"]
-    friend = still(field, "Thor", 1, 18, 14)
+    friend = field.still("Thor", 1, 18, 14)
     assert field.order(ghost, NUKE, point=point)
     field.play(1)
     begun = world.loop
@@ -269,7 +259,7 @@ def test_the_enemy_is_warned_of_a_strike(field: Any) -> None:
 
 def test_structures_take_more_of_a_nuke(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(NUKE).numbers
-    ghost, hall = armed(field), still(field, "CommandCenter", 2, 18.5, 16.5)
+    ghost, hall = armed(field), field.still("CommandCenter", 2, 18.5, 16.5)
     field.order(ghost, NUKE, point=(18.5, 16.5))
     field.play(322)
     assert world.life[hall] == 1500 - numbers["damage"] - numbers["bonus_structure"]
@@ -286,7 +276,7 @@ def test_a_strike_uses_up_one_nuke_and_needs_one(field: Any) -> None:
 
 def test_an_academy_arms_a_nuke_that_a_ghost_then_calls(field: Any) -> None:
     world = field.world
-    ghost, academy = still(field, "Ghost", 1, 6, 16), field.put("GhostAcademy", 1, 4.5, 28.5)
+    ghost, academy = field.still("Ghost", 1, 6, 16), field.put("GhostAcademy", 1, 4.5, 28.5)
     field.put("Factory", 1, 10.5, 28.5)
     world.players[1].minerals = world.players[1].vespene = 100.0
     assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.TECH_REQUIREMENTS_NOT_MET
@@ -298,7 +288,7 @@ def test_an_academy_arms_a_nuke_that_a_ghost_then_calls(field: Any) -> None:
 @pytest.mark.parametrize("how", ["cancel", "order", "death"])
 def test_a_strike_is_lost_when_the_ghost_stops_painting(field: Any, how: str) -> None:
     world = field.world
-    ghost, victim = armed(field), still(field, "Ultralisk", 2, 17, 16)
+    ghost, victim = armed(field), field.still("Ultralisk", 2, 17, 16)
     field.order(ghost, NUKE, point=(17, 16))
     field.play(290)
     if how == "cancel":
@@ -314,7 +304,7 @@ def test_a_strike_is_lost_when_the_ghost_stops_painting(field: Any, how: str) ->
 
 
 def test_a_strike_that_is_down_needs_no_painter_any_more(field: Any) -> None:
-    ghost, victim = armed(field), still(field, "Ultralisk", 2, 17, 16)
+    ghost, victim = armed(field), field.still("Ultralisk", 2, 17, 16)
     field.order(ghost, NUKE, point=(17, 16))
     field.play(302)
     field.world.life[ghost] = 0.0

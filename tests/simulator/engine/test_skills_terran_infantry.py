@@ -22,14 +22,6 @@ def field(request: pytest.FixtureRequest, make_field: Any) -> Any:
     return make_field(version=request.param)
 
 
-def still(field: Any, name: str, owner: int, x: float, y: float) -> int:
-    """A unit that stays where it is and fights nobody."""
-    slot: int = field.put(name, owner, x, y)
-    field.world.looks_around[slot] = False
-    buffs.apply(field.world, slot, "LurkerHoldFireB")
-    return slot
-
-
 # stimpack -------------------------------------------------------------------------------------------------------------
 
 
@@ -91,7 +83,7 @@ def test_a_stimmed_marine_fires_more_often_by_the_factor(field: Any) -> None:
         world = type(field)(version=field.world.catalog.version)
         world.research(1, "Stimpack")
         slot = world.put("Marine", 1, 10, 10)
-        victim = still(world, "Hatchery", 2, 16, 10)
+        victim = world.still("Hatchery", 2, 16, 10)
         if stimmed:
             world.order(slot, STIM)
         life = world.world.life[victim]
@@ -113,7 +105,7 @@ def test_concussive_shells_slow_whom_they_hit_but_nothing_massive_and_no_structu
     world = field.world
     if researched:
         field.research(1, "PunisherGrenades")
-    slot, victim = field.put("Marauder", 1, 10, 10), still(field, name, 2, 15, 10)
+    slot, victim = field.put("Marauder", 1, 10, 10), field.still(name, 2, 15, 10)
     step = world.step_max[victim]
     commands.attack_unit(world, [slot], world.tag_of(victim))
     before = field.vitals(victim)
@@ -128,7 +120,7 @@ def test_concussive_shells_slow_whom_they_hit_but_nothing_massive_and_no_structu
 def test_the_slowing_lasts_its_time_after_the_last_hit(field: Any) -> None:
     world = field.world
     field.research(1, "PunisherGrenades")
-    slot, victim = field.put("Marauder", 1, 10, 10), still(field, "Zealot", 2, 15, 10)
+    slot, victim = field.put("Marauder", 1, 10, 10), field.still("Zealot", 2, 15, 10)
     commands.attack_unit(world, [slot], world.tag_of(victim))
     for _ in field.loops(60):
         if buffs.has(world, victim, "Slow"):
@@ -167,9 +159,9 @@ def test_a_reaper_heals_after_a_time_without_damage(field: Any) -> None:
 
 def test_a_charge_goes_off_after_its_fuse_and_hurts_friend_and_foe_on_the_ground(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(KD8).numbers
-    reaper = still(field, "Reaper", 1, 10, 10)
-    foe, friend = still(field, "Zealot", 2, 14, 10.5), still(field, "Marine", 1, 14, 9.0)
-    flyer, far = still(field, "Mutalisk", 2, 14, 10), still(field, "Marine", 2, 14 + numbers["radius"] + 0.4, 10)
+    reaper = field.still("Reaper", 1, 10, 10)
+    foe, friend = field.still("Zealot", 2, 14, 10.5), field.still("Marine", 1, 14, 9.0)
+    flyer, far = field.still("Mutalisk", 2, 14, 10), field.still("Marine", 2, 14 + numbers["radius"] + 0.4, 10)
     lives = {slot: field.vitals(slot) for slot in (foe, friend, flyer, far)}
     assert field.order(reaper, KD8, point=(14, 10))
     field.play(1)
@@ -185,7 +177,7 @@ def test_a_charge_goes_off_after_its_fuse_and_hurts_friend_and_foe_on_the_ground
 
 def test_a_charge_throws_units_away_from_it_by_its_distance(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(KD8).numbers
-    reaper, victim = still(field, "Reaper", 1, 10, 10), still(field, "Marine", 2, 15, 10)
+    reaper, victim = field.still("Reaper", 1, 10, 10), field.still("Marine", 2, 15, 10)
     field.order(reaper, KD8, point=(14, 10))
     field.play(int(numbers["fuse_loops"]) + 1)
     assert world.can_attack[victim] == 0
@@ -198,7 +190,7 @@ def test_a_charge_throws_units_away_from_it_by_its_distance(field: Any) -> None:
 def test_a_charge_does_not_throw_what_is_massive_built_or_a_larva(field: Any, name: str) -> None:
     world = field.world
     world.growth.paint(0, 0, 32, 32)
-    reaper, victim = still(field, "Reaper", 1, 10, 10), still(field, name, 2, 15.5, 10.5)
+    reaper, victim = field.still("Reaper", 1, 10, 10), field.still(name, 2, 15.5, 10.5)
     before = world.life[victim]
     field.order(reaper, KD8, point=(14, 10))
     for _ in field.loops(40):
@@ -211,7 +203,7 @@ def test_a_charge_does_not_throw_what_is_massive_built_or_a_larva(field: Any, na
 
 def test_a_charge_is_a_body_that_nobody_can_touch_and_is_gone_with_its_explosion(field: Any) -> None:
     world = field.world
-    reaper = still(field, "Reaper", 1, 10, 10)
+    reaper = field.still("Reaper", 1, 10, 10)
     field.order(reaper, KD8, point=(14, 10))
     field.play(1)
     charge = next(s for s in world.live.tolist() if world.unit_type(s).name == "KD8Charge")
@@ -222,7 +214,7 @@ def test_a_charge_is_a_body_that_nobody_can_touch_and_is_gone_with_its_explosion
 
 def test_a_reaper_walks_into_range_and_has_to_wait_for_the_next_charge(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(KD8)
-    reaper = still(field, "Reaper", 1, 4, 10)
+    reaper = field.still("Reaper", 1, 4, 10)
     assert field.order(reaper, KD8, point=(16, 10))
     for _ in field.loops(100):
         if world.fields:
@@ -237,7 +229,7 @@ def test_a_reaper_walks_into_range_and_has_to_wait_for_the_next_charge(field: An
 
 
 def test_a_charge_is_not_thrown_at_flyers(field: Any) -> None:
-    reaper, flyer = still(field, "Reaper", 1, 10, 10), still(field, "Mutalisk", 2, 13, 10)
+    reaper, flyer = field.still("Reaper", 1, 10, 10), field.still("Mutalisk", 2, 13, 10)
     assert field.why_not(reaper, KD8, flyer) is Refusal.MUST_TARGET_GROUND_UNITS
 
 

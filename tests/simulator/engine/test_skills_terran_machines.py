@@ -27,22 +27,6 @@ def field(request: pytest.FixtureRequest, make_field: Any) -> Any:
     return make_field(version=request.param)
 
 
-def still(field: Any, name: str, owner: int, x: float, y: float) -> int:
-    """A unit that stays where it is and fights nobody."""
-    slot: int = field.put(name, owner, x, y)
-    field.world.looks_around[slot] = False
-    buffs.apply(field.world, slot, "LurkerHoldFireB")
-    return slot
-
-
-def until(field: Any, holds: Any, most: int = 500) -> int:
-    """Play until something holds; the loop at which it did."""
-    for loop in field.loops(most):
-        if holds():
-            return int(loop)
-    pytest.fail(f"not within {most} loops")
-
-
 # modes ----------------------------------------------------------------------------------------------------------------
 
 
@@ -53,7 +37,7 @@ def test_a_unit_changes_its_mode_in_the_time_of_the_tables(field: Any, name: str
     slot = field.put(name, 1, 10, 10)
     tag = world.tag_of(slot)
     assert field.order(slot, number)
-    done = until(field, lambda: world.unit_type(slot).name == ability.unit)
+    done = field.until(lambda: world.unit_type(slot).name == ability.unit)
     least = 1 + ability.loops
     assert least <= done <= math.ceil(least + ability.random_loops) + 1
     assert world.tag_of(slot) == tag
@@ -79,7 +63,7 @@ def test_an_order_given_while_a_tank_changes_its_mode_is_kept_for_afterwards(fie
     commands.move(world, [slot], (12, 10))
     field.play(10)
     assert [o.ability for o in world.orders_of(slot)] == [UNSIEGE, 16]
-    until(field, lambda: world.unit_type(slot).name == "SiegeTank")
+    field.until(lambda: world.unit_type(slot).name == "SiegeTank")
     field.play(80)
     assert world.pos[slot].tolist() == pytest.approx([12, 10], abs=0.1)
 
@@ -108,11 +92,11 @@ def test_stop_does_not_keep_a_tank_from_sieging(field: Any) -> None:
     field.order(slot, SIEGE)
     field.play(10)
     commands.stop(world, [slot])
-    until(field, lambda: world.unit_type(slot).name == "SiegeTankSieged")
+    field.until(lambda: world.unit_type(slot).name == "SiegeTankSieged")
 
 
 def test_a_tank_does_not_fire_while_it_changes_its_mode(field: Any) -> None:
-    slot, victim = field.put("SiegeTank", 1, 6, 10), still(field, "Hatchery", 2, 14.5, 10.5)
+    slot, victim = field.put("SiegeTank", 1, 6, 10), field.still("Hatchery", 2, 14.5, 10.5)
     field.order(slot, SIEGE)
     field.play(60)
     assert field.world.life[victim] == 1500
@@ -124,7 +108,7 @@ def test_a_sieged_tank_neither_moves_nor_fires_at_what_is_too_close(field: Any) 
     world = field.world
     slot = field.put("SiegeTankSieged", 1, 6, 10)
     weapon = world.unit_type(slot).weapons[0]
-    near = still(field, "Roach", 2, 6 + 0.875 + world.catalog.unit("Roach").radius + weapon.min_range - 0.2, 10)
+    near = field.still("Roach", 2, 6 + 0.875 + world.catalog.unit("Roach").radius + weapon.min_range - 0.2, 10)
     commands.move(world, [slot], (20, 10))
     field.play(100)
     assert world.pos[slot].tolist() == [6, 10]
@@ -134,10 +118,10 @@ def test_a_sieged_tank_neither_moves_nor_fires_at_what_is_too_close(field: Any) 
 
 def test_the_splash_of_a_sieged_tank_hurts_friends(field: Any) -> None:
     world = field.world
-    slot, victim = field.put("SiegeTankSieged", 1, 4, 10), still(field, "Roach", 2, 14, 10)
-    friend = still(field, "Marauder", 1, 14, 11.3)
+    slot, victim = field.put("SiegeTankSieged", 1, 4, 10), field.still("Roach", 2, 14, 10)
+    friend = field.still("Marauder", 1, 14, 11.3)
     commands.attack_unit(world, [slot], world.tag_of(victim))
-    until(field, lambda: world.life[victim] < 145)
+    field.until(lambda: world.life[victim] < 145)
     assert world.life[friend] < 125
 
 
@@ -162,11 +146,11 @@ def test_a_burrowed_mine_is_hidden_and_fires_by_itself_after_taking_aim(field: A
     slot = mine(field)
     field.play(4)
     assert not world.visible[2, slot]
-    victim = still(field, "Ultralisk", 2, 10 + ability.range + 1.0, 10)
-    begun = until(field, lambda: world.casts[slot])
-    fired = until(field, lambda: world.fields)
+    victim = field.still("Ultralisk", 2, 10 + ability.range + 1.0, 10)
+    begun = field.until(lambda: world.casts[slot])
+    fired = field.until(lambda: world.fields)
     assert ability.prep_loops <= fired - begun <= ability.prep_loops + 2
-    until(field, lambda: world.life[victim] < 500)
+    field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == pytest.approx(ability.numbers["damage"])
 
 
@@ -176,7 +160,7 @@ def test_a_mine_keeps_what_it_was_set_to_do_when_it_burrows(field: Any) -> None:
     assert world.autocast[slot] == (MINE_ATTACK,)
     del world.autocast[slot]
     field.order(slot, BURROW)
-    until(field, lambda: world.unit_type(slot).name == "WidowMineBurrowed")
+    field.until(lambda: world.unit_type(slot).name == "WidowMineBurrowed")
     assert slot not in world.autocast
 
 
@@ -184,18 +168,18 @@ def test_a_right_click_of_a_burrowed_mine_on_a_foe_fires(field: Any) -> None:
     world = field.world
     slot = mine(field)
     world.autocast.pop(slot)
-    near, friend = still(field, "Ultralisk", 2, 15, 10), still(field, "Marine", 1, 12, 12)
+    near, friend = field.still("Ultralisk", 2, 15, 10), field.still("Marine", 1, 12, 12)
     assert casting.smart(world, [slot], target=world.tag_of(friend)) != [slot] or not world.casts[slot]
     casting.smart(world, [slot], target=world.tag_of(near))
     assert [o.ability for o in world.orders_of(slot)] == [MINE_ATTACK]
-    until(field, lambda: world.life[near] < 500)
+    field.until(lambda: world.life[near] < 500)
 
 
 def test_a_mine_takes_more_from_shields(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(MINE_ATTACK).numbers
     mine(field)
-    victim = still(field, "Archon", 2, 14, 10)
-    until(field, lambda: world.shields[victim] < 350)
+    victim = field.still("Archon", 2, 14, 10)
+    field.until(lambda: world.shields[victim] < 350)
     assert 350 - world.shields[victim] == numbers["damage"] + numbers["bonus_vs_shields"]
 
 
@@ -208,23 +192,23 @@ def test_a_mine_hurts_who_is_beside_its_target_but_no_structure_and_no_mine_of_i
 ) -> None:
     world, numbers = field.world, field.world.catalog.ability(MINE_ATTACK).numbers
     mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
+    victim = field.still("Ultralisk", 2, 15, 10)
     radius = world.catalog.unit(name).radius
-    other = still(field, name, owner, 15, 10 + numbers["splash_radius"] + radius - 0.1)
+    other = field.still(name, owner, 15, 10 + numbers["splash_radius"] + radius - 0.1)
     world.autocast.pop(other, None)
     if name == "SpineCrawler":
         world.growth.paint(0, 0, 32, 32)
     before = world.life[other]
-    until(field, lambda: world.life[victim] < 500)
+    field.until(lambda: world.life[victim] < 500)
     assert before - world.life[other] == (numbers["splash_damage"] if hurt else 0)
 
 
 def test_splash_reaches_its_radius_to_the_edge(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(MINE_ATTACK).numbers
     mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
-    other = still(field, "Marauder", 1, 15, 10 + numbers["splash_radius"] + 0.5625 + 0.1)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 15, 10)
+    other = field.still("Marauder", 1, 15, 10 + numbers["splash_radius"] + 0.5625 + 0.1)
+    field.until(lambda: world.life[victim] < 500)
     assert world.life[other] == 125
     assert numbers["splash_radius"] == (1.75 if world.catalog.version == "4.10" else 1.5)
 
@@ -232,8 +216,8 @@ def test_splash_reaches_its_radius_to_the_edge(field: Any) -> None:
 def test_a_mine_that_reloads_is_seen_until_it_is_ready(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(MINE_ATTACK)
     slot = mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 15, 10)
+    field.until(lambda: world.life[victim] < 500)
     fired = world.timers[slot][ability.timer] - ability.cooldown_loops
     world.life[victim] = 0.0
     field.play(5)
@@ -248,8 +232,8 @@ def test_drilling_claws_keep_a_reloading_mine_hidden_and_burrow_it_faster(field:
     world, burrow = field.world, field.world.catalog.ability(BURROW)
     field.research(1, "DrillClaws")
     slot = mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 15, 10)
+    field.until(lambda: world.life[victim] < 500)
     field.play(8)
     assert not world.visible[2, slot]
     faster = 2 if world.catalog.version == "4.10" else 1.5
@@ -259,21 +243,21 @@ def test_drilling_claws_keep_a_reloading_mine_hidden_and_burrow_it_faster(field:
 def test_a_mine_fires_once_per_cooldown_and_only_from_the_ground(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(MINE_ATTACK)
     slot = mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 15, 10)
+    field.until(lambda: world.life[victim] < 500)
     life = world.life[victim]
     field.play(int(ability.cooldown_loops) - 40)
     assert world.life[victim] == pytest.approx(life, abs=13)  # Zerg regain life
     assert field.why_not(slot, MINE_ATTACK, victim) is Refusal.COOLDOWN
-    above = still(field, "WidowMine", 1, 20, 20)
+    above = field.still("WidowMine", 1, 20, 20)
     assert field.why_not(above, MINE_ATTACK, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_a_mine_lets_go_of_who_leaves_its_range_in_time(field: Any) -> None:
     world = field.world
     slot = mine(field)
-    victim = still(field, "Ultralisk", 2, 15, 10)
-    until(field, lambda: world.casts[slot])
+    victim = field.still("Ultralisk", 2, 15, 10)
+    field.until(lambda: world.casts[slot])
     field.play(10)
     world.pos[victim] = (22, 10)
     field.play(40)
@@ -288,7 +272,7 @@ def test_a_mine_lets_go_of_who_leaves_its_range_in_time(field: Any) -> None:
 )  # fmt: skip
 def test_whom_a_mine_may_fire_at(field: Any, name: str, owner: int, why: Refusal) -> None:
     slot = mine(field)
-    assert field.why_not(slot, MINE_ATTACK, still(field, name, owner, 14, 10)) is why
+    assert field.why_not(slot, MINE_ATTACK, field.still(name, owner, 14, 10)) is why
 
 
 # Cyclone --------------------------------------------------------------------------------------------------------------
@@ -296,7 +280,7 @@ def test_whom_a_mine_may_fire_at(field: Any, name: str, owner: int, why: Refusal
 
 def locked(field: Any, name: str = "Ultralisk", away: float = 6.0) -> tuple[int, int]:
     """A Cyclone that has just locked on to a unit."""
-    slot, victim = still(field, "Cyclone", 1, 4, 10), still(field, name, 2, 4 + away, 10)
+    slot, victim = field.still("Cyclone", 1, 4, 10), field.still(name, 2, 4 + away, 10)
     field.world.autocast.pop(slot, None)
     assert field.order(slot, LOCK_ON, victim)
     field.play(1)
@@ -335,7 +319,7 @@ def test_research_adds_to_the_missiles_of_a_lock_on_armored_targets_in_4_10(make
     field.research(1, "CycloneLockOnDamageUpgrade")
     _, victim = locked(field, "CommandCenter")
     life = field.world.life[victim]
-    until(field, lambda: field.world.life[victim] < life)
+    field.until(lambda: field.world.life[victim] < life)
     assert life - field.world.life[victim] == 40
 
 
@@ -377,15 +361,15 @@ def test_what_ends_a_lock_and_that_the_cooldown_runs_from_there(field: Any, how:
 def test_a_cyclone_locks_on_by_itself(field: Any) -> None:
     world = field.world
     slot = field.put("Cyclone", 1, 4, 10)
-    victim = still(field, "Ultralisk", 2, 10.5, 10)
-    until(field, lambda: buffs.has(world, victim, "LockOn"), 40)
+    victim = field.still("Ultralisk", 2, 10.5, 10)
+    field.until(lambda: buffs.has(world, victim, "LockOn"), 40)
     assert buffs.has(world, slot, "LockOnDisableAttack")
 
 
 def test_two_locks_on_one_target_end_each_for_itself(field: Any) -> None:
     world = field.world
     slot, victim = locked(field)
-    other = still(field, "Cyclone", 1, 4, 12)
+    other = field.still("Cyclone", 1, 4, 12)
     world.autocast.pop(other, None)
     field.order(other, LOCK_ON, victim)
     field.play(3)
@@ -398,9 +382,9 @@ def test_two_locks_on_one_target_end_each_for_itself(field: Any) -> None:
 
 def test_a_cyclone_walks_into_range_to_lock_on(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(LOCK_ON)
-    slot, victim = still(field, "Cyclone", 1, 4, 10), still(field, "Ultralisk", 2, 22, 10)
+    slot, victim = field.still("Cyclone", 1, 4, 10), field.still("Ultralisk", 2, 22, 10)
     world.autocast.pop(slot, None)
     field.order(slot, LOCK_ON, victim)
-    until(field, lambda: buffs.has(world, victim, "LockOn"))
+    field.until(lambda: buffs.has(world, victim, "LockOn"))
     gap = math.dist(world.pos[slot].tolist(), world.pos[victim].tolist()) - world.radius[slot] - world.radius[victim]
     assert gap == pytest.approx(ability.range, abs=0.3)

@@ -20,48 +20,30 @@ def field(request: pytest.FixtureRequest, make_field: Any) -> Any:
     return make_field(version=request.param)
 
 
-def still(field: Any, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
-    """A unit that stays where it is and fights nobody."""
-    slot: int = field.put(name, owner, x, y)
-    field.world.looks_around[slot] = False
-    buffs.apply(field.world, slot, "LurkerHoldFireB")
-    if energy is not None:
-        field.world.energy[slot] = energy
-    return slot
-
-
-def until(field: Any, holds: Any, most: int = 500) -> int:
-    """Play until something holds; the loop at which it did."""
-    for loop in field.loops(most):
-        if holds():
-            return int(loop)
-    pytest.fail(f"not within {most} loops")
-
-
 # Yamato cannon --------------------------------------------------------------------------------------------------------
 
 
 def cruiser(field: Any, x: float = 4, y: float = 10) -> int:
-    slot = still(field, "Battlecruiser", 1, x, y)
+    slot: int = field.still("Battlecruiser", 1, x, y)
     field.research(1, "BattlecruiserEnableSpecializations")
     return slot
 
 
 def test_the_yamato_cannon_fires_when_it_is_charged(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(YAMATO)
-    slot, victim = cruiser(field), still(field, "Ultralisk", 2, 13, 10)
+    slot, victim = cruiser(field), field.still("Ultralisk", 2, 13, 10)
     assert field.order(slot, YAMATO, victim)
     field.play(1)
-    fired = until(field, lambda: world.fields)
+    fired = field.until(lambda: world.fields)
     assert fired == 1 + ability.numbers["cast_time_loops"]
-    until(field, lambda: world.life[victim] < 500)
+    field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == ability.numbers["damage"] == 240
     assert casting.cooldown_left(world, slot, ability) == ability.cooldown_loops - (world.loop - fired)
 
 
 def test_a_charge_that_is_broken_off_costs_the_cooldown_only_where_the_tables_say_so(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(YAMATO)
-    slot, victim = cruiser(field), still(field, "Ultralisk", 2, 13, 10)
+    slot, victim = cruiser(field), field.still("Ultralisk", 2, 13, 10)
     field.order(slot, YAMATO, victim)
     field.play(20)
     commands.stop(world, [slot])
@@ -75,15 +57,15 @@ def test_a_charge_that_is_broken_off_costs_the_cooldown_only_where_the_tables_sa
 
 def test_a_charge_follows_its_target_as_far_as_the_slop(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(YAMATO)
-    slot, victim = cruiser(field), still(field, "Ultralisk", 2, 13, 10)
+    slot, victim = cruiser(field), field.still("Ultralisk", 2, 13, 10)
     field.order(slot, YAMATO, victim)
     field.play(10)
     world.pos[victim] = (4 + ability.range + ability.slop, 10)
-    until(field, lambda: world.life[victim] < 500)
+    field.until(lambda: world.life[victim] < 500)
 
 
 def test_the_yamato_cannon_needs_its_research(field: Any) -> None:
-    slot, victim = still(field, "Battlecruiser", 1, 4, 10), still(field, "Ultralisk", 2, 12, 10)
+    slot, victim = field.still("Battlecruiser", 1, 4, 10), field.still("Ultralisk", 2, 12, 10)
     assert field.why_not(slot, YAMATO, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
 
 
@@ -103,7 +85,7 @@ def test_a_jump_takes_its_time_and_nobody_can_touch_the_ship_on_the_way(field: A
     assert world.pos[slot].tolist() == pytest.approx([4, 10], abs=0.1)
     field.play(math.ceil(numbers["out_loops"]))
     assert world.pos[slot].tolist() == pytest.approx([28, 28])
-    over = until(field, lambda: world.targetable[slot])
+    over = field.until(lambda: world.targetable[slot])
     whole = delay + numbers["out_loops"] + numbers["transit_loops"] + numbers["in_loops"]
     assert over == pytest.approx(1 + whole, abs=1.5)
     assert casting.cooldown_left(world, slot, ability) == ability.cooldown_loops - over + 1
@@ -134,7 +116,7 @@ def guarding(field: Any, point: tuple[float, float] = (14, 10)) -> int:
     """A Liberator at (8, 10) that has laid out its zone and taken its mode."""
     slot: int = field.put("Liberator", 1, 8, 10)
     assert field.order(slot, GUARD, point=point)
-    until(field, lambda: field.world.unit_type(slot).name == "LiberatorAG")
+    field.until(lambda: field.world.unit_type(slot).name == "LiberatorAG")
     return slot
 
 
@@ -142,20 +124,20 @@ def test_a_zone_is_set_up_in_its_time_and_shown_to_everybody(field: Any) -> None
     world, numbers = field.world, field.world.catalog.ability(GUARD).numbers
     slot = field.put("Liberator", 1, 9, 10)
     field.order(slot, GUARD, point=(14, 10))
-    begun = until(field, lambda: world.fields)
+    begun = field.until(lambda: world.fields)
     assert [(f.effect, f.radius, f.at) for f in world.fields] == [(8, numbers["radius"], (14, 10))]
     assert begun < 10
-    working = until(field, lambda: world.fields[0].effect == 9)
+    working = field.until(lambda: world.fields[0].effect == 9)
     assert working == begun + numbers["setup_loops"]
     morph = world.catalog.ability(TO_GROUND)
-    done = until(field, lambda: world.unit_type(slot).name == "LiberatorAG")
+    done = field.until(lambda: world.unit_type(slot).name == "LiberatorAG")
     assert done == pytest.approx(begun + 1 + morph.loops, abs=1.5)
 
 
 @pytest.mark.parametrize(("y", "fires"), [(10 + 5 + 0.3, True), (10 + 5 + 0.625 + 0.05, False)])
 def test_a_liberator_fires_only_at_who_touches_its_zone(field: Any, y: float, *, fires: bool) -> None:
     guarding(field)
-    victim = still(field, "Roach", 2, 14, y)
+    victim = field.still("Roach", 2, 14, y)
     field.play(40)
     assert bool(field.world.life[victim] < 145) is fires
 
@@ -164,7 +146,7 @@ def test_a_liberator_fires_only_at_who_touches_its_zone(field: Any, y: float, *,
 def test_a_liberator_on_guard_spares_flyers_and_structures(field: Any, name: str) -> None:
     field.world.growth.paint(0, 0, 32, 32)
     guarding(field)
-    victim = still(field, name, 2, 14, 10)
+    victim = field.still(name, 2, 14, 10)
     life = field.world.life[victim]
     field.play(40)
     assert field.world.life[victim] == life
@@ -173,8 +155,8 @@ def test_a_liberator_on_guard_spares_flyers_and_structures(field: Any, name: str
 def test_a_target_that_leaves_the_zone_is_let_go(field: Any) -> None:
     world = field.world
     guarding(field)
-    victim = still(field, "Ultralisk", 2, 14, 10)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 14, 10)
+    field.until(lambda: world.life[victim] < 500)
     world.pos[victim] = (21.5, 10)
     field.play(3)
     life = world.life[victim]
@@ -185,8 +167,8 @@ def test_a_target_that_leaves_the_zone_is_let_go(field: Any) -> None:
 def test_a_liberator_hits_with_the_weapon_of_the_tables(field: Any) -> None:
     world = field.world
     slot = guarding(field)
-    victim = still(field, "Ultralisk", 2, 14, 10)
-    until(field, lambda: world.life[victim] < 500)
+    victim = field.still("Ultralisk", 2, 14, 10)
+    field.until(lambda: world.life[victim] < 500)
     weapon = world.unit_type(slot).weapons[0]
     assert 500 - world.life[victim] == pytest.approx(
         weapon.hits[0].damage - world.catalog.unit("Ultralisk").armor, abs=0.1
@@ -200,9 +182,9 @@ def test_the_zone_ends_with_the_mode_and_the_ship_takes_off(field: Any) -> None:
     field.play(1)
     assert not [f for f in world.fields if f.effect]
     begun = world.loop
-    done = until(field, lambda: world.unit_type(slot).name == "Liberator")
+    done = field.until(lambda: world.unit_type(slot).name == "Liberator")
     assert done == pytest.approx(begun + world.catalog.ability(TO_AIR).loops, abs=1.5)
-    victim = still(field, "Mutalisk", 2, 10, 10)
+    victim = field.still("Mutalisk", 2, 10, 10)
     field.play(60)
     assert world.life[victim] < 120
 
@@ -225,7 +207,7 @@ def test_a_liberator_carried_away_from_its_zone_gives_it_up(field: Any) -> None:
 
 def test_research_lets_zones_lie_farther_away(field: Any) -> None:
     world, ability = field.world, field.world.catalog.ability(GUARD)
-    slot = still(field, "Liberator", 1, 4, 10)
+    slot: int = field.still("Liberator", 1, 4, 10)
     field.research(1, "LiberatorAGRangeUpgrade")
     more = 4 if world.catalog.version == "4.10" else 2
     assert casting.as_is(world, slot, ability).range == ability.range + more
@@ -240,9 +222,9 @@ def test_research_lets_zones_lie_farther_away(field: Any) -> None:
 
 def test_a_medivac_heals_by_itself_for_energy(field: Any) -> None:
     world, numbers = field.world, field.world.catalog.ability(HEAL).numbers
-    slot, marine = field.put("Medivac", 1, 10, 10), still(field, "Marauder", 1, 12, 10)
+    slot, marine = field.put("Medivac", 1, 10, 10), field.still("Marauder", 1, 12, 10)
     world.life[marine], world.energy[slot] = 25.0, 100.0
-    begun = until(field, lambda: world.life[marine] > 25.0)
+    begun = field.until(lambda: world.life[marine] > 25.0)
     field.play(49)
     rate = numbers["life_per_s_normal"] / 16
     assert world.life[marine] == pytest.approx(25 + rate * (world.loop - begun + 1), abs=rate + 0.01)
@@ -254,7 +236,7 @@ def test_a_medivac_heals_by_itself_for_energy(field: Any) -> None:
 
 def test_healing_stops_at_full_life_and_without_energy(field: Any) -> None:
     world = field.world
-    slot, marine = field.put("Medivac", 1, 10, 10), still(field, "Marine", 1, 12, 10)
+    slot, marine = field.put("Medivac", 1, 10, 10), field.still("Marine", 1, 12, 10)
     world.life[marine], world.energy[slot] = 40.0, 100.0
     field.play(40)
     assert world.life[marine] == world.life_max[marine]
@@ -266,7 +248,7 @@ def test_healing_stops_at_full_life_and_without_energy(field: Any) -> None:
 
 def test_a_medivac_follows_who_walks_away(field: Any) -> None:
     world = field.world
-    slot, scv = field.put("Medivac", 1, 8, 10), still(field, "Marauder", 1, 10, 10)
+    slot, scv = field.put("Medivac", 1, 8, 10), field.still("Marauder", 1, 10, 10)
     world.life[scv], world.energy[slot] = 20.0, 200.0
     field.play(8)
     commands.move(world, [scv], (28, 10))
@@ -277,11 +259,11 @@ def test_a_medivac_follows_who_walks_away(field: Any) -> None:
 
 def test_one_unit_is_healed_by_one_medivac_at_a_time(field: Any) -> None:
     world = field.world
-    marine = still(field, "Marauder", 1, 12, 10)
+    marine = field.still("Marauder", 1, 12, 10)
     world.life[marine] = 25.0
     for y in (8, 10, 12):
         world.energy[field.put("Medivac", 1, 10, y)] = 100.0
-    begun = until(field, lambda: world.life[marine] > 25)
+    begun = field.until(lambda: world.life[marine] > 25)
     field.play(40)
     assert world.life[marine] <= 25 + (world.loop - begun + 2) * 9 / 16
 
@@ -292,13 +274,13 @@ def test_one_unit_is_healed_by_one_medivac_at_a_time(field: Any) -> None:
      ("Marine", 1, Refusal.SUCCESS)],
 )  # fmt: skip
 def test_whom_a_medivac_heals(field: Any, name: str, owner: int, why: Refusal) -> None:
-    slot, other = still(field, "Medivac", 1, 10, 10, energy=50), still(field, name, owner, 12, 10)
+    slot, other = field.still("Medivac", 1, 10, 10, energy=50), field.still(name, owner, 12, 10)
     field.world.life[other] = 20.0
     assert field.why_not(slot, HEAL, other) is why
 
 
 def test_who_is_well_is_not_healed_and_without_energy_nobody_is(field: Any) -> None:
-    slot, marine = still(field, "Medivac", 1, 10, 10, energy=50), still(field, "Marine", 1, 12, 10)
+    slot, marine = field.still("Medivac", 1, 10, 10, energy=50), field.still("Marine", 1, 12, 10)
     assert field.why_not(slot, HEAL, marine) is Refusal.REQUIRES_HEAL_TARGET
     field.world.life[marine], field.world.energy[slot] = 10.0, 0.0
     assert field.why_not(slot, HEAL, marine) is Refusal.NOT_ENOUGH_ENERGY
