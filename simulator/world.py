@@ -25,6 +25,7 @@ from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
+from simulator.remembered import Remembered
 from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.snapshots import Memory
 from simulator.stats import Stats
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
 
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
-    from simulator.census import Census
-    from simulator.contacts import Bodies
     from simulator.fields import Field
     from simulator.maps import GameMap
     from simulator.production import Job
@@ -91,7 +90,7 @@ class Rally:
     target: int = NO_TAG
 
 
-class World(UnitColumns):
+class World(UnitColumns, Remembered):
     """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
 
     The world grows by itself; keep no reference to a column across ``spawn``.
@@ -100,7 +99,8 @@ class World(UnitColumns):
     def __init__(
         self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
     ) -> None:
-        super().__init__()
+        UnitColumns.__init__(self)
+        Remembered.__init__(self)
         self.map: GameMap = game_map
         self.catalog: Catalog = catalog or load_catalog()
         self.seed = seed
@@ -117,7 +117,6 @@ class World(UnitColumns):
         self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
         self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
         self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
-        self.looked_at = -1  # the population that ``visible`` was written for
         self.memories = [Memory() for _ in self.players]  # what each player remembers of what the fog covers
         self.missiles = Missiles()
         self.pending = PendingHits()
@@ -126,16 +125,11 @@ class World(UnitColumns):
         self.fields: list[Field] = []
         self.timers: dict[int, dict[str, float]] = {}  # slot -> cooldown's name -> loop at which it is over
         self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
-        self.natured: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
-        self.natured_at = -1  # the population that this was written for
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
         self.alerts: list[Alert] = []
         self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
         self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
-        self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
-        self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
-        self.powered_at = -1  # the population for which ``powered`` was written
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []
         self.deaths_seen = 0  # how many of the deaths the triggers have been told about
@@ -145,20 +139,9 @@ class World(UnitColumns):
         self.live: Ints = np.zeros(0, dtype=np.int64)
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
-        self.settled = -1  # the population among which no body touched another when all last stood still
-        self.bodies: Bodies | None = None  # of this population
-        self.census: Census | None = None  # of this population
-        self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
-        self.harvesting = False  # whether anybody harvests
-        self.mortal = False  # whether anybody's life is timed
-        self.hiding = False  # whether anybody is cloaked or burrowed
         self.growth = Creep(game_map.terrain, self.catalog.version)
-        self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
-        self.stirred = True  # somebody walked in the last loop
         self.scan_now = True  # somebody lost a target or got an order since the last scan
-        self.orders_changed = True  # somebody got an order, was born or died since orders were last looked over
         self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
-        self.population = 0  # counts births and deaths, for what is worth remembering between them
         self._grow(64)
 
     # units --------------------------------------------------------------------------------------------------------
