@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SEEN_BEFORE = 1
 VISIBLE = 2
+FROM_ABOVE = 1 << 20  # higher than any cliff: nothing hides from it
 
 
 def look(world: World) -> None:
@@ -82,26 +83,24 @@ def _reveal(world: World) -> None:
 
 def _light(world: World, player: int) -> None:
     """Redraw one player's visibility grid."""
-    grid = world.visibility[player]
+    grid, cliff = world.visibility[player], world.map.terrain.cliff
     np.minimum(grid, SEEN_BEFORE, out=grid)
     height, width = grid.shape
-    cliff = world.map.terrain.cliff
-    for point, radius in _lights(world, player):
-        cells = _disc(radius) + np.array(point).astype(np.int64)
-        x, y = cells[:, 0], cells[:, 1]
-        inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        grid[y[inside], x[inside]] = VISIBLE
-    for slot in world.units_of(player).tolist():
-        cells = _disc(float(world.sight[slot])) + world.pos[slot].astype(np.int64)
-        x, y = cells[:, 0], cells[:, 1]
-        inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        x, y = x[inside], y[inside]
-        if world.layer[slot] != Layer.AIR:
-            eye = np.clip(world.pos[slot].astype(np.int64), 0, (width - 1, height - 1))
-            level = int(cliff[eye[1], eye[0]]) + MECHANICS.high_ground_step
-            low = cliff[y, x] < level
-            x, y = x[low], y[low]
-        grid[y, x] = VISIBLE
+    eyes = {(int(x), int(y), radius, FROM_ABOVE) for (x, y), radius in _lights(world, player)}
+    slots = world.units_of(player)
+    cells = world.pos[slots].astype(np.int64)
+    inside = np.clip(cells, 0, (width - 1, height - 1))
+    level = cliff[inside[:, 1], inside[:, 0]].astype(np.int64) + MECHANICS.high_ground_step
+    level[world.layer[slots] == Layer.AIR.value] = FROM_ABOVE
+    eyes.update(zip(*cells.T.tolist(), world.sight[slots].tolist(), level.tolist(), strict=True))
+    for x, y, radius, below in eyes:  # who looks from the same cell sees the same, and the order does not matter
+        mask, half = _disc(radius)
+        left, low = max(x - half, 0), max(y - half, 0)
+        right, high = max(min(x + half + 1, width), left), max(min(y + half + 1, height), low)
+        shape = mask[low - y + half : high - y + half, left - x + half : right - x + half]
+        if below != FROM_ABOVE:
+            shape = shape & (cliff[low:high, left:right] < below)
+        np.copyto(grid[low:high, left:right], VISIBLE, where=shape)
 
 
 def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]]:
@@ -121,5 +120,10 @@ def _lighting(catalog: Catalog) -> NDArray[np.int64]:
 
 
 @lru_cache(maxsize=64)
-def _disc(radius: float) -> NDArray[np.int64]:
-    return geometry.disc_cells(radius)
+def _disc(radius: float) -> tuple[NDArray[np.bool_], int]:
+    """The cells within a radius as a square mask, and how far its middle is from its edge."""
+    cells = geometry.disc_cells(radius)
+    half = int(np.abs(cells).max(initial=0))
+    mask = np.zeros((2 * half + 1, 2 * half + 1), dtype=np.bool_)
+    mask[cells[:, 1] + half, cells[:, 0] + half] = True
+    return mask, half
