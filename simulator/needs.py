@@ -16,10 +16,13 @@ from simulator import buffs
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from simulator.abilities import Need
     from simulator.catalog import Catalog
     from simulator.world import World
 
+FINISHED, EVERYBODY = 0, 1
 ALIAS: Final = "Alias_"
 NATURES: Final[dict[str, Callable[[World, int], bool]]] = {
     "IsTransportOverlord": lambda world, slot: world.unit_type(slot).name == "OverlordTransport",
@@ -90,14 +93,25 @@ def _units(world: World, slot: int, need: Need) -> float:
     player = int(world.owner[slot])
     if need.state.endswith("_here"):
         return float(world.addon[slot] >= 0 and int(world.type[world.addon[slot]]) in rows)
-    mine = np.flatnonzero(world.alive & (world.owner == player))  # those inside others count as well
-    of_kind = np.isin(world.type[mine], list(rows))
-    if need.state == "done":
-        of_kind &= world.build_progress[mine] >= 1.0
-    found = float(np.count_nonzero(of_kind))
+    counted = _tally(world)[FINISHED if need.state == "done" else EVERYBODY, player]
+    found = float(sum(counted[row] for row in rows))
     if need.state.startswith("queued"):
         found += sum(world.catalog.units[row].name in world.players[player].underway for row in rows)
     return found
+
+
+def _tally(world: World) -> NDArray[np.int64]:
+    """[2, players, unit rows] how many finished units, and how many at all, each player has, passengers too."""
+    if world.tally is None or world.tallied != world.loop:
+        slots = np.flatnonzero(world.alive)
+        shape = (len(world.players), len(world.catalog.units))
+        kinds = world.owner[slots] * shape[1] + world.type[slots]
+        finished = kinds[world.build_progress[slots] >= 1.0]
+        world.tallied = world.loop
+        world.tally = np.stack(
+            [np.bincount(k, minlength=shape[0] * shape[1]).reshape(shape) for k in (finished, kinds)]
+        )
+    return world.tally
 
 
 RULES: Final[dict[str, Callable[[World, int, Need], float]]] = {

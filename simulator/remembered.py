@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from simulator.census import Census
     from simulator.columns import Bools, Ints
     from simulator.contacts import Bodies
@@ -25,6 +27,8 @@ class Remembered:
         self.settled = -1  # the population among which no body touched another when all last stood still
         self.bodies: Bodies | None = None  # of this population
         self.census: Census | None = None  # of this population
+        self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``needs``
+        self.tallied = -1  # the loop in which that was counted
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.harvesting = False  # whether anybody harvests
         self.mortal = False  # whether anybody's life is timed

@@ -402,7 +402,7 @@ class World(UnitColumns, Remembered):
         self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.bodies = None
-        self.census = None
+        self.census = self.tally = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
         self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
@@ -419,7 +419,7 @@ class World(UnitColumns, Remembered):
         )
         self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
         self.bodies = None
-        self.census = None
+        self.census = self.tally = None
         self.looked_at = -1
         self.scan_now = True
 
