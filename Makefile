@@ -8,10 +8,10 @@ PYTHONS ?= 3.11 3.12 3.13
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
 
-.PHONY: help install check format types test slow test-all demo bench docs golden picture clean
+.PHONY: help install check format types test pysc2 slow test-all demo bench docs golden picture clean
 
 help: ## What can be made
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .uv/bin/uv:
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
@@ -28,10 +28,13 @@ install: .venv/.ready ## Install everything into .venv
 demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
 	$(RUN)khala run 2s3z_pair
 
-test: install check ## What CI runs: lint, types, contracts and every test
+test: install check ## Lint, types, contracts and every test that is not long
 	$(RUN)pytest
 
-slow: install ## The tests that take long: PySC2's own in full, whole matches
+pysc2: install ## Those of PySC2's own game tests that take long; `make test` runs the others
+	$(RUN)pytest -m slow tests/simulator/live/test_pysc2_own_tests.py
+
+slow: install ## All tests that take long: those of PySC2, random agents, long games, the other version's tables
 	$(RUN)pytest -m slow
 
 check: install ## Lint, format, types and import contracts
