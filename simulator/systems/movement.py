@@ -151,7 +151,7 @@ def _turn(world: World, walkers: Ints, wanted: Floats, step: Floats, left: Float
     product = facing * wanted
     swings = world.glides.take(walkers)
     swings &= left > TURNING_CIRCLES * step
-    step = np.where(swings, step, step * np.maximum(product[:, 0] + product[:, 1], 0.0))
+    step = np.where(swings | ~late, step, step * np.maximum(product[:, 0] + product[:, 1], 0.0))
     return step, np.where(swings[:, None], facing, wanted)
 
 
