@@ -12,8 +12,9 @@ from typing import NoReturn
 
 from protocol.speech.marks import SHORT, Malformed
 
-# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back.
-_NAME = re.compile(r"<(?P<blank>\s*+)(?P<name>[^\W\d](?:\\?+[\w-])*+)(?P<open>\s*+\\?+\()?+")
+# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
+# may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
+_NAME = re.compile(r"<(?P<blank>\s*+)(?P<name>[^\W\d](?:\\?+[\w-])*+)(?P<open>\s*+\\?+\()?")
 _CLOSE = re.compile(r"\s*+\\?+/?+\s*+\\?+>")
 _BRACKET = re.compile(r"[()\[\]{}<>]")
 _OPENED_BY = {")": "(", "]": "[", "}": "{"}

@@ -52,16 +52,17 @@ class Heading:
     team: str | None = None
 
 
-# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back.
+# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
+# may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
 _BULLET = r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+"
-_CLOSE = r"(?:[^\w\n<:(]*+\([^()\n<]{0,80}+\))?+(?:[^\w\n<:]|_)*+"
+_CLOSE = r"(?:[^\w\n<:(]*+\([^()\n<]{0,80}+\))?(?:[^\w\n<:]|_)*+"
 _WORD = r"\w[\w.+-]*+"
 _TO_EDGE = r"[^\w\n<]*+(?=<|$)"
 _KEYWORD = r"(?:analysis|actions?|communications?|messages?)(?![^\W_])"
-_FOR_TEAM = rf"(?:[ \t]+(?:for|of)[ \t]+(?:team[ \t]+)?(?P<of>{_WORD}))?+"
+_FOR_TEAM = rf"(?:[ \t]+(?:for|of)[ \t]+(?:team[ \t]+)?(?P<of>{_WORD}))?"
 _SECTION = (
-    r"(?:(?:final|my|our|next|chosen|team|the)[ \t]+)?+(?:analysis[ \t]+(?:and|&|\+|/)[ \t]+)?"
-    rf"(?P<section>{_KEYWORD})(?:[ \t]*+[0-9]{{1,2}}+)?+{_FOR_TEAM}{_CLOSE}(?::|$)"
+    r"(?:(?:final|my|our|next|chosen|team|the)[ \t]+)?(?:analysis[ \t]+(?:and|&|\+|/)[ \t]+)?"
+    rf"(?P<section>{_KEYWORD})(?:[ \t]*+[0-9]{{1,2}}+)?{_FOR_TEAM}{_CLOSE}(?::|$)"
 )
 _GAP = r"(?:(?=[^\w\n<:,&/+]*+[,&/+])[^\w\n<:]*+|[^\w\n<:]++and[^\w\n<:]++)(?:teams?[ \t]+)?+"
 _SEVERAL = rf"{_WORD}(?:{_GAP}{_WORD}){{1,8}}+"
