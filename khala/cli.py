@@ -214,11 +214,14 @@ app.add_typer(simulator.cli.app, name="sc2")
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
+    faults: list[BaseException] = []
     try:
         app(arguments, prog_name="khala")
     except* (KhalaError, simulator.install.InstallError) as group:
-        for error in _leaves(group):
-            sys.stderr.write(f"khala: {error}\n")
+        faults = list(_leaves(group))
+    for fault in faults:
+        sys.stderr.write(f"khala: {fault}\n")
+    if faults:  # not within `except*`, from where early Pythons 3.11 raise an exit as a part of a group
         sys.exit(1)
 
 
