@@ -4,6 +4,7 @@ python-sc2 writes its log to the standard output and changes signal handlers; so
 what the bots saw goes to a file as JSON.
 """
 
+import asyncio
 import contextlib
 import json
 import os
@@ -21,6 +22,7 @@ from sc2.observer_ai import ObserverAI
 from sc2.player import Bot, Computer
 
 SEEN: dict[str, Any] = {}
+KNOWS = asyncio.Event()  # the fighter knows how its game ended
 MAPS = Path(os.environ["SC2PATH"]) / "Maps"
 
 
@@ -65,9 +67,20 @@ class Fighter(BotAI):
         """Called by python-sc2."""
         SEEN["destroyed"] = SEEN.get("destroyed", 0) + 1
 
+    async def on_end(self, game_result: Result) -> None:
+        """Called by python-sc2."""
+        KNOWS.set()
+
 
 class Quitter(BotAI):
-    """Walks off and gives up soon."""
+    """Walks off and gives up soon; with `waits`, not before the other one knows.
+
+    When the first of two bots is done, python-sc2 kills the game processes of both. In real time the other one is told
+    of its victory only with the next loop.
+    """
+
+    def __init__(self, *, waits: bool = False) -> None:
+        self.waits = waits
 
     async def on_step(self, iteration: int) -> None:
         """Called by python-sc2."""
@@ -76,6 +89,11 @@ class Quitter(BotAI):
         if iteration == 20:
             SEEN["quit at"] = self.state.game_loop
             await self.client.leave()
+
+    async def on_end(self, game_result: Result) -> None:
+        """Called by python-sc2."""
+        if self.waits:
+            await asyncio.wait_for(KNOWS.wait(), timeout=20)
 
 
 class Waiter(BotAI):
@@ -128,7 +146,7 @@ def main(game: str, out: Path) -> None:
         case "a quitter":
             result = _play("Melee/Simple64.SC2Map", _bot(Waiter(), "waiter"), _bot(Quitter(), "quitter"))
         case "real time":
-            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "f"), _bot(Quitter(), "q"), realtime=True)
+            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "f"), _bot(Quitter(waits=True), "q"), realtime=True)
         case "replay":
             with contextlib.suppress(KeyError):  # at the end it looks for the result of a player 0
                 run_replay(Watcher(), str(out.with_suffix(".SC2Replay")), observed_id=1)
