@@ -40,7 +40,7 @@ class Holdings:
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.player: Player = world.players[player]
         self.kind = world.map.scenario.score
-        slots = which(world.alive & (world.owner == player))  # those inside others count, too
+        slots = which(world.alive & (world.owner == player) & ~world.hallucination)  # those inside others count, too
         rows = world.type[slots]
         names, columns = _columns(types)
         totals = np.bincount(rows, minlength=len(columns)) @ columns

@@ -191,3 +191,12 @@ def test_a_panel_of_cargo_that_is_not_there_is_no_fault(make_table: Any) -> None
     assert table.game.act(1, click) == 3
     table.game.step(1)
     assert not table.observe().ui_data.HasField("cargo")
+
+
+def test_images_are_counted_nowhere(make_table: Any) -> None:
+    table = make_table(RAW)
+    table.put("Zealot", 1, 10, 16)
+    before = table.observe().player_common
+    image = table.put("Probe", 1, 12, 16)
+    table.world.hallucination[image] = True
+    assert table.observe().player_common == before
