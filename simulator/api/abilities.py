@@ -41,6 +41,7 @@ class Command:
     target: int = NO_TAG
     point: Point | None = None
     queue: bool = False
+    clicked: Point | None = None  # where on the screen the target was clicked, world units
 
     @property
     def aim(self) -> Aim:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from s2clientprotocol import error_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import casting
 from simulator.abilities import Aim
 from simulator.api import abilities, clicks, pixels
 from simulator.api.abilities import Command, Outcome
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
     from simulator.api.seat import Seat
 
     Result: TypeAlias = error_pb2.ActionResult.ValueType
+
+
+ON_MINIMAP = casting.ORDINARY | {"rally"}
+"""What can be told by a click on the minimap, whoever is told; PySC2 has no such function for most of the rest."""
 
 
 def judge(seat: Seat, action: sc.Action) -> Result:
@@ -111,10 +116,10 @@ def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
 
 def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view: View) -> Command:
     """The command that a click on the screen or the minimap gives to the selected units."""
-    target, point = 0, None
+    target, point, clicked = 0, None, None
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
-        point = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
+        point = clicked = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
         if Aim.UNIT in abilities.aims_of(seat.world.catalog, message.ability_id):
             sight = seat.look()
             row = at_point(sight, seat.types, point, view.screen.scale / 2)
@@ -124,7 +129,7 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view:
         pixel = message.target_minimap_coord
         point = view.minimap.to_world(float(pixel.x), float(pixel.y))
     tags = tuple(seat.selection.tags)
-    return Command(message.ability_id, tags, target=target, point=point, queue=message.queue_command)
+    return Command(message.ability_id, tags, target, point, queue=message.queue_command, clicked=clicked)
 
 
 def _give(seat: Seat, command: Command, loop: int, *, by_tags: bool) -> None:
@@ -152,15 +157,16 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
         elif command.point is not None:
             raw.target_world_space_pos.x = command.point[0] - seat.origin[0]
             raw.target_world_space_pos.y = command.point[1] - seat.origin[1]
-    point = command.point
-    if command.target:
+    point = command.clicked or command.point
+    if command.target and point is None:
         x, y = seat.world.pos[seat.world.slot_of(command.target)].tolist()
         point = x, y
+    does = seat.world.catalog.ability(outcome.ability).does
     for spatial, view in _images(seat, action):
         spatial.unit_command.ability_id = outcome.ability
         spatial.unit_command.queue_command = command.queue
         if point is not None:
-            pixels.write_target(spatial.unit_command, view, seat.camera, point)
+            pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=does in ON_MINIMAP)
 
 
 # camera and clicks ----------------------------------------------------------------------------------------------------

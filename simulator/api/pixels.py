@@ -18,14 +18,21 @@ if TYPE_CHECKING:
 
 
 def write_target(
-    message: spatial_pb2.ActionSpatialUnitCommand, view: View, camera: Point, point: tuple[float, float]
+    message: spatial_pb2.ActionSpatialUnitCommand,
+    view: View,
+    camera: Point,
+    point: tuple[float, float],
+    *,
+    minimap: bool,
 ) -> None:
-    """The click at a world point: on the screen, or on the minimap if that is elsewhere."""
+    """The click at a world point: on the screen; if that is elsewhere on the minimap, or else at the screen's edge."""
     column, row = (math.floor(v) for v in view.screen.to_pixels(*point, camera))
-    if 0 <= column < view.screen.columns and 0 <= row < view.screen.rows:
-        message.target_screen_coord.x, message.target_screen_coord.y = column, row
-    else:
+    inside = 0 <= column < view.screen.columns and 0 <= row < view.screen.rows
+    if minimap and not inside:
         _write_on_minimap(message.target_minimap_coord, view, point)
+        return
+    message.target_screen_coord.x = min(max(column, 0), view.screen.columns - 1)
+    message.target_screen_coord.y = min(max(row, 0), view.screen.rows - 1)
 
 
 def write_camera(message: spatial_pb2.ActionSpatialCameraMove, view: View, camera: Point) -> None:

@@ -200,3 +200,18 @@ def test_images_are_counted_nowhere(make_table: Any) -> None:
     image = table.put("Probe", 1, 12, 16)
     table.world.hallucination[image] = True
     assert table.observe().player_common == before
+
+
+@pytest.mark.parametrize(("ability", "on_minimap"), [(298, False), (1, True)])
+def test_a_command_at_what_is_off_the_screen_is_told_as_a_click_that_clients_know(
+    make_table: Any, ability: int, *, on_minimap: bool
+) -> None:
+    table = make_table(FEATURES)
+    probe, field = table.put("Probe", 1, 10, 16), table.put("MineralField", 0, 30, 16)
+    table.game.act(1, command(ability, [table.world.tag_of(probe)], target=table.world.tag_of(field)))
+    table.game.step(1)
+    (told,) = [a for a in table.respond().actions if a.action_feature_layer.HasField("unit_command")]
+    click = told.action_feature_layer.unit_command
+    assert click.HasField("target_minimap_coord") == on_minimap
+    if not on_minimap:
+        assert (click.target_screen_coord.x, click.target_screen_coord.y) == (31, 16)
