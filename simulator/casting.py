@@ -201,13 +201,19 @@ WORDS: Final[dict[str, Callable[[World, int, int], bool]]] = {
 def in_range(world: World, cast: Cast, *, slop: float | None = None) -> bool:
     """Whether a unit stands near enough for its ability, from edge to edge; ``slop`` is what it may be beyond."""
     ability = cast.ability
-    if ability.range >= ANYWHERE or (cast.target == NOBODY and cast.point is None):
+    away = _distance(world, cast)
+    if away is None or ability.range >= ANYWHERE:
         return True
-    goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
-    assert goal is not None
-    x, y = world.pos[cast.slot].tolist()
-    away = math.hypot(goal[0] - x, goal[1] - y)
     return away <= reach(world, cast) + (ability.slop if slop is None else slop) + 1e-6
+
+
+def _distance(world: World, cast: Cast) -> float | None:
+    """From the caster's centre to the target's or to the point; None for a cast at nothing."""
+    goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
+    if goal is None:
+        return None
+    x, y = world.pos[cast.slot].tolist()
+    return math.hypot(goal[0] - x, goal[1] - y)
 
 
 def reach(world: World, cast: Cast) -> float:
@@ -274,12 +280,9 @@ def _busy(world: World, cast: Cast) -> bool:
 
 
 def _away(world: World, cast: Cast) -> float:
-    if cast.target == NOBODY and cast.point is None:
-        return -float(world.energy[cast.slot])
-    goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
-    assert goal is not None
-    x, y = world.pos[cast.slot].tolist()
-    return math.hypot(goal[0] - x, goal[1] - y)
+    """What a caster is chosen by, the least first: its way, or its energy where there is none."""
+    distance = _distance(world, cast)
+    return -float(world.energy[cast.slot]) if distance is None else distance
 
 
 def perform(world: World, cast: Cast) -> None:

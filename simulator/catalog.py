@@ -77,6 +77,7 @@ class Catalog:
     ordinary: tuple[dict[str, int], ...]
     ability_of_id: dict[int, Ability]
     buff_of_name: dict[str, Buff]
+    upgrade_of: dict[int | str, Upgrade]
 
     def unit(self, key: int | str) -> UnitType:
         """The unit type with this API id or this name; raises ``CatalogError`` when there is none."""
@@ -105,9 +106,9 @@ class Catalog:
 
     def upgrade(self, key: int | str) -> Upgrade:
         """The upgrade with this API id or this name; raises ``CatalogError`` when there is none."""
-        for upgrade in self.upgrades:
-            if key in (upgrade.id, upgrade.name):
-                return upgrade
+        found = self.upgrade_of.get(key)
+        if found is not None:
+            return found
         raise CatalogError(f"no upgrade {key!r} in the tables of version {self.version}")
 
 
@@ -145,6 +146,7 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
         ordinary=tuple({a.does: a.id for a in card if a.does in BASICS} for card in cards),
         ability_of_id={a.id: a for a in abilities},
         buff_of_name={b.name: b for b in buffs},
+        upgrade_of={key: u for u in upgrades for key in (u.id, u.name)},
     )
 
 

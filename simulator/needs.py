@@ -81,7 +81,7 @@ def _buffs(world: World, slot: int, need: Need) -> float:
 
 def _upgrades(world: World, slot: int, need: Need) -> float:
     player = int(world.owner[slot])
-    upgrade = next((u for u in world.catalog.upgrades if u.name == need.name), None)
+    upgrade = world.catalog.upgrade_of.get(need.name)
     if upgrade is None:
         return 0.0
     underway = need.state.startswith("queued") and upgrade.name in world.players[player].underway

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 EDGE_TOLERANCE = 1e-9
 ON_TARGET = 1e-9
 FOLLOW_GAP = 0.5
-ANYWHERE = 500.0
 HARVEST_OVERLAP = 0.05
 FOLLOW = int(OrderKind.FOLLOW)
 TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
@@ -145,12 +144,11 @@ def _approach(world: World) -> None:
     """Units that are to use an ability walk until it reaches, and stand from then on unless they have to follow."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])
-        ability = world.catalog.ability(int(world.order_ability[slot]))
-        ability = world.stats.ability(int(world.owner[slot]), ability)
+        ability = casting.as_is(world, slot, world.catalog.ability(int(world.order_ability[slot])))
         aimed = target != NOBODY or bool(world.order_aimed[slot])
         waits = world.cast_at[slot] < 0.0 and not world.channels[slot]
         follows = bool(world.channels[slot]) and ability.follow_range > 0.0
-        if not (aimed and (waits or follows)) or ability.range >= ANYWHERE:
+        if not (aimed and (waits or follows)) or ability.range >= casting.ANYWHERE:
             continue
         goal = world.pos[target] if target != NOBODY else world.order_point[slot]
         body = float(world.radius[target]) if target != NOBODY else 0.0
