@@ -1,7 +1,8 @@
 """Which unit answers to which agent and team: the one home of the rules of grouping.
 
 A unit is grouped when it is seen finished for the first time, in ascending order of tags, and stays where it is
-until it is gone. A unit that comes back (out of a transport, a gas building) returns to its old team.
+until it is gone. A unit that comes back (out of a transport, a gas building) returns to its old team. Structures are
+units like all others: whoever lists their type has them. What no team lists answers to nobody.
 
 *Agent*: one that admits only `airborne` units, if the unit stands by a transport; otherwise the first agent in
 the order of the task that lists its type and admits it:
@@ -16,10 +17,16 @@ the order of the task that lists its type and admits it:
 
 *Team*, of the agent's teams that list the type: the first, if all of them are empty; then by kind: `group` takes
 the smallest team while that has fewer than 4 units, and later the one whose head is nearest; the others take the
-nearest head within 15, else an empty team, else the nearest head.
+nearest head within 15, else an empty team, else the nearest head. A `side` team has no units and is always there.
+
+*Change of type* (a Gateway becomes a WarpGate, a tank digs in): the unit stays, if its team lists the new type;
+otherwise it goes to a team that does. If none does, a unit in another form (burrowed, sieged, lifted off, in a
+cocoon) counts as the type whose form it is, and any other unit is nobody's from then on. What comes out of an egg,
+and the Archon of two Templar, is a new unit to the game and is grouped as one.
 
 The head of a team is its oldest unit. (The order of a Python set decided it in the original, so that the camera
-jumped.) Sources of the rules: the paper's appendix D and its first implementation; see SOURCES.md.
+jumped.) Sources of the rules: the paper's appendix D and its first implementation; the rule of changes is our own;
+see SOURCES.md.
 """
 
 from __future__ import annotations
@@ -31,7 +38,7 @@ from typing import TYPE_CHECKING
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
@@ -46,6 +53,49 @@ NEAR_TRANSPORT = 4.0
 WORKERS_PER_BUILDER = 30
 ARMY_PER_DEFENDER = 15
 
+FORMS = {
+    "BanelingCocoon": "Zergling",
+    "BroodLordCocoon": "Corruptor",
+    "GreaterSpire": "Spire",
+    "Hellbat": "Hellion",
+    "Hive": "Hatchery",
+    "Lair": "Hatchery",
+    "LiberatorAG": "Liberator",
+    "LurkerCocoon": "Hydralisk",
+    "ObserverSurveillanceMode": "Observer",
+    "OrbitalCommand": "CommandCenter",
+    "OrbitalCommandFlying": "CommandCenter",
+    "OverlordTransport": "Overlord",
+    "OverlordTransportCocoon": "Overlord",
+    "OverseerCocoon": "Overlord",
+    "OverseerOversightMode": "Overseer",
+    "PlanetaryFortress": "CommandCenter",
+    "RavagerCocoon": "Roach",
+    "SiegeTankSieged": "SiegeTank",
+    "SupplyDepotLowered": "SupplyDepot",
+    "ThorHighImpactMode": "Thor",
+    "VikingAssault": "VikingFighter",
+    "WarpGate": "Gateway",
+    "WarpPrismPhasing": "WarpPrism",
+}
+"""By the name of a form: the type as which it counts where no team lists the form."""
+FORM_SUFFIXES = ("Burrowed", "Flying", "Uprooted")
+"""Ends of the names of forms that are made of the type's own name."""
+
+
+def form_of(name: str) -> str | None:
+    """The type that a unit type is another form of; None if it is no form.
+
+    >>> form_of("RoachBurrowed"), form_of("SiegeTankSieged"), form_of("Roach")
+    ('Roach', 'SiegeTank', None)
+    """
+    if name in FORMS:
+        return FORMS[name]
+    for suffix in FORM_SUFFIXES:
+        if name.endswith(suffix) and name != suffix:
+            return name.removesuffix(suffix)
+    return None
+
 
 @dataclass(frozen=True, slots=True)
 class Team:
@@ -55,13 +105,13 @@ class Team:
     name: str
     kind: TeamKind
     tags: tuple[int, ...]
-    """Its units, the head first."""
+    """Its units, the head first; () for a `side` team."""
     control_group: int | None
     config: TeamConfig
 
     @property
     def head(self) -> int:
-        """Tag of the unit that the team's camera follows."""
+        """Tag of the unit that the team's camera follows; a `side` team has none."""
         return self.tags[0]
 
 
@@ -69,47 +119,71 @@ class Roster:
     """Who has which unit in a running episode; one per side."""
 
     def __init__(self, agents: Iterable[AgentConfig]) -> None:
-        self._agents = tuple(agents)
-        self._groups = [[_Group(agent, team) for team in agent.teams] for agent in self._agents]
-        self._places: dict[int, _Group] = {}
+        self._groups = [[_Group(agent, team) for team in agent.teams] for agent in agents]
+        self._homes: dict[int, _Home] = {}
+        self._grouped: set[int] = set()
+        self._takers: dict[int, list[list[_Group]]] = {}  # by unit type; [] for a type that no team lists
 
     def update(self, own: Sequence[raw_pb2.Unit], player: sc_pb.PlayerCommon) -> None:
         """Drops the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
         units = {unit.tag: unit for unit in own}
-        for group in self._all_groups():
-            group.tags = [tag for tag in group.tags if tag in units]
-        grouped = {tag for group in self._all_groups() for tag in group.tags}
-        for unit in own:
-            if unit.tag not in grouped and unit.build_progress >= 1.0:
-                self._place(unit, units, player)
+        self._keep(units)
+        transports: list[raw_pb2.Unit] | None = None
+        for tag, unit in units.items():
+            if tag in self._grouped or not self._taken_by(unit.unit_type) or unit.build_progress < 1.0:
+                continue
+            if transports is None:
+                transports = [u for u in own if unit_name(u.unit_type) in TRANSPORTS]
+            self._place(_Arrival(unit, units, transports, player))
 
     def teams(self, agent: str) -> tuple[Team, ...]:
-        """The agent's teams that have units, in the order of its configuration."""
+        """The agent's teams that have units, and its `side` teams, in the order of its configuration."""
         return tuple(team for group in self._all_groups() if group.agent.name == agent for team in group.teams())
 
     def idle_teams(self, agent: str) -> tuple[str, ...]:
-        """Names of the agent's teams that have no unit now."""
-        return tuple(g.config.name for g in self._all_groups() if g.agent.name == agent and not g.tags)
+        """Names of the agent's teams that have no unit now, though they could."""
+        groups = (group for group in self._all_groups() if group.agent.name == agent and group.config.kind != "side")
+        return tuple(group.config.name for group in groups if not group.tags)
 
-    def _all_groups(self) -> Iterable[_Group]:
+    def _all_groups(self) -> Iterator[_Group]:
         return (group for groups in self._groups for group in groups)
 
-    def _place(self, unit: raw_pb2.Unit, units: Mapping[int, raw_pb2.Unit], player: sc_pb.PlayerCommon) -> None:
-        group = self._places.get(unit.tag) or self._find(unit, units, player)
-        if group is not None:
-            self._places[unit.tag] = group
-            group.add(unit.tag)
+    def _keep(self, units: Mapping[int, raw_pb2.Unit]) -> None:
+        """Leaves in the teams those who are still there, as what they were; moves out those who became another."""
+        for tag in self._grouped & units.keys():
+            home, unit_type = self._homes[tag], units[tag].unit_type
+            if home.unit_type != unit_type:
+                if _lists(self._taken_by(unit_type), home.group):
+                    home.unit_type = unit_type
+                else:
+                    del self._homes[tag]
+        for group in self._all_groups():
+            group.tags = [tag for tag in group.tags if tag in units and tag in self._homes]
+        self._grouped = {tag for group in self._all_groups() for tag in group.tags}
 
-    def _find(self, unit: raw_pb2.Unit, units: Mapping[int, raw_pb2.Unit], player: sc_pb.PlayerCommon) -> _Group | None:
-        name = unit_name(unit.unit_type)
-        by_agent = [[g for g in groups if name in g.config.unit_types] for groups in self._groups]
-        for airborne in (True, False):
-            for groups, candidates in zip(self._groups, by_agent, strict=True):
-                if not candidates or (candidates[0].agent.admits == "airborne") != airborne:
-                    continue
-                if _admits(groups, name, unit, units, player):
-                    return _choose(candidates, unit, units)
-        return None
+    def _place(self, arrival: _Arrival) -> None:
+        tag, unit_type = arrival.unit.tag, arrival.unit.unit_type
+        home, takers = self._homes.get(tag), self._taken_by(unit_type)
+        if home is not None and _lists(takers, home.group):
+            group: _Group | None = home.group
+        else:
+            group = _find(takers, arrival)
+        if group is not None:
+            self._homes[tag] = _Home(group, unit_type)
+            self._grouped.add(tag)
+            group.add(tag)
+
+    def _taken_by(self, unit_type: int) -> list[list[_Group]]:
+        """The groups that list a unit type, agent by agent."""
+        if unit_type not in self._takers:
+            name: str | None = unit_name(unit_type)
+            takers: list[list[_Group]] = []
+            while name is not None and not takers:
+                found = ([g for g in groups if name in g.config.unit_types] for groups in self._groups)
+                takers = [groups for groups in found if groups]
+                name = form_of(name)
+            self._takers[unit_type] = takers
+        return self._takers[unit_type]
 
 
 @dataclass(slots=True)
@@ -126,42 +200,68 @@ class _Group:
         self.tags.append(tag)
         self.numbers.setdefault(tag, len(self.numbers) + 1)
 
-    def teams(self) -> Iterable[Team]:
+    def teams(self) -> Iterator[Team]:
         name, kind, agent = self.config.name, self.config.kind, self.agent.name
-        if not self.tags:
-            return
-        if kind != "select":
+        if kind == "side":
+            yield Team(agent, name, kind, (), None, self.config)
+        elif kind == "select":
+            for tag in self.tags:
+                yield Team(agent, f"{name}-{self.numbers[tag]}", kind, (tag,), None, self.config)
+        elif self.tags:
             yield Team(agent, name, kind, tuple(self.tags), self.config.control_group, self.config)
-            return
-        for tag in self.tags:
-            yield Team(agent, f"{name}-{self.numbers[tag]}", kind, (tag,), None, self.config)
 
 
-def _admits(
-    groups: Sequence[_Group],
-    name: str,
-    unit: raw_pb2.Unit,
-    units: Mapping[int, raw_pb2.Unit],
-    player: sc_pb.PlayerCommon,
-) -> bool:
+@dataclass(slots=True)
+class _Home:
+    """Where a unit belongs, and the type that it had when that was last looked at."""
+
+    group: _Group
+    unit_type: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Arrival:
+    """A unit that has no team, and what there is around it."""
+
+    unit: raw_pb2.Unit
+    units: Mapping[int, raw_pb2.Unit]
+    transports: Sequence[raw_pb2.Unit]
+    player: sc_pb.PlayerCommon
+
+
+def _lists(takers: Iterable[Sequence[_Group]], group: _Group) -> bool:
+    return any(taker is group for groups in takers for taker in groups)
+
+
+def _find(takers: Sequence[Sequence[_Group]], arrival: _Arrival) -> _Group | None:
+    """The group that takes a unit: agents of airborne units are asked first, then all others, in their order."""
+    for airborne in (True, False):
+        for groups in takers:
+            if (groups[0].agent.admits == "airborne") == airborne and _admits(groups, arrival):
+                return _choose(groups, arrival)
+    return None
+
+
+def _admits(groups: Sequence[_Group], arrival: _Arrival) -> bool:
+    unit, player = arrival.unit, arrival.player
     has = sum(len(group.tags) for group in groups)
     match groups[0].agent.admits:
         case "combat":
-            return name not in WORKERS or has == 0
+            return has == 0 or unit_name(unit.unit_type) not in WORKERS
         case "builder":
             return has < player.food_workers / WORKERS_PER_BUILDER
         case "defender":
             return has < player.food_army / ARMY_PER_DEFENDER
         case "airborne":
-            transports = [u for u in units.values() if unit_name(u.unit_type) in TRANSPORTS and u.tag != unit.tag]
-            return name in TRANSPORTS or any(_distance(unit, t) < NEAR_TRANSPORT for t in transports)
+            return any(t.tag == unit.tag or _distance(unit, t) < NEAR_TRANSPORT for t in arrival.transports)
         case "any":
             return True
 
 
-def _choose(groups: Sequence[_Group], unit: raw_pb2.Unit, units: Mapping[int, raw_pb2.Unit]) -> _Group:
+def _choose(groups: Sequence[_Group], arrival: _Arrival) -> _Group:
     if not any(group.tags for group in groups):
         return groups[0]
+    unit, units = arrival.unit, arrival.units
     smallest = min(groups, key=lambda group: len(group.tags))
     nearest = min((g for g in groups if g.tags), key=lambda group: _distance(unit, units[group.tags[0]]))
     if groups[0].config.kind == "group":

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.observe.teams import Roster
+from bridge.compat import units as pysc2_units
+from bridge.observe.teams import FORMS, Roster, form_of
 from bridge.task import AgentConfig, TaskConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from s2clientprotocol import raw_pb2
-
-ORDERS = {"Zealot": ("Stop",), "Stalker": ("Stop",), "Probe": ("Stop",), "Observer": ("Stop",), "WarpPrism": ("Stop",)}
+TYPES = ("Zealot", "Stalker", "Probe", "Observer", "WarpPrism", "Gateway", "WarpGate", "HighTemplar", "Archon")
+TYPES += ("Roach", "Zergling", "Baneling", "SiegeTank", "PhotonCannon")
+ORDERS = dict.fromkeys(TYPES, ("Stop",))
 
 
 def agent(name: str, *teams: dict[str, Any], admits: str = "combat") -> AgentConfig:
@@ -134,3 +137,110 @@ def test_the_army_of_2s3z_is_grouped_as_in_the_paper(
         "Zealot-2": 1,
         "Stalker-1": 2,
     }
+
+
+# --- units that change their type -----------------------------------------------------------------------------
+
+NUMBERS = {
+    member.name: int(member) for race in (pysc2_units.Protoss, pysc2_units.Terran, pysc2_units.Zerg) for member in race
+}
+"""Unit types as the game counts them, forms among them that `knowledge` need not know."""
+
+
+def followed(agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None) -> list[object]:
+    """Agent and team of every unit at each moment; a moment says of what type the units are then."""
+    roster, found = Roster(agents), []
+    for moment in moments:
+        own = [raw_pb2.Unit(tag=tag, unit_type=NUMBERS[name], build_progress=1) for tag, name in sorted(moment.items())]
+        for unit in own:
+            unit.pos.x = (at or {}).get(unit.tag, 10.0)
+        roster.update(own, sc_pb.PlayerCommon(food_workers=12))
+        found.append({tag: f"{t.agent} {t.name}" for a in agents for t in roster.teams(a.name) for tag in t.tags})
+    return found
+
+
+def test_a_gateway_that_becomes_a_warp_gate_goes_to_the_team_that_lists_it() -> None:
+    agents = [agent("A", team("Gates", "Gateway")), agent("D", team("Warp", "WarpGate", kind="select_all_type"))]
+    assert followed(
+        agents, {1: "Gateway", 2: "Gateway"}, {1: "WarpGate", 2: "Gateway"}, {1: "Gateway", 2: "Gateway"}
+    ) == [
+        {1: "A Gates", 2: "A Gates"},
+        {1: "D Warp", 2: "A Gates"},
+        {1: "A Gates", 2: "A Gates"},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("listed", "form"),
+    [
+        ("Observer", "ObserverSurveillanceMode"),
+        ("WarpPrism", "WarpPrismPhasing"),
+        ("Gateway", "WarpGate"),
+        ("SiegeTank", "SiegeTankSieged"),
+        ("Roach", "RoachBurrowed"),
+        ("Roach", "RavagerCocoon"),
+        ("Zergling", "BanelingCocoon"),
+    ],
+)
+def test_a_unit_in_another_form_stays_if_no_team_lists_the_form(listed: str, form: str) -> None:
+    agents = [agent("A", team("First", listed), team("Second", listed))]
+    moments = ({1: listed, 2: listed}, {1: form, 2: listed}, {1: listed, 2: form})
+    assert followed(agents, *moments) == [{1: "A First", 2: "A Second"}] * 3
+
+
+def test_a_unit_first_seen_in_another_form_is_grouped_as_what_it_is_a_form_of() -> None:
+    assert followed([agent("A", team("Tanks", "SiegeTank"))], {1: "SiegeTankSieged"}) == [{1: "A Tanks"}]
+
+
+def test_a_unit_that_becomes_something_no_team_lists_is_nobodys_from_then_on() -> None:
+    agents = [agent("A", team("Lings", "Zergling"))]
+    moments = ({1: "Zergling", 2: "Zergling"}, {1: "BanelingCocoon", 2: "Zergling"}, {1: "Baneling", 2: "Zergling"})
+    assert followed(agents, *moments) == [{1: "A Lings", 2: "A Lings"}, {1: "A Lings", 2: "A Lings"}, {2: "A Lings"}]
+
+
+def test_the_archon_of_two_templar_is_grouped_as_a_new_unit() -> None:
+    agents = [agent("Main", team("Archons", "Archon")), agent("Casters", team("Templar", "HighTemplar"))]
+    moments = ({1: "HighTemplar", 2: "HighTemplar"}, {3: "Archon"})
+    assert followed(agents, *moments) == [{1: "Casters Templar", 2: "Casters Templar"}, {3: "Main Archons"}]
+
+
+def test_a_unit_that_was_carried_away_returns_to_its_team_where_it_is_set_down() -> None:
+    agents = [
+        agent("Air", team("Drop", "Zealot"), team("Prism", "WarpPrism"), admits="airborne"),
+        agent("C", team("Z", "Zealot")),
+    ]
+    everybody = {1: "WarpPrism", 2: "Zealot", 3: "Zealot"}
+    moments = ({2: "Zealot", 3: "Zealot"}, everybody, {1: "WarpPrism", 3: "Zealot"}, everybody)
+    (*_, last) = followed(agents, *moments)
+    assert last == {1: "Air Prism", 2: "C Z", 3: "C Z"}
+
+
+def test_a_dead_builder_is_replaced_by_the_next_worker() -> None:
+    agents = [agent("B", team("Builder", "Probe"), admits="builder")]
+    moments = ({1: "Probe", 2: "Probe", 3: "Probe"}, {2: "Probe", 3: "Probe"}, {3: "Probe"})
+    assert followed(agents, *moments) == [{1: "B Builder"}, {2: "B Builder"}, {3: "B Builder"}]
+
+
+def test_structures_answer_to_whoever_lists_their_type() -> None:
+    agents = [agent("C", team("Z", "Zealot")), agent("D", team("Guns", "PhotonCannon"))]
+    assert followed(agents, {1: "PhotonCannon", 2: "Nexus", 3: "Zealot"}) == [{1: "D Guns", 3: "C Z"}]
+
+
+def test_every_form_and_what_it_is_a_form_of_is_a_unit_of_pysc2() -> None:
+    assert {name for pair in FORMS.items() for name in pair} <= NUMBERS.keys()
+    by_suffix = {name: base for name in NUMBERS if name not in FORMS and (base := form_of(name))}
+    assert set(by_suffix.values()) <= NUMBERS.keys()
+    assert not {"Locust", "Burrowed"} & by_suffix.keys()
+
+
+def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
+    agents = [agent("B", team("Builder", "Probe"), admits="builder"), agent("C", team("Z", "Zealot", "Stalker"))]
+    names = ["Probe"] * 70 + ["Zealot"] * 60 + ["Stalker"] * 50 + ["Nexus"] * 20
+    own = [raw_pb2.Unit(tag=n, unit_type=NUMBERS[name], build_progress=1) for n, name in enumerate(names, 1)]
+    roster, player, took_s = Roster(agents), sc_pb.PlayerCommon(food_workers=70), []
+    for _ in range(20):
+        began = time.perf_counter()
+        roster.update(own, player)
+        took_s.append(time.perf_counter() - began)
+    assert len(roster.teams("C")[0].tags) == 110
+    assert min(took_s) < 0.001
