@@ -1,77 +1,140 @@
-"""The catalogue of text actions: a typed reading of `bridge/data/actions.yaml`.
+"""The catalogue of text actions: those that were written by hand, and those that follow from PySC2's functions.
 
-It says what an action is called, what it takes, who may use it and what PySC2 calls it. It decides nothing: whether
-a call fits it is the business of `bridge.act.recognise`, whether it may be done now that of `bridge.act.translate`.
-It does not import PySC2, which takes seconds, so that tasks can be listed and checked quickly; that PySC2 has every
-function that is named here, and that both functions of an action are one ability, is tested.
+The files of `bridge/data/actions/` hold the actions of the paper and others that deserve words of their own;
+`bridge.generated` makes one of every function that none of them stands for, and the forms for a single unit. The
+whole is checked while it is loaded. It does not import PySC2: that PySC2 has every function that is named here is
+checked where a game starts.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import Literal, TypeAlias
+import hashlib
+from typing import TYPE_CHECKING
 
 from bridge import data
-from protocol.messages import ActionSpec, Frozen
+from bridge.action import GROUP_SELECTOR, Action, ArgKind
+from bridge.errors import CatalogueError
+from bridge.functions import functions
+from bridge.generated import generated
 
-ArgKind: TypeAlias = Literal["tag", "screen", "minimap"]
-FILE = "actions.yaml"
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
+__all__ = ["Action", "ArgKind", "alias_of", "catalogue", "catalogue_sha256", "chosen", "curated"]
 
-class Needs(Frozen):
-    """What has to be true for an action to be valid now."""
-
-    weapon: bool = False
-    """The unit type has a weapon."""
-    upgrade: str | None = None
-    """The player has this upgrade, named as in `pysc2.lib.upgrades`."""
-
-
-class Action(Frozen):
-    """One text action."""
-
-    name: str = ""
-    args: tuple[ArgKind, ...] = ()
-    about: str
-    subject: Literal["team", "unit"] = "team"
-    """Who carries it out: the whole team, or the unit that the first argument names."""
-    units: tuple[str, ...] = ()
-    """Unit types that have it; () for every type."""
-    target: Literal["enemy", "own"] | None = None
-    raw: str | None = None
-    """Name of PySC2's raw function; None for an action that orders nothing."""
-    screen: str | None = None
-    """Name of PySC2's function for the screen executor."""
-    queue: bool = False
-    needs: Needs = Needs()
-
-    @property
-    def target_kind(self) -> ArgKind | None:
-        """What the target is given as; None for an action without a target."""
-        args = self.args[1:] if self.subject == "unit" else self.args
-        return args[0] if args else None
-
-    @property
-    def form(self) -> str:
-        """How it is written: `<Attack_Unit(tag)>`."""
-        return f"<{self.name}({', '.join(self.args)})>"
-
-    @functools.cached_property
-    def spec(self) -> ActionSpec:
-        """What an agent is told of it."""
-        return ActionSpec(name=self.name, args=self.args, description=self.about)
-
-    def fits(self, unit_type: str) -> bool:
-        """Whether units of this type have it at all."""
-        return not self.units or unit_type in self.units
+DIRECTORY = "actions"
+_TARGETS: dict[str, frozenset[ArgKind | None]] = {
+    "quick": frozenset({None}),
+    "autocast": frozenset({None}),
+    "screen": frozenset({"tag", "screen", "minimap"}),
+    "minimap": frozenset({"minimap"}),
+    "interface": frozenset({None}),
+}
+"""What the target of an action may be, by the kind of the function that it ends in."""
 
 
 @functools.cache
 def catalogue() -> dict[str, Action]:
-    """Every text action by name, in the order of the file."""
-    return {name: action.model_copy(update={"name": name}) for name, action in data.table(FILE, Action).items()}
+    """Every text action by name: the files in the order of their names, then what follows from them.
+
+    Raises:
+        CatalogueError: an entry contradicts another one or PySC2's functions.
+    """
+    written = curated()
+    found = dict(written)
+    for action in generated(written):
+        _check(action, found, "made by rule")
+        found[action.name] = action
+    return found
+
+
+@functools.cache
+def curated() -> dict[str, Action]:
+    """The actions of the files, by name.
+
+    Raises:
+        CatalogueError: an entry contradicts another one or PySC2's functions.
+    """
+    found: dict[str, Action] = {}
+    for file in _files():
+        for name, entry in data.table(file, Action).items():
+            action = entry.model_copy(update={"name": name})
+            _check(action, found, file)
+            found[name] = action
+    return found
+
+
+@functools.cache
+def _by_any_name() -> dict[str, Action]:
+    names = {action.name.casefold(): action for action in catalogue().values()}
+    aliases = {alias.casefold(): action for action in catalogue().values() for alias in action.aliases}
+    return aliases | names
+
+
+def alias_of(name: str) -> Action | None:
+    """The action of this name or alias, in any case of letters; None if there is none."""
+    return _by_any_name().get(name.casefold())
+
+
+def chosen(names: Iterable[str], unit_type: str | None = None) -> tuple[str, ...]:
+    """Names of actions, with each `group:<name>` replaced by the actions of that group, each once.
+
+    Args:
+        names: names of actions and groups.
+        unit_type: of a group only what units of this type have, and no more than they are told one by one; None for
+            the actions of a side.
+
+    Raises:
+        ValueError: there is no such group.
+    """
+    found: dict[str, None] = {}
+    for name in names:
+        if name.startswith(GROUP_SELECTOR):
+            found |= dict.fromkeys(_of_group(name.removeprefix(GROUP_SELECTOR), unit_type))
+        else:
+            found[name] = None
+    return tuple(found)
+
+
+def _of_group(group: str, unit_type: str | None) -> list[str]:
+    members = [action for action in catalogue().values() if action.group == group]
+    if not members:
+        groups = ", ".join(dict.fromkeys(action.group for action in catalogue().values()))
+        raise ValueError(f"there is no group of actions '{group}', there are {groups}")
+    if unit_type is None:
+        return [action.name for action in members if action.subject == "side"]
+    return [action.name for action in members if action.subject != "side" and action.fits(unit_type)]
 
 
 def catalogue_sha256() -> str:
-    """Hash of the catalogue, for the run card."""
-    return data.sha256(FILE)
+    """Hash of the whole catalogue, for the run card."""
+    digest = hashlib.sha256()
+    for action in catalogue().values():
+        digest.update(action.model_dump_json().encode())
+    return digest.hexdigest()
+
+
+def _files() -> list[str]:
+    return [f"{DIRECTORY}/{file.name}" for file in sorted(data.path(DIRECTORY).glob("*.yaml"))]
+
+
+def _check(action: Action, others: dict[str, Action], source: str) -> None:
+    """Raises `CatalogueError` if an action cannot be what it says."""
+    if fault := _fault(action, others):
+        raise CatalogueError(f"text action {action.name} ({source}): {fault}")
+
+
+def _fault(action: Action, others: dict[str, Action]) -> str | None:
+    function = action.function and functions().get(action.function)
+    named = action.args[: action.named]
+    faults = {
+        "there are two of this name": action.name in others,
+        f"it names {action.named} unit(s) first, which are tags": named != ("tag",) * action.named,
+        f"it has more than one target: {action.args}": len(action.args) > action.named + 1,
+        f"PySC2 has no function {action.function}": action.function is not None and not function,
+        f"{action.function} takes no {action.target_kind or 'order without a target'}": (
+            action.rule is None and function and action.target_kind not in _TARGETS[function.kind]
+        ),
+    }
+    return next((fault for fault, is_so in faults.items() if is_so), None)

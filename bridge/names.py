@@ -46,8 +46,3 @@ def order_name(ability: int) -> str:
     if raw.general_id:
         return order_name(raw.general_id)
     return _FORM.sub("", raw.name)
-
-
-def ability_of(raw_function: str) -> int:
-    """Ability that a raw function of PySC2 stands for, by the name of the function, `Attack_unit`."""
-    return int(actions.RAW_FUNCTIONS[raw_function].ability_id)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from s2clientprotocol import raw_pb2
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from protocol.messages import Outcome
@@ -23,6 +25,9 @@ class Snapshot:
     response: sc_pb.ResponseObservation
     info: sc_pb.ResponseGameInfo
     """About the game and its map; the same object for a whole episode."""
+    abilities: Mapping[int, frozenset[int]] | None = None
+    """By tag of an own unit, the abilities that the game would take from it now, each as itself and in its general
+    form; None if the game was not asked."""
     functions: frozenset[int] = frozenset()
     """Ids of the PySC2 functions that the current selection allows."""
     dead: frozenset[int] = frozenset()

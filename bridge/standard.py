@@ -14,7 +14,7 @@ from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.messages import Clock
 
 if TYPE_CHECKING:
-    from bridge.catalog import Action
+    from bridge.action import Action
     from bridge.maps import MapSpec
 
 AGENT = "Commander"

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from bridge.catalog import Action, catalogue
+from bridge.action import GROUP_SELECTOR, Action
+from bridge.catalog import alias_of, catalogue, chosen
 from bridge.knowledge import knowledge
 from bridge.maps import Difficulty, MapSpec, Race, known_maps
 from protocol.errors import WrongKey
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 T = TypeVar("T")
-TeamKind: TypeAlias = Literal["select", "select_all_type", "group"]
+TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
+AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
 
 
@@ -45,6 +47,14 @@ def _known(name: str, known: Iterable[str], what: str) -> str:
     raise ValueError(f"there is no {what} '{name}'{hint}")
 
 
+def _known_action(name: str) -> str:
+    """An action as the catalogue spells it; a group is left to those who know whom it is for."""
+    if name.startswith(GROUP_SELECTOR):
+        return name
+    action = alias_of(name)
+    return action.name if action else _known(name, catalogue(), "action")
+
+
 def _some(values: tuple[T, ...]) -> tuple[T, ...]:
     """At least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
     if not values:
@@ -54,7 +64,7 @@ def _some(values: tuple[T, ...]) -> tuple[T, ...]:
 
 KeyName: TypeAlias = Annotated[str, AfterValidator(_key_name)]
 UnitTypeName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, knowledge(), "unit type"))]
-ActionName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, catalogue(), "action"))]
+ActionName: TypeAlias = Annotated[str, AfterValidator(_known_action)]
 MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: name and _known(name, known_maps(), "map"))]
 
 
@@ -62,13 +72,56 @@ class TeamConfig(Frozen):
     """One team of an agent."""
 
     name: KeyName
-    unit_types: Annotated[tuple[UnitTypeName, ...], AfterValidator(_some)]
+    unit_types: tuple[UnitTypeName, ...] = ()
     kind: TeamKind = "group"
     """`select`: every unit is a team of its own, named `<name>-1`, `<name>-2`, …; `select_all_type`: the units of
-    a type around the first one; `group`: a control group, units are spread over the agent's teams."""
+    a type around the first one; `group`: a control group, units are spread over the agent's teams; `side`: no units,
+    but orders to those of the whole side, its producers, workers or army, which the host chooses."""
+    actions: tuple[ActionName, ...] = ()
+    """What a team of the kind `side` may be told; `group:<name>` stands for a whole group of actions."""
     control_group: int | None = Field(default=None, ge=0, le=9)
     """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
     task: str = ""
+
+    @field_validator("actions")
+    @classmethod
+    def _of_the_side(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        names = chosen(names)
+        if strange := [name for name in names if catalogue()[name].subject != "side" and catalogue()[name].function]:
+            raise ValueError(f"{strange[0]} is for units, and this is for the whole side")
+        return names
+
+    @model_validator(mode="after")
+    def _units_or_side(self) -> Self:
+        if self.kind == "side":
+            if self.unit_types or not self.actions:
+                raise ValueError(f"team {self.name} is of the kind side: it has actions and no unit_types")
+        elif self.actions or not self.unit_types:
+            raise ValueError(f"team {self.name} needs unit_types; what they may be told is listed by type of unit")
+        return self
+
+
+class ImageSpec(Frozen):
+    """One picture that an agent is shown with each observation."""
+
+    what: str
+    """What it shows."""
+    size_px: int = Field(default=512, ge=64, le=2048)
+    """Length of its sides."""
+    format: Literal["jpeg", "png", "webp"] = "jpeg"
+    marks: bool = True
+    """Whether units are marked with the last digits of their tags."""
+
+
+class AutoConfig(Frozen):
+    """What the host does by itself, with units that no agent has ordered in the same turn."""
+
+    gather: bool = False
+    """Sends idle workers to minerals and gas."""
+    train_workers: bool = False
+    """Trains workers while bases have room for them."""
+    warpgates: bool = False
+    """Turns Gateways into WarpGates once that is researched."""
 
 
 class AgentConfig(Frozen):
@@ -76,11 +129,21 @@ class AgentConfig(Frozen):
 
     name: KeyName
     role: str
+    kind: AgentKind = "combat_group"
+    """What it is for; decides what its observations speak of unless `sections` says it."""
+    sections: tuple[str, ...] = ()
+    """Names of the sections of its observations, in their order; () for those of its kind."""
+    images: tuple[ImageSpec, ...] = ()
+    text_tokens: int | None = Field(default=None, ge=100)
+    """About how long its observations may be; None for no limit."""
+    talks_to: tuple[KeyName, ...] | None = None
+    """Agents that it may write to; None for all."""
     admits: Admission = "combat"
     """Which units it takes of those that its teams list; see `bridge.observe.teams`."""
     teams: Annotated[tuple[TeamConfig, ...], AfterValidator(_some)]
-    actions: dict[UnitTypeName, tuple[ActionName, ...]]
-    """Names of text actions by unit type, in the order in which they are shown."""
+    actions: dict[UnitTypeName, tuple[ActionName, ...]] = Field(default_factory=dict)
+    """Names of text actions by unit type, in the order in which they are shown; `group:<name>` stands for those of a
+    group that the type has."""
     task: str = ""
     """What it has to do besides the task of all."""
     required: bool = True
@@ -89,10 +152,11 @@ class AgentConfig(Frozen):
     @field_validator("actions")
     @classmethod
     def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-        for unit_type, names in actions.items():
+        found = {unit_type: chosen(names, unit_type) for unit_type, names in actions.items()}
+        for unit_type, names in found.items():
             if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
                 raise ValueError(f"{unit_type} has no action {strange[0]}")
-        return actions
+        return found
 
     @model_validator(mode="after")
     def _every_type_has_actions(self) -> Self:
@@ -104,7 +168,8 @@ class AgentConfig(Frozen):
 
     def catalogue(self) -> tuple[Action, ...]:
         """Every action that any of its units may be told, in the order in which they are first listed."""
-        names = dict.fromkeys(name for listed in self.actions.values() for name in listed)
+        lists = (*(team.actions for team in self.teams), *self.actions.values())
+        names = dict.fromkeys(name for listed in lists for name in listed)
         return tuple(catalogue()[name] for name in names)
 
     def team_specs(self) -> tuple[TeamSpec, ...]:
@@ -142,6 +207,7 @@ class TaskConfig(Frozen):
     executor: Literal["raw", "screen"] = "raw"
     clock: Clock = Clock()
     frames: Frames = Frames()
+    auto: AutoConfig = AutoConfig()
     default_reply: str = ""
     """What an agent is taken to have said that did not answer in time; empty: its units go on with what they do."""
     max_actions: int = Field(default=3, ge=1)
@@ -160,6 +226,10 @@ class TaskConfig(Frozen):
     @classmethod
     def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
         _once((agent.name for agent in agents), "agent")
+        names = [agent.name for agent in agents]
+        for agent in agents:
+            for name in agent.talks_to or ():
+                _known(name, names, "agent")
         groups = [t.control_group for a in agents for t in a.teams if t.control_group is not None]
         _once((str(group) for group in groups), "control group")
         return agents

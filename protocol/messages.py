@@ -31,7 +31,10 @@ RejectionReason = Literal[
     "wrong_arguments",  # number or form of the arguments
     "unknown_team",  # a team that this agent does not have
     "unknown_target",  # a tag that names no unit in sight
+    "dead_target",  # a tag of a unit that has died
+    "not_yours",  # a tag of a unit that does not obey this team
     "invalid_target",  # a unit or a point that this action cannot be used on
+    "wrong_frame",  # a point that only makes sense in the other frame
     "out_of_bounds",  # a point outside of its frame or of the map
     "not_available",  # known, but not now: cost, cooldown, requirement
     "too_many_actions",  # over the number of actions a team may have in one reply
@@ -193,12 +196,19 @@ class View(Frozen):
 
 
 class ImageRef(Frozen):
-    """A picture that belongs to an observation and travels on a topic of its own."""
+    """A picture that belongs to an observation and travels, as nothing but its bytes, on a topic of its own."""
 
     name: str
-    media_type: Literal["image/jpeg", "image/png"]
+    media_type: Literal["image/jpeg", "image/png", "image/webp"]
     sha256: str
+    """Hash of the bytes, by which a receiver finds them among those that arrived."""
     title: str = ""
+    """One line that tells a model what it shows."""
+    width: int = Field(ge=1)
+    """In pixels."""
+    height: int = Field(ge=1)
+    bytes: int = Field(ge=1)
+    """How many there are."""
 
 
 class Received(Frozen):
@@ -357,6 +367,8 @@ class ChatMessage(Frozen):
 
     role: Literal["system", "user", "assistant"]
     content: str
+    images: tuple[ImageRef, ...] = ()
+    """Pictures that stand before the text, in their order."""
 
 
 class Exchange(Wire):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from s2clientprotocol import error_pb2
 
 from bridge.act.recognise import Refused, reject
-from bridge.names import ability_of, order_name
+from bridge.names import order_name
 from bridge.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[Refus
 
 
 def _order(command: Command) -> str:
-    return order_name(ability_of(command.action.raw)) if command.action.raw else ""
+    return order_name(command.function.ability_id)
 
 
 def words(result: int) -> str:

@@ -12,7 +12,6 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act.plan import Plan, Played, Step, listed, refused_by_game, written
-from bridge.names import ability_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,8 +36,7 @@ def unit_command(command: Command) -> sc_pb.Action:
     """A command in the words of the SC2 API."""
     action = sc_pb.Action()
     order = action.action_raw.unit_command
-    assert command.action.raw is not None  # a command comes of an action that orders something
-    order.ability_id = ability_of(command.action.raw)
+    order.ability_id = command.function.ability_id
     order.unit_tags.extend(command.units)
     order.queue_command = command.queued
     if isinstance(command.target, int):
@@ -49,10 +47,12 @@ def unit_command(command: Command) -> sc_pb.Action:
 
 
 def _words(command: Command) -> str:
-    assert command.action.raw is not None
     arguments: list[object] = ["queued" if command.queued else "now", listed(command.units)]
+    form = "quick"
     if isinstance(command.target, int):
+        form = "unit"
         arguments.append(hex(command.target))
     elif command.target is not None:
+        form = "pt"
         arguments.append(f"[{command.target.x:.1f}, {command.target.y:.1f}]")
-    return written(command.action.raw, *arguments)
+    return written(f"{command.function.stem}_{form}", *arguments)

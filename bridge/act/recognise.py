@@ -18,7 +18,7 @@ from protocol.speech import render
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bridge.catalog import Action, ArgKind
+    from bridge.action import Action, ArgKind
     from bridge.observe.sight import AgentSight, TeamSight
     from protocol.messages import Call, Point, RejectionReason
 

@@ -147,7 +147,7 @@ class _Tour:
             yield from self._function("select_point", how, pixel)
 
     def _call(self, command: Command) -> Generator[Step, Snapshot, None]:
-        function = pysc2.FUNCTIONS[command.action.screen]
+        function = pysc2.FUNCTIONS[command.function.id]
         if function.id not in self.now.functions:
             self.refusals.append(refuse(command, f"{function.name} is not available to what is selected"))
             return

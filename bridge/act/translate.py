@@ -22,7 +22,8 @@ from bridge.names import unit_name
 from bridge.observe.sight import Sight, unmet
 
 if TYPE_CHECKING:
-    from bridge.catalog import Action
+    from bridge.action import Action
+    from bridge.functions import Function
     from protocol.messages import Rejection
 
 _SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
@@ -34,6 +35,8 @@ class Command:
 
     said: Recognised
     """The action that it carries out."""
+    function: Function
+    """PySC2's function for it, which names the ability."""
     units: tuple[int, ...]
     target: int | WorldPoint | None
     """Tag of a unit, or a point of the world."""
@@ -61,12 +64,13 @@ class Translator:
             self._count_in(said)
         except Refused as refused:
             return reject(said.call, refused, said.team.view.name)
-        if said.action.raw is None:
+        function = said.action.pysc2
+        if function is None:
             return []
         first = tuple(tag for tag in units if not (said.action.queue and tag in self._ordered))
         later = tuple(tag for tag in units if said.action.queue and tag in self._ordered)
         self._ordered.update(units)
-        commands = (Command(said, first, target), Command(said, later, target, queued=True))
+        commands = (Command(said, function, first, target), Command(said, function, later, target, queued=True))
         return [command for command in commands if command.units]
 
     def _count_in(self, said: Recognised) -> None:

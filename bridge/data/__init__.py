@@ -1,7 +1,8 @@
 """Data files of the bridge and the one way to read them.
 
-`actions.yaml` (text actions), `maps.yaml`, `knowledge/` (unit types); SOURCES.md says where the facts come from.
-They are part of the program: a fault in them is a bug, found by the tests, not an error to explain to a user.
+`actions/` (text actions), `functions.tsv` (PySC2's functions), `maps.yaml`, `knowledge/` (unit types); SOURCES.md
+says where the facts come from. They are part of the program: a fault in them is a bug, found by the tests, not an error
+to explain to a user.
 """
 
 from __future__ import annotations

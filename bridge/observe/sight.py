@@ -28,7 +28,7 @@ from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitView, View
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.catalog import Action
+    from bridge.action import Action
     from bridge.observe.teams import Roster, Team
     from bridge.snapshot import Snapshot
     from bridge.task import AgentConfig

@@ -16,7 +16,7 @@ from simulator.maps import MapError, load_map
 from simulator.tick import new_game
 
 if TYPE_CHECKING:
-    from bridge.catalog import Action
+    from bridge.action import Action
     from bridge.knowledge import Weapon
     from bridge.maps import MapSpec
     from bridge.task import AgentConfig, TaskConfig
@@ -45,15 +45,15 @@ def tasks() -> str:
 def actions() -> str:
     """The catalogue of text actions."""
     rows = [
-        (code(action.form), action.about, _who(action), _target(action), _needs(action), *_functions(action))
+        (code(action.form), action.about, _who(action), _target(action), _needs(action), *_function(action))
         for action in catalogue().values()
     ]
     return join(
-        head("Actions", "`bridge/data/actions.yaml`"),
+        head("Actions", "`bridge/data/actions`"),
         "What an agent may say between `<` and `>`. A task lists the ones that each of its unit types has. How calls "
         "are read: [the text language](text-language.md).",
         table(
-            ("action", "meaning", "who", "target", "needs", "raw function", "screen function", "queued"),
+            ("action", "meaning", "who", "target", "needs", "function", "queued"),
             rows,
         ),
         "* `tag` is a unit's tag as the observation gives it, `screen` a point `[x, y]` of the team's screen, "
@@ -138,12 +138,8 @@ def _needs(action: Action) -> str:
     return f"upgrade {action.needs.upgrade}" if action.needs.upgrade else weapon
 
 
-def _functions(action: Action) -> tuple[str, str, str]:
-    return (
-        code(action.raw) if action.raw else "",
-        code(action.screen) if action.screen else "",
-        "yes" if action.queue else "",
-    )
+def _function(action: Action) -> tuple[str, str]:
+    return code(action.function) if action.function else "", "yes" if action.queue else ""
 
 
 def _race(race: str) -> str:
