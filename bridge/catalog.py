@@ -12,6 +12,8 @@ import functools
 import hashlib
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 from bridge import data
 from bridge.action import GROUP_SELECTOR, Action, ArgKind
 from bridge.errors import CatalogueError
@@ -58,11 +60,22 @@ def curated() -> dict[str, Action]:
     """
     found: dict[str, Action] = {}
     for file in _files():
-        for name, entry in data.table(file, Action).items():
-            action = entry.model_copy(update={"name": name})
+        for action in _read(file):
             _check(action, found, file)
-            found[name] = action
+            found[action.name] = action
     return found
+
+
+def _read(file: str) -> Iterable[Action]:
+    """The actions of a file: each has the fields that stand under `common`, and its own."""
+    page = data.document(file)
+    for name, fields in page["actions"].items():
+        try:
+            yield Action.model_validate({**page["common"], **fields, "name": name})
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            place = ".".join(map(str, first["loc"]))
+            raise CatalogueError(f"text action {name} ({file}): {place}: {first['msg']}") from None
 
 
 @functools.cache
@@ -130,6 +143,7 @@ def _fault(action: Action, others: dict[str, Action]) -> str | None:
     named = action.args[: action.named]
     faults = {
         "there are two of this name": action.name in others,
+        f"one of its aliases is the name of another one: {action.aliases}": any(a in others for a in action.aliases),
         f"it names {action.named} unit(s) first, which are tags": named != ("tag",) * action.named,
         f"it has more than one target: {action.args}": len(action.args) > action.named + 1,
         f"PySC2 has no function {action.function}": action.function is not None and not function,

@@ -254,6 +254,13 @@ class TaskConfig(Frozen):
         """The agent of this name."""
         return next(agent for agent in self.agents if agent.name == name)
 
+    def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:
+        """The agents that this one may write to, in the order of the task."""
+        if not self.communication:
+            return ()
+        names = agent.talks_to
+        return tuple(a for a in self.agents if a.name != agent.name and (names is None or a.name in names))
+
     def cards(self) -> tuple[AgentCard, ...]:
         """The agents as the run card lists them."""
         return tuple(

@@ -19,7 +19,7 @@ _PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
 
 def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Briefing:
     """What one agent has to know besides its observations."""
-    others = [other for other in task.agents if other.name != agent.name] if task.communication else []
+    others = task.correspondents(agent)
     return Briefing(
         run=run,
         agent=agent.name,

@@ -71,7 +71,10 @@ async def host(
 def assemble(config: MatchConfig, game: OneSide, asking: Asking, telling: Telling) -> Match:
     """A match with everything between the game and those who are asked."""
     task = config.task
-    seats = [Seat(task.side, agent.name) for agent in task.agents]
+    reach = {
+        Seat(task.side, agent.name): [Seat(task.side, other.name) for other in task.correspondents(agent)]
+        for agent in task.agents
+    }
     channels = task.channels if task.communication else ()
     return Match(
         config=config,
@@ -79,7 +82,7 @@ def assemble(config: MatchConfig, game: OneSide, asking: Asking, telling: Tellin
         observer=Observer(task),
         actor=Actor(task),
         asking=asking,
-        mailbox=Mailbox(seats, channels),
+        mailbox=Mailbox(reach, channels),
         telling=telling,
     )
 

@@ -15,7 +15,7 @@ from orchestrator.roster import Seat
 from protocol.messages import Message, Received, Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
 MAX_CHARACTERS = 4000
 """Longer messages are cut: what one agent says is read by all others, and paid for by them."""
@@ -32,8 +32,9 @@ class Post:
 class Mailbox:
     """Sorts messages into boxes; knows who listens to which channel."""
 
-    def __init__(self, seats: Iterable[Seat], channels: Iterable[str] = ()) -> None:
-        self._seats = tuple(seats)
+    def __init__(self, reach: Mapping[Seat, Sequence[Seat]], channels: Iterable[str] = ()) -> None:
+        """Takes whom each seat may write to, and the channels that everybody may."""
+        self._reach = dict(reach)
         self._channels = tuple(channels)
         self._listeners: dict[tuple[str, str], list[Seat]] = defaultdict(list)
 
@@ -66,15 +67,14 @@ class Mailbox:
         wanted = name.casefold()
         if wanted in (channel.casefold() for channel in self._channels):
             return [seat for seat in self._listeners[sender.side, wanted] if seat != sender]
-        direct = [s for s in self._seats if s.side == sender.side and s.agent.casefold() == wanted and s != sender]
-        return direct or None
+        return [seat for seat in self._reach[sender] if seat.agent.casefold() == wanted] or None
 
     def _return(self, sender: Seat, message: Message) -> Rejection:
-        names = [s.agent for s in self._seats if s.side == sender.side and s != sender] + list(self._channels)
+        names = [seat.agent for seat in self._reach[sender]] + list(self._channels)
         known = "you can write to " + ", ".join(names) if names else "there is nobody to write to"
         return Rejection(
             reason="unknown_recipient",
-            message=f"Nobody is called {message.recipient!r}: {known}.",
+            message=f"You cannot write to {message.recipient!r}: {known}.",
             text=message.recipient,
             start=0,
         )

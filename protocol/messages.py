@@ -119,6 +119,19 @@ class ActionSpec(Frozen):
 # --- what an agent sees -----------------------------------------------------------------------------
 
 
+class OrderView(Frozen):
+    """One order of a unit of the own side."""
+
+    name: str
+    """General name of what it does, `Attack`."""
+    target: str | None = None
+    """Tag of the unit that it is about."""
+    minimap: Point | None = None
+    """The point that it is about."""
+    progress: float | None = None
+    """How far it is, 0 to 1, of what is trained, researched or morphed; None while there is nothing to tell."""
+
+
 class UnitView(Frozen):
     """One unit in sight of a team, in the team's screen frame."""
 
@@ -147,31 +160,75 @@ class UnitView(Frozen):
     buffs: tuple[str, ...] = ()
     order: str | None = None
     """Name of the order it follows; own units only."""
+    orders: tuple[OrderView, ...] = ()
+    """The order that it follows, and those that wait behind it."""
+    passengers: tuple[str, ...] = ()
+    """Types of the units inside; own units only."""
+    cargo_max: int = 0
+    """Room for passengers; 0 for those that carry none, and for others' units."""
+    burrowed: bool = False
+    unpowered: bool = False
+    """An own structure that does nothing for want of a power field."""
+    contents: int | None = None
+    """Minerals or vespene left in a resource."""
+    harvesters: tuple[int, int] | None = None
+    """Workers that an own base or gas structure has, and how many it has work for."""
 
 
 class Event(Frozen):
     """What happened to a unit between the last observation and this one."""
 
-    what: Literal["hurt", "healed", "died", "joined", "appeared", "disappeared"]
+    what: Literal["hurt", "healed", "died", "joined", "appeared", "disappeared", "finished", "researched"]
     tag: str
+    """Empty for `researched`, which happens to no unit."""
     type: str
+    """Of the unit; the upgrade's name for `researched`."""
     alliance: Alliance
     amount: float | None = None
     """Health and shield lost (`hurt`) or regained (`healed`)."""
+
+
+class Offer(Frozen):
+    """What a valid action costs."""
+
+    action: str
+    minerals: int = 0
+    vespene: int = 0
+    supply: float = 0.0
+    times: int = Field(ge=0)
+    """How often it could be paid for now."""
+    first: bool = False
+    """Whether it makes a structure of which there is none yet."""
+
+
+class Barred(Frozen):
+    """An action that is not valid now."""
+
+    action: str
+    reason: str
+    """As the end of a sentence: `no Stargate`."""
 
 
 class TeamView(Frozen):
     """One team of an agent: its units, and what they see on their screen."""
 
     name: str
-    minimap: Point
-    """Centre of the team's camera."""
+    minimap: Point | None = None
+    """Centre of the team's camera; None for a team without units, which orders those of the whole side."""
+    task: str = ""
+    """What it has to do at this time."""
     units: tuple[UnitView, ...] = ()
     allies: tuple[UnitView, ...] = ()
     enemies: tuple[UnitView, ...] = ()
     events: tuple[Event, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
     """What is valid for this team now."""
+    offers: tuple[Offer, ...] = ()
+    """Of those, the ones that cost something."""
+    barred: tuple[Barred, ...] = ()
+    """What it may be told, but not now."""
+    resources: tuple[UnitView, ...] = ()
+    """Minerals and geysers on its screen; for builders only."""
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 24.0, 24.0)
     """The part of the screen frame that lies on the playable map: x0, y0, x1, y1."""
 
@@ -185,6 +242,93 @@ class Resources(Frozen):
     supply_cap: float = 0.0
 
 
+class TypeCount(Frozen):
+    """How many units of a type the own side has."""
+
+    type: str
+    ready: int
+    """Finished ones."""
+    idle: int | None = None
+    """Of these, the ones without an order; None for types that neither produce nor gather."""
+    under_way: tuple[float, ...] = ()
+    """How far each is that is being built or warped in, 0 to 1, the farthest first."""
+
+
+class Production(Frozen):
+    """What is being trained, researched or morphed, by the name of its order."""
+
+    order: str
+    progress: tuple[float, ...]
+    """Of each that has begun, 0 to 1, the farthest first."""
+    queued: int = 0
+    """How many more wait behind others."""
+
+
+class EnemyCount(Frozen):
+    """What was seen of an enemy's type in this episode."""
+
+    type: str
+    seen: int
+    """Different units, alive or dead."""
+    in_sight: int = 0
+    dead: int = 0
+    minimap: Point | None = None
+    """Where one of them was seen last."""
+
+
+class Counts(Frozen):
+    """What a side has, makes and knows of."""
+
+    units: tuple[TypeCount, ...] = ()
+    structures: tuple[TypeCount, ...] = ()
+    production: tuple[Production, ...] = ()
+    enemies: tuple[EnemyCount, ...] = ()
+
+
+class Alert(Frozen):
+    """A place where units of the own side lost health or died since the last observation."""
+
+    minimap: Point
+    units: dict[str, int]
+    """How many, by type."""
+    lost: float
+    """Health and shield that they lost, without those that died."""
+    died: int = 0
+
+
+class TeamReport(Frozen):
+    """A team of another agent, as a commander hears of it."""
+
+    agent: str
+    name: str
+    minimap: Point
+    units: dict[str, int]
+    """How many, by type."""
+    health: float
+    """Health and shield of all of them, 0 to 1 of what they have at their best."""
+
+
+class Landmark(Frozen):
+    """A thing on the map whose tag an action takes."""
+
+    what: Literal["base place", "geyser", "power field", "structure"]
+    tag: str
+    type: str
+    minimap: Point
+    screen: Point | None = None
+    """If it is on the screen of the agent's first team."""
+    about: str = ""
+    """What else is to be known of it."""
+
+
+class WarpGates(Frozen):
+    """How many units can be warped in."""
+
+    count: int
+    ready: int | None = None
+    """None if the game was not asked."""
+
+
 class View(Frozen):
     """The structured form of an observation's text."""
 
@@ -193,6 +337,16 @@ class View(Frozen):
     resources: Resources = Resources()
     upgrades: tuple[str, ...] = ()
     teams: tuple[TeamView, ...] = ()
+    counts: Counts | None = None
+    """Told to commanders, developers and builders, as all that follows."""
+    events: tuple[Event, ...] = ()
+    """What happened to the whole side."""
+    warnings: tuple[str, ...] = ()
+    """What the game itself warns of, `NuclearLaunchDetected`."""
+    alerts: tuple[Alert, ...] = ()
+    others: tuple[TeamReport, ...] = ()
+    landmarks: tuple[Landmark, ...] = ()
+    warp_gates: WarpGates | None = None
 
 
 class ImageRef(Frozen):

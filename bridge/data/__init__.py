@@ -7,9 +7,8 @@ to explain to a user.
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import yaml
 from pydantic import BaseModel, TypeAdapter
@@ -28,12 +27,11 @@ def path(name: str) -> Path:
     return _HERE / name
 
 
+def document(name: str) -> Any:
+    """What stands in a YAML file."""
+    return yaml.load(path(name).read_bytes(), Loader=_LOADER)  # noqa: S506  # a safe loader in both cases
+
+
 def table(name: str, model: type[M]) -> dict[str, M]:
     """The entries of a data file by their name, in the order of the file."""
-    data = yaml.load(path(name).read_bytes(), Loader=_LOADER)  # noqa: S506  # a safe loader in both cases
-    return TypeAdapter(dict[str, model]).validate_python(data)  # type: ignore[valid-type]  # a type known at run time
-
-
-def sha256(name: str) -> str:
-    """Hash of a data file, for the run card."""
-    return hashlib.sha256(path(name).read_bytes()).hexdigest()
+    return TypeAdapter(dict[str, model]).validate_python(document(name))  # type: ignore[valid-type]  # a type known at run time

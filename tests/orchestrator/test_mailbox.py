@@ -15,7 +15,7 @@ def said(sender: Seat, recipient: str, text: str = "hi") -> Message:
 
 @pytest.fixture
 def mailbox() -> Mailbox:
-    box = Mailbox([A, B, C, FOE], ["Channel-1"])
+    box = Mailbox({A: [B, C], B: [A, C], C: [A], FOE: []}, ["Channel-1"])
     box.listen(A, "channel-1")
     box.listen(B, "Channel-1")
     return box
@@ -48,7 +48,13 @@ def test_a_message_to_nobody_goes_back_with_the_names_one_can_write_to(mailbox: 
     post = mailbox.deliver([said(A, recipient)])
     (rejection,) = post.rejections[A]
     assert rejection.reason == "unknown_recipient"
-    assert rejection.message == f"Nobody is called {recipient!r}: you can write to B, C, Channel-1."
+    assert rejection.message == f"You cannot write to {recipient!r}: you can write to B, C, Channel-1."
+
+
+def test_who_may_not_be_written_to_hears_nothing(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(C, "B")])
+    assert not post.received
+    assert [r.message for r in post.rejections[C]] == ["You cannot write to 'B': you can write to A, Channel-1."]
 
 
 def test_a_long_message_is_cut(mailbox: Mailbox) -> None:
