@@ -1,0 +1,235 @@
+"""The land: what stands on the ground at one moment, what lies on it, and what has to stay free.
+
+Made of a snapshot, remembered for the last one. Grids are indexed `[x, y]` as those of `bridge.ground.terrain`. Which
+of the free places is the best is the business of `bridge.macro`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+
+from bridge.frames import WorldPoint
+from bridge.functions import functions_of
+from bridge.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, footprints, sites, stands_on
+from bridge.ground.resources import base_places, mark
+from bridge.ground.terrain import Ground, grid
+from bridge.names import unit_name
+
+if TYPE_CHECKING:
+    from bridge.ground.footprints import Footprint
+    from bridge.ground.resources import Base, Places
+    from bridge.ground.terrain import Bools, Bytes, Floats
+    from bridge.snapshot import Snapshot
+
+POWER_RISE = 0.5
+"""Ground that lies so much higher than a Pylon is not powered by it: it does not reach up a cliff."""
+LINE_WIDTH = 1.0
+"""A cell is in the way of workers if the way over it is longer than the straight one by less than this."""
+LINE_REACH = 10.0
+"""Resources farther from a town hall are not its own."""
+SEEN_NOW = 2
+"""The game's number for a cell that is in sight; 1 was seen once, 0 never."""
+_DRONE_BEGINS = "Build_"
+
+
+class Land:
+    """What is known of the ground at the moment of a snapshot."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.ground = Ground.of(snapshot.info)
+        self._raw = snapshot.response.observation.raw_data
+        self._standing: list[tuple[str, Footprint, raw_pb2.Unit]] = []
+        self._bodies: list[raw_pb2.Unit] = []
+        for unit in self._raw.units:
+            found = stands_on(unit.unit_type)
+            if found is not None:
+                self._standing.append((*found, unit))
+            elif unit.alliance != raw_pb2.Self and not unit.is_flying:
+                self._bodies.append(unit)
+
+    # --- what stands there ------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def taken(self) -> Bools:
+        """(w, h) where something stands, or a unit of others is in the way, so that nothing can be built."""
+        taken = np.zeros(self.ground.size, np.bool_)
+        for _, footprint, unit in self._standing:
+            mark(taken, footprint.cells, footprint.cell(unit.pos.x, unit.pos.y), value=True)
+        for unit in self._bodies:
+            mark(taken, ((0, 0),), (int(unit.pos.x), int(unit.pos.y)), value=True)
+        return taken
+
+    @functools.cached_property
+    def planned(self) -> Bools:
+        """(w, h) where own units are on their way to build something."""
+        planned = np.zeros(self.ground.size, np.bool_)
+        for unit in self._raw.units:
+            if unit.alliance != raw_pb2.Self:
+                continue
+            for order in unit.orders:
+                structure = built_by(order.ability_id)
+                footprint = structure and footprint_of(structure)
+                if footprint and order.HasField("target_world_space_pos"):
+                    point = order.target_world_space_pos
+                    mark(planned, footprint.cells, footprint.cell(point.x, point.y), value=True)
+        return planned
+
+    @functools.cached_property
+    def open(self) -> Bools:
+        """(w, h) where ground units can walk now."""
+        walls = np.zeros(self.ground.size, np.bool_)
+        for _, footprint, unit in self._standing:
+            if not footprint.flat:
+                mark(walls, footprint.cells, footprint.cell(unit.pos.x, unit.pos.y), value=True)
+        return self.ground.walkable & ~walls
+
+    @functools.cached_property
+    def free(self) -> Bools:
+        """(w, h) where a structure could stand now: buildable, and nothing there or planned to be there."""
+        return self.ground.buildable & ~self.taken & ~self.planned
+
+    # --- what lies on it --------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def creep(self) -> Bools:
+        """(w, h) where creep is."""
+        return self._state(grid(self._raw.map_state.creep)) > 0
+
+    @functools.cached_property
+    def sight(self) -> Bytes:
+        """(w, h) 2 where the player sees, 1 where it once saw, 0 elsewhere."""
+        return self._state(grid(self._raw.map_state.visibility))
+
+    def powered(self, *, corner: bool, by: int | None = None) -> Bools:
+        """(w, h) in which cells a middle would be in a power field.
+
+        Args:
+            corner: whether the middle is the lower left corner of the cell, as of structures of 2 x 2, and not its
+                own middle.
+            by: tag of the only source that counts; None for all.
+        """
+        result = np.zeros(self.ground.size, np.bool_)
+        shift = 0.0 if corner else 0.5
+        for source in self._raw.player.power_sources:
+            if by is not None and source.tag != by:
+                continue
+            reach = math.ceil(source.radius) + 1
+            x0, y0 = max(int(source.pos.x) - reach, 0), max(int(source.pos.y) - reach, 0)
+            part = np.s_[x0 : int(source.pos.x) + reach + 1, y0 : int(source.pos.y) + reach + 1]
+            height = self.ground.height[part]
+            x, y = np.ogrid[x0 : x0 + height.shape[0], y0 : y0 + height.shape[1]]
+            inside = (x + shift - source.pos.x) ** 2 + (y + shift - source.pos.y) ** 2 <= source.radius**2
+            if source.tag not in self._flying:
+                inside = inside & (height <= self.ground.level(source.pos.x, source.pos.y) + POWER_RISE)
+            result[part] |= inside
+        return result
+
+    @functools.cached_property
+    def _flying(self) -> frozenset[int]:
+        return frozenset(u.tag for u in self._raw.units if u.is_flying or unit_name(u.unit_type) == "WarpPrismPhasing")
+
+    def _state(self, found: Bytes | None) -> Bytes:
+        return found if found is not None else np.zeros(self.ground.size, np.uint8)
+
+    # --- bases ------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def bases(self) -> tuple[Base, ...]:
+        """Every place for a town hall with its resources, by ascending coordinates."""
+        halls = [WorldPoint(round(u.pos.x, 3), round(u.pos.y, 3)) for u in self.own_halls]
+        return base_places(
+            self.ground, self._places("mineral_field"), self._places("geyser"), (*self.ground.starts, *halls)
+        )
+
+    def _places(self, footprint: str) -> Places:
+        found = {(round(u.pos.x, 3), round(u.pos.y, 3)) for name, _, u in self._standing if name == footprint}
+        return tuple(sorted(found))
+
+    @functools.cached_property
+    def halls(self) -> tuple[raw_pb2.Unit, ...]:
+        """Every town hall that is known of, whoever's and also those under construction, by ascending tags."""
+        found = (u for name, _, u in self._standing if name == "town_hall")
+        return tuple(sorted(found, key=lambda unit: unit.tag))
+
+    @functools.cached_property
+    def own_halls(self) -> tuple[raw_pb2.Unit, ...]:
+        """The player's own town halls, finished or not, by ascending tags."""
+        return tuple(unit for unit in self.halls if unit.alliance == raw_pb2.Self)
+
+    # --- what has to stay free --------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def kept(self) -> Bools:
+        """(w, h) where nothing should be built unasked: ways of workers, places of town halls, room for add-ons."""
+        kept = _lines(self.ground, self.bases, tuple((u.pos.x, u.pos.y) for u in self.own_halls)).copy()
+        for _, footprint, unit in self._standing:
+            site = sites().get(unit_name(unit.unit_type)) if unit.alliance == raw_pb2.Self else None
+            if site is not None and site.addon and not unit.add_on_tag:
+                mark(kept, ADDON, footprint.cell(unit.pos.x, unit.pos.y), value=True)
+        return kept
+
+
+def addon_place(structure: WorldPoint) -> WorldPoint:
+    """Where the add-on of a structure stands."""
+    return WorldPoint(structure.x + ADDON_OFFSET[0], structure.y + ADDON_OFFSET[1])
+
+
+@functools.lru_cache(2048)
+def built_by(ability: int) -> str | None:
+    """The structure that a worker places with an ability; None for any other ability."""
+    for function in functions_of(ability):
+        name = function.stem.removeprefix(_DRONE_BEGINS)
+        if function.stem.startswith(_DRONE_BEGINS) and name in sites():
+            return name
+    return None
+
+
+_last: list[tuple[Snapshot, Land]] = []
+
+
+def land_of(snapshot: Snapshot) -> Land:
+    """The land at the moment of a snapshot; all who ask about one of the last two share it."""
+    for known, land in _last[:]:  # a copy: other matches of the process may ask from other threads
+        if known is snapshot:
+            return land
+    land = Land(snapshot)
+    _last[:] = [(snapshot, land), *_last[:1]]
+    return land
+
+
+@functools.lru_cache(maxsize=8)
+def _lines(ground: Ground, bases: tuple[Base, ...], halls: Places) -> Bools:
+    """(w, h) between town halls and their resources, and where town halls are going to stand."""
+    kept = np.zeros(ground.size, np.bool_)
+    hall = footprints()["town_hall"]
+    for base in bases:
+        mark(kept, hall.cells, hall.cell(*base.place), value=True)
+    resources = [place for base in bases for place in (*base.fields, *base.geysers)]
+    for place in dict.fromkeys((*(tuple(base.place) for base in bases), *halls)):
+        for resource in resources:
+            if math.dist(place, resource) <= LINE_REACH:
+                _mark_way(kept, place, resource)
+    return kept
+
+
+def _mark_way(kept: Bools, start: tuple[float, ...], end: WorldPoint) -> None:
+    """Marks the cells over which the way between two points is little longer than the straight one."""
+    x0, x1 = sorted((int(start[0]), int(end.x)))
+    y0, y1 = sorted((int(start[1]), int(end.y)))
+    x0, y0 = max(x0 - 2, 0), max(y0 - 2, 0)
+    part = kept[x0 : x1 + 3, y0 : y1 + 3]
+    x, y = np.ogrid[x0 : x0 + part.shape[0], y0 : y0 + part.shape[1]]
+    way = np.hypot(x + 0.5 - start[0], y + 0.5 - start[1]) + np.hypot(x + 0.5 - end.x, y + 0.5 - end.y)
+    part |= way <= math.dist(start, end) + LINE_WIDTH
+
+
+def distances(grid_: Bools, point: WorldPoint) -> Floats:
+    """(w, h) straight distance of the middle of each cell from a point, in world units."""
+    x, y = np.ogrid[: grid_.shape[0], : grid_.shape[1]]
+    result: Floats = np.hypot(x + 0.5 - point.x, y + 0.5 - point.y).astype(np.float32)
+    return result
