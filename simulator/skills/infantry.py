@@ -15,7 +15,7 @@ from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.mechanics import MECHANICS
 from simulator.skills.basics import on_self
-from simulator.skills.skill import Skill, around, number, place_of
+from simulator.skills.skill import Skill, around, lay, number, place_of
 from simulator.traits import Layer
 
 if TYPE_CHECKING:
@@ -70,20 +70,7 @@ def _throw_charge(world: World, cast: Cast) -> None:
     point, fuse = place_of(world, cast), number(cast, "fuse_loops")
     owner = int(world.owner[cast.slot])
     charge = world.spawn(world.catalog.unit("KD8Charge"), owner, point)
-    world.fields.append(
-        Field(
-            "kd8_charge",
-            owner=owner,
-            points=[point],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=world.loop + fuse,
-            due=world.loop + fuse,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-            target=world.tag_of(charge),
-        )
-    )
+    lay(world, cast, "kd8_charge", end=world.loop + fuse, due=world.loop + fuse).target = world.tag_of(charge)
 
 
 def _explode(world: World, charge: Field) -> None:

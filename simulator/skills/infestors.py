@@ -16,7 +16,7 @@ from simulator.orders import OrderKind
 from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
-from simulator.skills.skill import Skill, around, foes, gap, number, place_of
+from simulator.skills.skill import Skill, around, foes, gap, lay, number
 from simulator.skills.throws import SPEED_UNKNOWN, throw
 from simulator.targets import disengage
 
@@ -165,20 +165,8 @@ def _hatches(world: World, item: Field) -> None:
 
 def _shroud(world: World, cast: Cast) -> None:
     """Lay a cloud in which ground units take half of what flyers deal."""
-    world.fields.append(
-        Field(
-            does="microbial_shroud",
-            owner=int(world.owner[cast.slot]),
-            points=[place_of(world, cast)],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=world.loop + number(cast, "duration_loops"),
-            due=world.loop,
-            period=number(cast, "period_loops"),
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
+    lay(world, cast, "microbial_shroud", end=end, due=world.loop, period=period)
 
 
 def _shrouds(world: World, item: Field) -> None:

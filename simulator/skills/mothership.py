@@ -13,7 +13,7 @@ from simulator.columns import NOBODY
 from simulator.fields import Field, source_slot
 from simulator.refusal import Refusal
 from simulator.skills import teleport
-from simulator.skills.skill import Skill, around, foes, friends, number, place_of
+from simulator.skills.skill import Skill, around, foes, friends, lay, number, place_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,19 +58,7 @@ def _recall(world: World, cast: Cast) -> None:
         buffs.apply(world, slot, name, source=cast.slot)
     x, y = world.pos[cast.slot].tolist()
     lasts = world.catalog.buff(name).loops
-    world.fields.append(
-        Field(
-            "recall",
-            int(world.owner[cast.slot]),
-            [place_of(world, cast), (x, y)],
-            number(cast, "radius"),
-            world.loop,
-            world.loop + lasts,
-            due=world.loop + 1,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    lay(world, cast, "recall", end=world.loop + lasts, due=world.loop + 1).points.append((x, y))
 
 
 def _bring(world: World, field: Field) -> None:
@@ -117,20 +105,7 @@ def _nobody_to_recall(world: World, cast: Cast) -> Refusal:
 def _time_warp(world: World, cast: Cast) -> None:
     """Slow the enemies around a place, as soon as the bubble has grown."""
     grown = world.loop + number(cast, "growing_loops")
-    world.fields.append(
-        Field(
-            "time_warp",
-            int(world.owner[cast.slot]),
-            [place_of(world, cast)],
-            number(cast, "radius"),
-            world.loop,
-            grown + number(cast, "duration_loops"),
-            effect=GROWING_EFFECT,
-            due=grown,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    lay(world, cast, "time_warp", end=grown + number(cast, "duration_loops"), due=grown, effect=GROWING_EFFECT)
 
 
 def _slow(world: World, field: Field) -> None:

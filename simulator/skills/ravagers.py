@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.damage import wound
 from simulator.fields import Field, source_slot
-from simulator.skills.skill import Skill, around, number, place_of
+from simulator.skills.skill import Skill, around, lay, number
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -19,20 +19,7 @@ def _bile(world: World, cast: Cast) -> None:
     """Harm whoever stands at the place some time later, and destroy force fields there."""
     rises, falls = number(cast, "delay_loops"), number(cast, "fall_loops")
     due = world.loop + rises + falls
-    world.fields.append(
-        Field(
-            does="corrosive_bile",
-            owner=int(world.owner[cast.slot]),
-            points=[place_of(world, cast)],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=due,
-            effect=BILE_EFFECT,
-            due=due,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    lay(world, cast, "corrosive_bile", end=due, due=due, effect=BILE_EFFECT)
 
 
 def _falls(world: World, item: Field) -> None:

@@ -14,7 +14,7 @@ from simulator import buffs, geometry, placement
 from simulator.columns import NOBODY
 from simulator.fields import Field, source_slot
 from simulator.skills import teleport
-from simulator.skills.skill import Skill, around, friends, number, place_of
+from simulator.skills.skill import Skill, around, friends, lay, number, place_of
 from simulator.stats import ATTRIBUTES, GROUND_PLANE
 
 if TYPE_CHECKING:
@@ -35,20 +35,8 @@ MASSIVE: Final = 1 << ATTRIBUTES.index("massive")
 
 def _guardian_shield(world: World, cast: Cast) -> None:
     """Surround the Sentry with a shield that follows it and takes damage from ranged hits on friends."""
-    world.fields.append(
-        Field(
-            does="guardian_shield",
-            owner=int(world.owner[cast.slot]),
-            points=[_place(world, cast.slot)],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=world.loop + number(cast, "duration_loops"),
-            effect=SHIELD_EFFECT,
-            due=world.loop + 1,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    end = world.loop + number(cast, "duration_loops")
+    lay(world, cast, "guardian_shield", end=end, due=world.loop + 1, effect=SHIELD_EFFECT)
 
 
 def _cover(world: World, field: Field) -> None:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from simulator.columns import NOBODY
+from simulator.fields import Field
 from simulator.refusal import Refusal
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
     from simulator.casts import Cast, Point
-    from simulator.fields import Field
     from simulator.world import World
 
 Effect: TypeAlias = Callable[["World", "Cast"], None]
@@ -122,6 +122,28 @@ def place_of(world: World, cast: Cast) -> Point:
         return cast.point
     x, y = world.pos[slot].tolist()
     return x, y
+
+
+def lay(world: World, cast: Cast, does: str, *, end: float, due: float, effect: int = 0, period: float = 1.0) -> Field:
+    """Lay a field where a cast is aimed, as wide as the ability says; whoever lays it may change it on.
+
+    Its rule ``does`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
+    """
+    laid = Field(
+        does,
+        owner=int(world.owner[cast.slot]),
+        points=[place_of(world, cast)],
+        radius=number(cast, "radius", 0.0),
+        begun=world.loop,
+        end=end,
+        effect=effect,
+        due=due,
+        period=period,
+        ability=cast.ability.id,
+        source=world.tag_of(cast.slot),
+    )
+    world.fields.append(laid)
+    return laid
 
 
 def distance(world: World, slot: int, point: Point) -> float:

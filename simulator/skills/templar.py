@@ -17,7 +17,7 @@ from simulator.damage import wound
 from simulator.fields import Field, source_slot
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
-from simulator.skills.skill import Skill, around, number, place_of
+from simulator.skills.skill import Skill, around, lay, number
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -39,21 +39,8 @@ SPARED_BY_FEEDBACK: Final = frozenset({"OrbitalCommand", "OrbitalCommandFlying",
 def _psi_storm(world: World, cast: Cast) -> None:
     """Let a storm rage at a place that hurts everybody in it but structures."""
     period = number(cast, "search_period_loops")
-    world.fields.append(
-        Field(
-            does="psi_storm",
-            owner=int(world.owner[cast.slot]),
-            points=[place_of(world, cast)],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=world.loop + period * (number(cast, "searches") - 1) + ROUNDING,
-            effect=STORM_EFFECT,
-            due=world.loop,
-            period=period,
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    end = world.loop + period * (number(cast, "searches") - 1) + ROUNDING
+    lay(world, cast, "psi_storm", end=end, due=world.loop, effect=STORM_EFFECT, period=period)
 
 
 def _search(world: World, field: Field) -> None:

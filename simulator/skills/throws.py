@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.fields import Field
-from simulator.skills.skill import distance, gap, number, place_of
+from simulator.skills.skill import distance, gap, lay, number, place_of
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
+    from simulator.fields import Field
     from simulator.world import World
 
 SPEED_UNKNOWN = "How fast the missile flies."
@@ -32,17 +32,6 @@ def flight_loops(world: World, cast: Cast) -> int:
 def throw(world: World, cast: Cast, does: str, *, radius: float = 0.0, delay_loops: float = 0.0) -> Field:
     """Send something to where a cast is aimed; the field's rule ``does`` runs once, when it arrives."""
     due = world.loop + flight_loops(world, cast) + delay_loops
-    item = Field(
-        does=does,
-        owner=int(world.owner[cast.slot]),
-        points=[place_of(world, cast)],
-        radius=radius,
-        begun=world.loop,
-        end=due,
-        due=due,
-        ability=cast.ability.id,
-        source=world.tag_of(cast.slot),
-        target=world.tag_of(cast.target),
-    )
-    world.fields.append(item)
+    item = lay(world, cast, does, end=due, due=due)
+    item.radius, item.target = radius, world.tag_of(cast.target)
     return item

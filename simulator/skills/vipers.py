@@ -13,7 +13,7 @@ from simulator.fields import Field, source_slot
 from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
-from simulator.skills.skill import Skill, around, foes, number, place_of
+from simulator.skills.skill import Skill, around, foes, lay, number
 from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
 
 if TYPE_CHECKING:
@@ -37,21 +37,8 @@ DRAINED = "ViperConsumeStructure"
 
 def _cloud(world: World, cast: Cast) -> None:
     """Lay a cloud in which nobody on the ground shoots farther than an arm's length, and structures detect nothing."""
-    world.fields.append(
-        Field(
-            does="blinding_cloud",
-            owner=int(world.owner[cast.slot]),
-            points=[place_of(world, cast)],
-            radius=number(cast, "radius"),
-            begun=world.loop,
-            end=world.loop + number(cast, "duration_loops"),
-            effect=CLOUD_EFFECT,
-            due=world.loop,
-            period=number(cast, "period_loops"),
-            ability=cast.ability.id,
-            source=world.tag_of(cast.slot),
-        )
-    )
+    end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
+    lay(world, cast, "blinding_cloud", end=end, due=world.loop, effect=CLOUD_EFFECT, period=period)
 
 
 def _blinds(world: World, item: Field) -> None:
