@@ -6,8 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from bridge.catalog import catalogue
-from bridge.data import table as data_table
-from bridge.knowledge import RACES, UnitType
+from bridge.knowledge import RACES, knowledge
 from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
 from orchestrator.config import all_tasks, task_files
@@ -17,7 +16,7 @@ from simulator.tick import new_game
 
 if TYPE_CHECKING:
     from bridge.action import Action
-    from bridge.knowledge import Weapon
+    from bridge.knowledge import UnitType, Weapon
     from bridge.maps import MapSpec
     from bridge.task import AgentConfig, TaskConfig
     from simulator.world import World
@@ -143,7 +142,7 @@ def _function(action: Action) -> tuple[str, str]:
 
 
 def _race(race: str) -> str:
-    known = data_table(f"knowledge/{race}.yaml", UnitType)
+    known = {name: unit for name, unit in knowledge().items() if unit.race == race and unit.about}
     numbers = [_numbers(name, unit) for name, unit in known.items()]
     words = [
         (name, unit.about, "; ".join(f"{a}: {b}" for a, b in unit.abilities.items())) for name, unit in known.items()

@@ -1,0 +1,176 @@
+"""Facts of abilities, out of the simulator's tables.
+
+One record per number of the API. A general ability (`Effect_Stim`) lists the special ones that it stands for, has the
+users of all, and of their facts those in which they agree.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from bridge.functions import functions_of
+from khala.knowledge.measures import in_seconds, plain, seconds, sparse
+from khala.knowledge.naming import ability_name, unit_name, unit_names, upgrade_name, upgrade_names
+from simulator.abilities import AIMS
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability, Filter, Need
+    from simulator.catalog import Catalog
+
+TARGETS: Final = {aim: name for name, aim in AIMS.items()}
+EVERYWHERE: Final = 500
+"""Range that stands for the whole map in the tables."""
+OWN_FIGURES: Final = frozenset({"range", "time", "unit", "units", "energy", "supply", "buff", "count"})
+"""Figures of a skill that the record says already, or in words of the tables."""
+SHARED: Final = (
+    *("range", "everywhere", "must", "must_not", "autocast", "energy", "life", "minerals", "vespene", "supply"),
+    *("cooldown_s", "charges", "requires", "addon", "produces", "count", "researches", "time_s", "figures"),
+)
+"""What a general ability has if all its special ones agree."""
+
+
+class Needs(NamedTuple):
+    """What an ability asks of a player and of the unit that uses it."""
+
+    names: tuple[str, ...] = ()
+    """Structures and upgrades; all are needed."""
+    addon: str = ""
+    """What has to be attached to the unit itself."""
+
+
+def ability_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
+    """One record for each ability that someone in a melee game has or PySC2 has a function for, by its number."""
+    users = _users(catalog)
+    special = {a.id: _special(a, users.get(a.id, []), catalog) for a in catalog.abilities if a.does != "general"}
+    special = {number: record for number, record in special.items() if record["melee"] or functions_of(number)}
+    general = {
+        a.id: _general(a, {s.id: special[s.id] for s in catalog.abilities if s.general == a.id and s.id in special})
+        for a in catalog.abilities
+        if a.does == "general"
+    }
+    return {str(number): sparse(record) for number, record in sorted({**special, **general}.items())}
+
+
+def needs_of(need: Need | None) -> Needs:
+    """The structures and upgrades in a condition; of alternatives the first, for which the others stand in.
+
+    Left out are conditions on the state of the unit itself and on what is under way: the game tells of these.
+    """
+    leaves = list(_leaves(need))
+    here = [name for name, state in leaves if state.endswith("_here")]
+    names = dict.fromkeys(_named(name) for name, state in leaves if state == "done")
+    return Needs(tuple(names), "TechLab" if any(name.endswith("TechLab") for name in here) else "")
+
+
+def _leaves(need: Need | None) -> list[tuple[str, str]]:
+    if need is None or need.kind in ("not", "const", "op", "behavior"):
+        return []
+    if need.kind in ("unit", "upgrade"):
+        return [(need.name.removeprefix("Alias_"), need.state)]
+    parts = need.parts
+    if need.kind == "cmp":
+        wanted = parts[1].value if len(parts) > 1 else None
+        return _leaves(parts[0]) if need.name in ("==", ">=", ">") and wanted else []
+    return [leaf for part in (parts[:1] if need.kind == "or" else parts) for leaf in _leaves(part)]
+
+
+def _named(name: str) -> str:
+    return upgrade_names().get(name) or unit_names().get(name) or name
+
+
+def _users(catalog: Catalog) -> dict[int, list[str]]:
+    """Names of the types that can be told to use an ability, by its number."""
+    found: dict[int, list[str]] = {}
+    for unit in catalog.units:
+        if not unit.like and unit.name in unit_names():
+            for ability in catalog.abilities_of(unit.row):
+                found.setdefault(ability.id, []).append(unit_name(unit.name))
+    return {number: sorted(names) for number, names in found.items()}
+
+
+def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, Any]:
+    upgrade = catalog.upgrade_of.get(ability.upgrade) if ability.upgrade else None
+    product = catalog.row_of_name.get(ability.unit)
+    in_melee = ability.does and any(_is_melee(name, catalog) for name in users)
+    if ability.does == "research":
+        in_melee = in_melee and upgrade is not None and upgrade.researchable
+    elif product is not None and catalog.units[product].not_in_melee:
+        in_melee = False
+    return {
+        "name": ability_name(ability),
+        "does": ability.does,
+        "general": ability.general,
+        "melee": bool(in_melee),
+        "users": users or sorted(unit_names()[name] for name in ability.users if name in unit_names()),
+        "target": TARGETS[ability.aim],
+        **_terms(ability),
+        **_outcome(ability),
+        "figures": _figures(ability),
+    }
+
+
+def _is_melee(name: str, catalog: Catalog) -> bool:
+    own = next(own for own, ours in unit_names().items() if ours == name)
+    return not catalog.unit(own).not_in_melee
+
+
+def _terms(ability: Ability) -> dict[str, Any]:
+    """What it costs and asks for."""
+    needs = needs_of(ability.requires)
+    comes_back = ability.charges.loops if ability.charges else 0.0
+    return {
+        "range": None if ability.range >= EVERYWHERE else plain(ability.range),
+        "everywhere": ability.range >= EVERYWHERE,
+        "energy": plain(ability.energy),
+        "life": plain(ability.life),
+        "minerals": plain(ability.minerals),
+        "vespene": plain(ability.vespene),
+        "supply": plain(ability.supply),
+        "cooldown_s": seconds(ability.cooldown_loops or comes_back),
+        "charges": ability.charges.max if ability.charges else 0,
+        "requires": list(needs.names),
+        "addon": needs.addon,
+        "autocast": ability.autocast,
+        **_filter(ability.filters),
+    }
+
+
+def _filter(filters: Filter) -> dict[str, Any]:
+    return {"must": [w.lower() for w in filters.required], "must_not": [w.lower() for w in filters.excluded]}
+
+
+def _outcome(ability: Ability) -> dict[str, Any]:
+    """What comes of it, and how long that takes."""
+    research = ability.does == "research"
+    return {
+        "produces": unit_name(ability.unit) if ability.unit else "",
+        "researches": upgrade_name(ability.upgrade) if ability.upgrade else "",
+        "count": ability.count if ability.count != 1 else len(ability.units) if len(ability.units) > 1 else 0,
+        "time_s": seconds(ability.loops) if ability.loops and (research or ability.unit) else 0,
+    }
+
+
+def _figures(ability: Ability) -> dict[str, Any]:
+    """The skill's own numbers; words and lists of the tables are left to what is written about it."""
+    own = in_seconds(ability.numbers)
+    return {
+        key: value
+        for key, value in own.items()
+        if isinstance(value, int | float) and not isinstance(value, bool) and key not in OWN_FIGURES and value
+    }
+
+
+def _general(ability: Ability, special: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    """A record for a general ability; where the special ones differ it says nothing."""
+    live = [record for record in special.values() if record["melee"]] or list(special.values())
+    shared = {key: live[0][key] for key in SHARED if live and all(record[key] == live[0][key] for record in live)}
+    targets = {record["target"] for record in live}
+    return {
+        "name": ability_name(ability),
+        "does": "general",
+        "special": list(special),
+        "melee": any(record["melee"] for record in special.values()),
+        "users": sorted({user for record in live for user in record["users"]}),
+        "target": targets.pop() if len(targets) == 1 else TARGETS[ability.aim],
+        **shared,
+    }

@@ -1,0 +1,56 @@
+"""Writes what is known of the game into the data of the bridge: `bridge/data/knowledge/<version>/*.json`.
+
+One record per line, in a fixed order, so that a change of the tables is a small difference of the files.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from bridge import data
+from khala.knowledge.abilities import ability_facts
+from khala.knowledge.units import unit_facts
+from khala.knowledge.upgrades import upgrade_facts
+from simulator.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def facts(version: str) -> dict[str, str]:
+    """The text of every file of facts of a game version, by file name.
+
+    Raises:
+        CatalogError: the simulator has no tables of this version.
+    """
+    catalog = load_catalog(version)
+    made = {"units": unit_facts(catalog), "abilities": ability_facts(catalog), "upgrades": upgrade_facts(catalog)}
+    return {f"{kind}.json": _text(catalog.version, catalog.build, records) for kind, records in made.items()}
+
+
+def outdated(version: str) -> list[str]:
+    """Names of the files of a version that do not say what would be written now."""
+    where = directory(version)
+    return [n for n, text in facts(version).items() if not (where / n).exists() or (where / n).read_text() != text]
+
+
+def write(version: str) -> list[Path]:
+    """Writes every file of a version; returns their paths."""
+    where = directory(version)
+    where.mkdir(parents=True, exist_ok=True)
+    made = {where / name: text for name, text in facts(version).items()}
+    for path, text in made.items():
+        path.write_text(text, encoding="utf-8")
+    return list(made)
+
+
+def directory(version: str) -> Path:
+    """Where the facts of a game version are."""
+    return data.path("knowledge") / version
+
+
+def _text(version: str, build: int, records: dict[str, dict[str, Any]]) -> str:
+    lines = [f"{json.dumps(name)}: {json.dumps(record)}" for name, record in records.items()]
+    head = f'"version": {json.dumps(version)},\n"build": {build},\n"made_by": "khala knowledge write"'
+    return "{\n" + head + ',\n"entries": {\n' + ",\n".join(lines) + "\n}\n}\n"

@@ -1,0 +1,59 @@
+"""The names that the bridge uses for what the simulator's tables name otherwise: PySC2's.
+
+PySC2's numbers are those of version 4.10, so names are found by number in the tables of that version and carried over
+to other versions by the tables' own names, which stay. What PySC2 has no name for keeps the one of the tables.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Final
+
+from bridge import names
+from bridge.functions import functions
+from simulator.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from simulator.abilities import Ability
+
+PYSC2_VERSION: Final = "4.10"
+"""Version of the game whose numbers PySC2's tables have."""
+
+
+@functools.cache
+def unit_names() -> dict[str, str]:
+    """PySC2's name of a unit type by the tables' name; types that PySC2 does not have are left out."""
+    found = {unit.name: names.unit_name(unit.id) for unit in load_catalog(PYSC2_VERSION).units if not unit.like}
+    return {own: name for own, name in found.items() if not _made_up(name)}
+
+
+@functools.cache
+def upgrade_names() -> dict[str, str]:
+    """PySC2's name of an upgrade by the tables' name; upgrades that PySC2 does not have are left out."""
+    found = {upgrade.name: names.upgrade_name(upgrade.id) for upgrade in load_catalog(PYSC2_VERSION).upgrades}
+    return {own: name for own, name in found.items() if not _made_up(name)}
+
+
+@functools.cache
+def _stems() -> dict[int, str]:
+    return {function.ability_id: function.stem for function in functions().values() if function.ability_id}
+
+
+def unit_name(name: str) -> str:
+    """What the bridge calls a type of the tables; one that is newer than PySC2 keeps its name."""
+    return unit_names().get(name, name)
+
+
+def upgrade_name(name: str) -> str:
+    """What the bridge calls an upgrade of the tables; one that is newer than PySC2 keeps its name."""
+    return upgrade_names().get(name, name)
+
+
+def ability_name(ability: Ability) -> str:
+    """What PySC2's functions call an ability, without what they take: `Effect_Blink_Stalker`."""
+    return _stems().get(ability.id, ability.name.replace(" ", "_"))
+
+
+def _made_up(name: str) -> bool:
+    """Whether `bridge.names` knew no name for a number and made one of it."""
+    return name.removeprefix("Unit").isdigit() or name.removeprefix("Upgrade").isdigit()

@@ -1,0 +1,178 @@
+"""Facts of unit types, out of the simulator's tables.
+
+A record says what the API tells of a type, with its names, and what it does not: where a type comes from, what stands
+in for it, and the weapons that the game hides from clients (`_weapons`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from khala.knowledge.abilities import needs_of
+from khala.knowledge.measures import per_second, plain, seconds, sparse
+from khala.knowledge.naming import unit_name, unit_names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from simulator.catalog import Catalog
+    from simulator.records import Hit, Production, UnitType, Weapon
+
+
+def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
+    """One record for each type that PySC2 has a name for, by that name, in alphabetical order."""
+    known = [unit for unit in catalog.units if not unit.like and unit.name in unit_names()]
+    return {unit_name(unit.name): sparse(_unit(unit, catalog)) for unit in sorted(known, key=_name)}
+
+
+def _name(unit: UnitType) -> str:
+    return unit_name(unit.name)
+
+
+def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
+    return {
+        "id": unit.id,
+        "race": unit.race,
+        "melee": not unit.not_in_melee,
+        "structure": unit.structure,
+        "attributes": sorted(unit.attributes),
+        "flying": unit.flying,
+        "planes": list(unit.planes),
+        "health": plain(unit.life),
+        "shield": plain(unit.shields),
+        "energy": plain(unit.energy),
+        "energy_start": plain(unit.energy_start),
+        "armor": plain(unit.armor),
+        "speed": per_second(unit.speed_n),
+        "sight": plain(unit.sight),
+        "detects": plain(unit.detect),
+        "radius": plain(unit.radius),
+        "cloaked": unit.cloaked and not unit.burrowed,
+        "burrowed": unit.burrowed,
+        "worker": unit.worker,
+        **_economy(unit),
+        **_origin(unit, catalog),
+        **_ground(unit, catalog),
+        "counts_as": [
+            unit_name(catalog.unit(number).name) for number in unit.tech_alias if number in catalog.row_of_id
+        ],
+        "abilities": [ability.id for ability in catalog.abilities_of(unit.row)],
+        "weapons": [sparse(weapon) for weapon in _weapons(unit, catalog)],
+    }
+
+
+def _economy(unit: UnitType) -> dict[str, Any]:
+    minerals, vespene = unit.cost
+    return {
+        "supply": plain(unit.supply),
+        "provides": plain(unit.provides),
+        "minerals": plain(minerals),
+        "vespene": plain(vespene),
+        "cargo_size": unit.cargo_size,
+        "cargo_space": unit.cargo_space,
+        "resource": unit.resource,
+    }
+
+
+def _origin(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
+    """Who makes it, by which abilities, how long the first way takes, and what all of it needs."""
+    ways = [way for way in unit.made_by if _counts(way, unit, catalog)]
+    first = catalog.ability_of_id.get(ways[0].ability) if ways else None
+    return {
+        "producers": list(dict.fromkeys(unit_name(way.producer) for way in ways)),
+        "made_by": list(dict.fromkeys(way.ability for way in ways)),
+        "build_s": seconds(ways[0].loops if ways else unit.build_loops),
+        "requires": list(needs_of(first.requires).names) if first else [],
+        "addon": needs_of(first.requires).addon if first else "",
+    }
+
+
+def _counts(way: Production, unit: UnitType, catalog: Catalog) -> bool:
+    """Whether someone can be told to make the type in this way: no cocoon, and not back from one of its own modes."""
+    made = catalog.row_of_name.get(way.producer)
+    if made is None or way.producer not in unit_names():
+        return False
+    if all(ability.id != way.ability for ability in catalog.abilities_of(made)):
+        return False
+    producer = catalog.units[made]
+    return unit.id not in (producer.unit_alias, *producer.tech_alias) or producer.structure != unit.structure
+
+
+def _ground(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
+    print_ = catalog.footprints.get(unit.footprint)
+    return {
+        "footprint": list(print_.size) if print_ and print_.cells else [],
+        "power_radius": max((radius for radius, _ in unit.power), default=0),
+        "needs_power": unit.needs_power,
+        "needs_creep": unit.needs_creep,
+        "makes_creep": unit.makes_creep,
+    }
+
+
+def _weapons(unit: UnitType, catalog: Catalog) -> Iterator[dict[str, Any]]:
+    """The weapons that a type fights with, as the API tells them; where it tells none, those that it hides.
+
+    Weapons that have to be switched on are left out: until then the type is unarmed.
+    """
+    usable = [weapon for weapon in unit.weapons if weapon.works and not weapon.disabled]
+    shown = [weapon for weapon in usable if not weapon.hidden]
+    for weapon in shown:
+        yield _shown(weapon)
+    for weapon in () if shown else usable:
+        yield from _hidden(unit, weapon, catalog)
+
+
+def _shown(weapon: Weapon) -> dict[str, Any]:
+    bonus = {name: plain(more) for name, more in weapon.shown_bonus}
+    blow = {"damage": plain(weapon.shown_damage), "attacks": weapon.shown_attacks, "bonus": bonus}
+    return {"targets": weapon.targets, **_frame(weapon), **blow}
+
+
+def _hidden(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
+    """A weapon of which the API says nothing: what is launched, a burst, or one hit for each plane.
+
+    What a Brood Lord drops counts as the Brood Lord's, and a Locust's leap ends its flight: neither is told again.
+    """
+    if weapon.launches:
+        yield from _launched(unit, weapon, catalog)
+    elif weapon.is_kamikaze:
+        yield from _burst(weapon)
+    elif [hit.when for hit in weapon.hits] == ["GroundUnitFilter", "else"]:
+        for plane, hit in zip(("ground", "air"), weapon.hits, strict=True):
+            yield {"targets": plane, **_frame(weapon), **_blow(hit)}
+    else:
+        yield _shown(weapon)
+
+
+def _frame(weapon: Weapon) -> dict[str, Any]:
+    rings = [ring.radius for hit in weapon.hits for ring in hit.area]
+    return {
+        "range": plain(weapon.range),
+        "min_range": plain(weapon.min_range),
+        "period_s": seconds(weapon.period_loops),
+        "splash": plain(max(rings, default=0.0)),
+    }
+
+
+def _blow(hit: Hit) -> dict[str, Any]:
+    return {"damage": plain(hit.damage), "attacks": 1, "bonus": {name: plain(more) for name, more in hit.bonus}}
+
+
+def _launched(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
+    """What all that a unit can hold and launch do together, at the distance from which it launches them."""
+    for hangar in catalog.abilities_of(unit.row):
+        if hangar.does == "arm" and hangar.unit == weapon.launches:
+            for other in _weapons(catalog.unit(weapon.launches), catalog):
+                count = other["attacks"] * int(hangar.numbers["max"])
+                yield {**other, "range": plain(weapon.range), "attacks": count}
+
+
+def _burst(weapon: Weapon) -> Iterator[dict[str, Any]]:
+    """A burst around the unit: what it does to units, and as a bonus what more it does to structures."""
+    hits = [hit for hit in weapon.hits if hit.damage and not hit.when]
+    razes = sum(hit.damage for hit in hits if hit.area_affects.only == "structure")
+    for hit in hits:
+        if hit.area_affects.only != "structure":
+            blow = _blow(hit)
+            more = {"structure": plain(razes - hit.damage)} if razes > hit.damage else {}
+            yield {"targets": weapon.targets, **_frame(weapon), **blow, "bonus": {**blow["bonus"], **more}}
