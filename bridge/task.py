@@ -20,7 +20,7 @@ from bridge.knowledge import knowledge
 from bridge.maps import Difficulty, MapSpec, Race, known_maps
 from protocol.errors import WrongKey
 from protocol.keys import check_name
-from protocol.messages import AgentCard, Clock, Frames, Frozen, TeamSpec
+from protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -68,6 +68,18 @@ ActionName: TypeAlias = Annotated[str, AfterValidator(_known_action)]
 MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: name and _known(name, known_maps(), "map"))]
 
 
+class Stage(Frozen):
+    """One part of a team's task, until the next one begins; the last part stays."""
+
+    task: str
+    at: Point | None = None
+    """Place on the minimap that ends the stage when the middle of the team's screen is there."""
+    within: float = Field(default=4.0, gt=0)
+    """Cells of the minimap that count as being there."""
+    until_s: float | None = Field(default=None, ge=0)
+    """Second of the game's clock that ends the stage."""
+
+
 class TeamConfig(Frozen):
     """One team of an agent."""
 
@@ -82,6 +94,16 @@ class TeamConfig(Frozen):
     control_group: int | None = Field(default=None, ge=0, le=9)
     """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
     task: str = ""
+    """What it has to do all the time."""
+    stages: tuple[Stage, ...] = ()
+    """What it has to do besides, one after the other: the line of time of a task."""
+
+    @field_validator("stages")
+    @classmethod
+    def _stages_end(cls, stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+        if any(stage.at is None and stage.until_s is None for stage in stages[:-1]):
+            raise ValueError("every stage but the last one needs an end: give at or until_s")
+        return stages
 
     @field_validator("actions")
     @classmethod
