@@ -1,6 +1,7 @@
 """An HTTP server that speaks OpenAI's chat completions and plays from the text of the prompt alone.
 
-    POST /v1/chat/completions    the model's name selects the player: `silent`, `random-legal`, `focus-fire`
+    POST /v1/chat/completions    the model's name selects the player: `silent`, `random-legal`, `focus-fire`,
+                                 `skilled`
     GET  /v1/models              their names
     GET  /health                 {"status": "ok"}
 

@@ -10,12 +10,14 @@ from collections import Counter
 from typing import TYPE_CHECKING, Literal
 
 from agents.scripted.reading import Action, Situation, Team, Unit, read
+from agents.scripted.skilled import skilled
+from agents.scripted.writing import call, inside, point, reply
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Iterable
 
-PlayerName = Literal["silent", "random-legal", "focus-fire"]
+PlayerName = Literal["silent", "random-legal", "focus-fire", "skilled"]
 
 REACH = 4.0
 """World units: an enemy is in reach if it is at most so much farther than the team's nearest one."""
@@ -41,8 +43,8 @@ def random_legal(observation: str, rng: random.Random) -> str:
         possible = [action for action in team.actions if all(_pools(action, team))]
         if possible:
             action = rng.choice(possible)
-            orders[team.name] = [_call(action, _random_values(action, team, rng))]
-    return _reply("Something will come of it.", orders, _hello(situation, rng))
+            orders[team.name] = [call(action.name, *_random_values(action, team, rng))]
+    return reply("Something will come of it.", orders, _hello(situation, rng))
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
@@ -52,18 +54,19 @@ def focus_fire(observation: str, rng: random.Random) -> str:
     target = _common_target(teams)
     orders = {team.name: order for team in teams if (order := _fight(team, target))}
     if target is None:
-        return _reply("No enemy is in sight.", orders, [])
+        return reply("No enemy is in sight.", orders, [])
     said = []
     if situation.correspondents and rng.random() < MESSAGE_SHARE:
         said = [(situation.correspondents[0], f"We fire on {target.tag}.")]
     words = f"{target.tag} is the weakest enemy in reach, with {target.hit_points:g} left. All fire on it."
-    return _reply(words, orders, said)
+    return reply(words, orders, said)
 
 
 PLAYERS: dict[PlayerName, Callable[[str, random.Random], str]] = {
     "silent": silent,
     "random-legal": random_legal,
     "focus-fire": focus_fire,
+    "skilled": skilled,
 }
 
 
@@ -96,9 +99,9 @@ def _fight(team: Team, target: Unit | None) -> list[str]:
         common = next((unit for unit in reached if target and unit.tag == target.tag), None)
         return [f"<Attack_Unit({(common or min(reached, key=_weakness)).tag})>"]
     if not reached and team.allies and "Move_Screen" in actions:
-        return [f"<Move_Screen({_written(_middle(team))})>"]
+        return [f"<Move_Screen({point(_middle(team))})>"]
     if not reached and "Move_Minimap" in actions:
-        return [f"<Move_Minimap({_written(MAP_CENTRE)})>"]
+        return [f"<Move_Minimap({point(MAP_CENTRE)})>"]
     return []
 
 
@@ -106,7 +109,7 @@ def _middle(team: Team) -> tuple[float, float]:
     """Where the allies of a team are, on its screen."""
     x = sum(unit.x for unit in team.allies) / len(team.allies)
     y = sum(unit.y for unit in team.allies) / len(team.allies)
-    return _inside(x, y, team)
+    return inside((x, y), team)
 
 
 # --- arguments --------------------------------------------------------------------------------------
@@ -129,39 +132,14 @@ def _random_values(action: Action, team: Team, rng: random.Random) -> list[str]:
         if kind == "tag":
             values.append(rng.choice(next(pools)).tag)
         elif kind == "minimap":
-            values.append(_written((rng.uniform(1, 63), rng.uniform(1, 63))))
+            values.append(point((rng.uniform(1, 63), rng.uniform(1, 63))))
         else:
             x, y = (middle + rng.uniform(-8, 8) for middle in SCREEN_CENTRE)
-            values.append(_written(_inside(x, y, team)))
+            values.append(point(inside((x, y), team)))
     return values
-
-
-def _inside(x: float, y: float, team: Team) -> tuple[float, float]:
-    x0, x1, y0, y1 = team.bounds
-    return min(max(x, x0 + 0.5), x1 - 0.5), min(max(y, y0 + 0.5), y1 - 0.5)
-
-
-def _written(point: tuple[float, float]) -> str:
-    return f"[{point[0]:.1f}, {point[1]:.1f}]"
-
-
-# --- the reply --------------------------------------------------------------------------------------
-
-
-def _call(action: Action, values: Iterable[str]) -> str:
-    return f"<{action.name}({', '.join(values)})>"
 
 
 def _hello(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     if situation.correspondents and rng.random() < MESSAGE_SHARE:
         return [(rng.choice(situation.correspondents), f"{len(situation.teams)} team(s) of mine are left.")]
     return []
-
-
-def _reply(analysis: str, orders: dict[str, list[str]], messages: Iterable[tuple[str, str]]) -> str:
-    lines = [f"Analysis: {analysis}", "Actions:"]
-    for team, calls in orders.items():
-        lines.append(f"    Team {team}:")
-        lines += [f"        {call}" for call in calls]
-    said = [f"    <MessageTo({name}, '''{text}''')>" for name, text in messages]
-    return "\n".join(lines + (["Communications:", *said] if said else [])) + "\n"

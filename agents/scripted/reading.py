@@ -1,42 +1,73 @@
 """The text of an observation → what a scripted player needs of it. It sees what a model sees, and no more.
 
 The layout is that of the host's observation text: sections at the margin, a block `Team <name>` with the units
-that the team sees, and `Valid actions` with a line a team. A line that is none of these is passed over, so
-that sections may be added to the text without this module knowing.
+that the team sees, and `Valid actions` with a line a team. Units are fields between bars, each of them told by its
+first word. A line, a field or a section that is none of these is passed over, so that the text may say more without
+this module knowing.
 """
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _SIGNED = r"(-?\d+(?:\.\d+)?)"
+_POINT = rf"\[{_SIGNED}, ?{_SIGNED}\]"
 _SECTION = re.compile(r"\n(?=\S)")
 _TEAM = re.compile(r"Team (\S+)")
-_UNITS = re.compile(r"^    (Your|Allied|Enemy) units:\n((?:        .*\n?)*)", re.MULTILINE)
-_UNIT = re.compile(
-    rf"^        \w+ \| tag (0x[0-9a-f]+) \| screen \[{_SIGNED}, {_SIGNED}\][^|\n]*"
-    rf"(?:\| distance {_NUMBER} )?\| health {_NUMBER}/[\d.]+(?: \| shield {_NUMBER})?",
-    re.MULTILINE | re.ASCII,
-)
+_UNITS = re.compile(r"^    (Your|Allied|Enemy) units\b[^\n]*:\n((?:        .*\n?)*)", re.MULTILINE)
 _SCREEN = re.compile(rf"    Screen on the map: x {_SIGNED} to {_SIGNED}, y {_SIGNED} to {_SIGNED}", re.ASCII)
-_VALID = re.compile(r"^    Team (\S+): (.*)", re.MULTILINE)
+_PLACE = re.compile(rf"    Minimap position: {_POINT}", re.ASCII)
+_VALID = re.compile(r"^    Team (\S+): (.*(?:\n     +<.*)*)", re.MULTILINE)
 _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
 _WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTILINE)
 _NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
+_TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d)", re.MULTILINE | re.ASCII)
+_AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
+_SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
+_UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
+_MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+)?: '''(.*)'''", re.MULTILINE)
+_ACCEPTED = re.compile(r"^    accepted: (\S+) <(\w+)\((.*)\)>", re.MULTILINE)
+_TASK = re.compile(r"^    (?:Team (\S+): )?(.*)", re.MULTILINE)
+_TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
+_AT = re.compile(_POINT, re.ASCII)
+_PART = re.compile(rf"{_NUMBER}/{_NUMBER}", re.ASCII)
+_FIRST = re.compile(_NUMBER, re.ASCII)
+
+Point = tuple[float, float]
 
 
 class Unit(NamedTuple):
-    """A unit on a team's screen; `distance` is the host's, from the middle of the team, infinite if not given."""
+    """A unit on a team's screen, as its line tells."""
 
     tag: str
+    type: str
     x: float
     y: float
     hit_points: float
+    """Health and shield together."""
+    full: float
+    """Health and shield together of one that is unhurt; 0 if not given."""
     distance: float
+    """The host's, from the middle of the team; infinite if not given."""
+    energy: float = 0.0
+    weapon_s: float = 0.0
+    """Time until the weapon can be used again; 0 if it can, or if not given."""
+    order: str = ""
+    cloaked: bool = False
+    hallucination: bool = False
+    effects: tuple[str, ...] = ()
+    built: float = 100.0
+    """How much of it is built, in percent."""
+
+    @property
+    def share(self) -> float:
+        """Hit points that are left, of all: 0 to 1."""
+        return self.hit_points / self.full if self.full else 1.0
 
 
 class Action(NamedTuple):
@@ -57,6 +88,13 @@ class Team:
     actions: list[Action] = field(default_factory=list)
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
+    minimap: Point | None = None
+    """Where it is; None for a team without units."""
+    task: str = ""
+
+    def can(self, name: str) -> bool:
+        """Whether an action of this name is valid now."""
+        return any(action.name == name for action in self.actions)
 
 
 @dataclass(slots=True)
@@ -66,6 +104,18 @@ class Situation:
     teams: dict[str, Team] = field(default_factory=dict)
     max_actions: int = 1
     correspondents: list[str] = field(default_factory=list)
+    time_s: float = 0.0
+    minerals: int = 0
+    vespene: int = 0
+    supply_used: float = 0.0
+    supply_cap: float = 0.0
+    upgrades: tuple[str, ...] = ()
+    task: str = ""
+    """What all have to do, and what this agent has."""
+    messages: list[tuple[str, str]] = field(default_factory=list)
+    """Sender and text."""
+    accepted: list[tuple[str, str, str]] = field(default_factory=list)
+    """Team, action and arguments of what was carried out of the last reply."""
 
 
 def read(text: str) -> Situation:
@@ -77,27 +127,94 @@ def read(text: str) -> Situation:
             _read_team(_team(situation, found[1]), body)
         elif title == "Valid actions":
             _read_valid_actions(situation, body)
-        elif title == "Communication" and (found := _WRITE_TO.search(body)):
-            situation.correspondents = _NAME.findall(found[1])
+        elif title == "Game":
+            _read_game(situation, body)
+        elif title == "Task":
+            _read_task(situation, body)
         elif title == "Answer" and (found := _MAX_ACTIONS.search(body)):
             situation.max_actions = int(found[1])
+        if found := _WRITE_TO.search(body):
+            situation.correspondents = _NAME.findall(found[1])
+        situation.messages += _MESSAGE.findall(body)
+        situation.accepted += _ACCEPTED.findall(body)
     return situation
+
+
+def points(text: str) -> list[Point]:
+    """Every point that a text names, `[52, 32]`, in its order."""
+    return [(float(x), float(y)) for x, y in _AT.findall(text)]
 
 
 def _team(situation: Situation, name: str) -> Team:
     return situation.teams.setdefault(name, Team(name))
 
 
+def _read_game(situation: Situation, body: str) -> None:
+    if found := _TIME.search(body):
+        situation.time_s = 60.0 * int(found[1]) + int(found[2])
+    amounts = {name.casefold(): int(amount) for name, amount in _AMOUNT.findall(body)}
+    situation.minerals, situation.vespene = amounts.get("minerals", 0), amounts.get("vespene", 0)
+    if found := _SUPPLY.search(body):
+        situation.supply_used, situation.supply_cap = float(found[1]), float(found[2])
+    if found := _UPGRADES.search(body):
+        situation.upgrades = tuple(found[1].split(", "))
+
+
+def _read_task(situation: Situation, body: str) -> None:
+    general = []
+    for team, text in _TASK.findall(body):
+        if not team:
+            general.append(text.strip())
+        elif team in situation.teams:
+            situation.teams[team].task = text
+    situation.task = " ".join(general)
+
+
 def _read_team(team: Team, body: str) -> None:
     groups = {"Your": team.own, "Allied": team.allies, "Enemy": team.enemies}
     for whose, lines in _UNITS.findall(body):
-        groups[whose] += [
-            Unit(tag, float(x), float(y), float(health) + float(shield or 0), float(distance or "inf"))
-            for tag, x, y, distance, health, shield in _UNIT.findall(lines)
-        ]
+        groups[whose] += [unit for line in lines.splitlines() if (unit := _unit(line.strip()))]
     if bounds := _SCREEN.search(body):
         x0, x1, y0, y1 = (float(number) for number in bounds.groups())
         team.bounds = (x0, x1, y0, y1)
+    if place := _PLACE.search(body):
+        team.minimap = float(place[1]), float(place[2])
+
+
+@functools.lru_cache(4096)
+def _unit(line: str) -> Unit | None:
+    """A unit of its line; None for a line that is no unit with a tag, a place and health."""
+    name, *parts = line.split(" | ")
+    fields: dict[str, str] = {}
+    for part in parts:
+        key, _, value = part.partition(" ")
+        fields.setdefault(key, value)
+    tag, at, health = _TAG.search(line), _AT.search(fields.get("screen", "")), _PART.match(fields.get("health", ""))
+    if tag is None or at is None or health is None:
+        return None
+    shield = _PART.match(fields.get("shield", ""))
+    return Unit(
+        tag=tag[1],
+        type=name.split(" ")[0],
+        x=float(at[1]),
+        y=float(at[2]),
+        hit_points=float(health[1]) + (float(shield[1]) if shield else 0.0),
+        full=float(health[2]) + (float(shield[2]) if shield else 0.0),
+        distance=_first(fields.get("distance", ""), float("inf")),
+        energy=_first(fields.get("energy", "")),
+        weapon_s=_first(fields.get("weapon", "")),
+        order=fields.get("order", "").split(" ")[0],
+        cloaked="cloaked" in fields,
+        hallucination="hallucination" in fields,
+        effects=tuple(fields["effects"].split(", ")) if "effects" in fields else (),
+        built=_first(fields.get("built", ""), 100.0),
+    )
+
+
+def _first(text: str, otherwise: float = 0.0) -> float:
+    """The first number in a text."""
+    found = _FIRST.search(text)
+    return float(found[1]) if found else otherwise
 
 
 def _read_valid_actions(situation: Situation, body: str) -> None:

@@ -49,7 +49,7 @@ async def test_it_says_what_it_has_and_that_it_is_well(http: aiohttp.ClientSessi
             names = [model["id"] for model in (await response.json())["data"]]
         async with http.get(endpoint.base_url.removesuffix("/v1") + "/health") as response:
             health = await response.json()
-    assert (names, health) == (["silent", "random-legal", "focus-fire"], {"status": "ok"})
+    assert (names, health) == (["silent", "random-legal", "focus-fire", "skilled"], {"status": "ok"})
 
 
 BAD_REQUESTS = [

@@ -1,0 +1,156 @@
+"""Fighting with one team: whom to shoot, when to step back, whom to pull out of the fight.
+
+The team shoots at the enemy whose loss helps most for the time that it takes; while its weapons cool down it steps out
+of the reach of slower or shorter-ranged enemies; units that are nearly dead blink or walk out of reach first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from agents.scripted.skilled.kinds import IGNORED, TOWN_HALLS, kind_of
+from agents.scripted.skilled.space import away, distance, middle, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from agents.scripted.reading import Team, Unit
+    from agents.scripted.skilled.plan import Plan
+
+HURT = 0.35
+"""Share of hit points below which a unit is pulled back."""
+IN_DANGER = 7.0
+STEP_BACK = 3.5
+BLINK = 7.5
+WALK_COST = 3.0
+"""World units of walking that halve what a target is worth."""
+COOLING_S = 0.3
+
+
+def targets(team: Team) -> list[Unit]:
+    """The enemies that some unit of the team has a weapon against."""
+    mine = [kind_of(unit) for unit in team.own]
+    return [
+        enemy for enemy in team.enemies if enemy.type not in IGNORED and any(kind.hits(kind_of(enemy)) for kind in mine)
+    ]
+
+
+def threats(team: Team) -> list[Unit]:
+    """The enemies that have a weapon against some unit of the team."""
+    mine = [kind_of(unit) for unit in team.own]
+    return [
+        enemy
+        for enemy in team.enemies
+        if enemy.built >= 100 and kind_of(enemy).role != "worker" and any(kind_of(enemy).hits(kind) for kind in mine)
+    ]
+
+
+def worth(enemy: Unit, prey: str) -> float:
+    """What it is worth to be rid of an enemy.
+
+    Args:
+        enemy: of the other side.
+        prey: what the team is after besides the fight: "worker" or "hall"; "" for nothing.
+    """
+    kind = kind_of(enemy)
+    value = kind.damage
+    if prey == "worker" and kind.role == "worker":
+        value = 200.0
+    if prey == "hall" and enemy.type in TOWN_HALLS:
+        value = 2e5
+    if enemy.hallucination or enemy.built < 100:
+        value *= 0.2
+    return value
+
+
+def best_target(team: Team, prey: str = "") -> Unit | None:
+    """The enemy whose loss helps most for the time and the way that it takes the team; None without targets."""
+    shooters = [unit for unit in team.own if kind_of(unit).reach >= 0]
+    if not shooters:
+        return None
+
+    def value(enemy: Unit) -> tuple[float, str]:
+        able = [unit for unit in shooters if kind_of(unit).hits(kind_of(enemy))]
+        ways = sorted(max(0.0, distance(unit, enemy) - _range(unit, enemy) - 1.0) for unit in able)
+        way = ways[len(ways) // 2]
+        return -worth(enemy, prey) / (enemy.hit_points + 30.0) / 2 ** (way / WALK_COST), enemy.tag
+
+    return min(targets(team), key=value, default=None)
+
+
+def fight(plan: Plan, prey: str = "") -> bool:
+    """Plans a fight of one team against what it sees; says whether there is one."""
+    team = plan.team
+    target = best_target(team, prey)
+    foes = threats(team)
+    if target is None and not foes:
+        return False
+    save_the_hurt(plan, foes)
+    if target is None or (not prey and step_back(plan, foes)):
+        return _keep_off(plan, foes) if target is None else True
+    shoot(plan, target)
+    return True
+
+
+def shoot(plan: Plan, target: Unit) -> bool:
+    """Orders the team to attack one enemy; units that have no weapon against it take the next best one."""
+    team = plan.team
+    able = [unit for unit in team.own if kind_of(unit).hits(kind_of(target))]
+    if len(able) == len(team.own) or not team.can("Select_Unit_Attack_Unit"):
+        return plan.give("Attack_Unit", target.tag)
+    given = [plan.give("Select_Unit_Attack_Unit", unit.tag, target.tag) for unit in able]
+    return any(given)
+
+
+def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
+    """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
+    hurt = [unit for unit in plan.team.own if unit.share < HURT and _pressed(unit, foes)]
+    if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
+        return  # nobody would be left to fight
+    for unit in sorted(hurt, key=lambda unit: unit.share):
+        if plan.left <= keep:
+            return
+        refuge = away(plan.team, (unit.x, unit.y), foes, BLINK)
+        if plan.cast("Blink_Screen", unit, refuge):
+            continue
+        if unit.share < HURT / 2 and kind_of(unit).speed > 2.9:
+            plan.cast("Move_Screen", unit, refuge)
+
+
+def step_back(plan: Plan, foes: Sequence[Unit]) -> bool:
+    """While weapons cool down: out of the reach of enemies who would have to follow; says whether it is worth it."""
+    team = plan.team
+    kinds = [kind_of(unit) for unit in team.own]
+    cooling = sum(unit.weapon_s > COOLING_S for unit in team.own)
+    if not foes or 2 * cooling <= len(team.own) or min(kind.reach for kind in kinds) < 2:
+        return False
+    reach, speed = min(kind.reach for kind in kinds), min(kind.speed for kind in kinds)
+    close = [foe for foe in foes if any(_gap(foe, unit) < 1.0 for unit in team.own)]
+    chased = [foe for foe in close if kind_of(foe).reach < reach - 0.9 and kind_of(foe).speed <= speed + 0.1]
+    if not chased or 2 * len(chased) < len(close):
+        return False
+    centre = middle(team.own)
+    return plan.give("Move_Screen", away(team, centre, foes, STEP_BACK))
+
+
+def _keep_off(plan: Plan, foes: Sequence[Unit]) -> bool:
+    """Keeps a team that cannot fight out of reach."""
+    near = [foe for foe in foes if any(_gap(foe, unit) < 2.0 for unit in plan.team.own)]
+    if near:
+        plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
+    return True
+
+
+def _pressed(unit: Unit, foes: Sequence[Unit]) -> bool:
+    foe = nearest(unit, foes)
+    return foe is not None and distance(unit, foe) < max(IN_DANGER, kind_of(foe).reach + 1.5)
+
+
+def _gap(foe: Unit, unit: Unit) -> float:
+    """How far a foe has to come until it reaches a unit."""
+    return distance(foe, unit) - _range(foe, unit) - 1.0
+
+
+def _range(unit: Unit, other: Unit) -> float:
+    kind = kind_of(unit)
+    return kind.air if kind_of(other).flying else kind.ground
