@@ -1,0 +1,159 @@
+"""Marks: the digits of a unit's tag beside it, so that what is seen can be named, put where they hide least.
+
+    0x1_0014_0001    the mark is `014`
+
+A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before);
+the three digits before them tell units apart, four where two units on one picture would share three.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+
+from bridge.observe.image import palette
+from bridge.observe.image.lettering import written
+from bridge.observe.image.palette import LIVERIES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bridge.observe.image.lettering import Image, Stamp
+    from bridge.observe.image.palette import Side
+
+_TAIL = 4
+"""Hexadecimal digits at the end of a tag that say nothing."""
+_CELL = 3
+"""Pixels of a cell of the plan of what is hidden."""
+_WORST = 0.5
+"""A mark of which more than this share would lie over other marks is left out."""
+_OVER_MARK, _OVER_BODY, _FAR = 4.0, 1.0, 0.15
+"""What it costs to lie over a mark or a body, as shares of the mark, and to be a ring further away."""
+_RINGS_PX = (2, 13, 24)
+"""Free pixels between a body and its mark; from the second ring on a line leads to it."""
+
+
+class Marked(NamedTuple):
+    """A thing that wants a mark: what it is to say, in whose colours, and where the body is drawn, in pixels."""
+
+    text: str
+    side: Side
+    x: int
+    y: int
+    radius: int
+
+
+def marks_of(tags: Iterable[int]) -> dict[int, str]:
+    """The mark of each tag, three or four hexadecimal digits; different tags of one picture have different marks."""
+    digits = {tag: f"{tag:x}".zfill(_TAIL + 4)[:-_TAIL] for tag in tags}
+    shared = Counter(text[-3:] for text in digits.values())
+    return {tag: text[-3:] if shared[text[-3:]] == 1 else text[-4:] for tag, text in digits.items()}
+
+
+def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], height_px: int) -> list[Marked]:
+    """Draws marks beside what they are of, the first ones at the best places.
+
+    Args:
+        image: is drawn on.
+        marked: what gets a mark, most important first.
+        bodies: everything that should rather not be covered.
+        height_px: of the letters.
+
+    Returns:
+        Those for whose mark there was room.
+    """
+    height, width = image.shape[:2]
+    hidden, covered = _Plan(width, height), _Plan(width, height)
+    for one in bodies:
+        r = round(one.radius * 0.8)
+        covered.add(max(one.x - r, 0), max(one.y - r, 0), 2 * r, 2 * r)
+    spots = []
+    for one in marked:
+        stamp = written(one.text, height_px, LIVERIES[one.side].mark, palette.INK)
+        spot = _spot(one, stamp, hidden, covered)
+        if spot is not None:
+            hidden.add(spot.left, spot.top, *stamp.size)
+            spots.append((one, stamp, spot))
+    for one, _, spot in spots:
+        if spot.ring:
+            _lead(image, one, spot)
+    for _, stamp, spot in spots:
+        stamp.press(image, spot.left, spot.top)
+    return [one for one, _, _ in spots]
+
+
+class _Spot(NamedTuple):
+    left: int
+    top: int
+    ring: int
+    middle: tuple[int, int]
+
+
+class _Plan:
+    """Which cells of a picture are taken: one number with a bit a cell, so that a rectangle is looked up in no time."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self._stride = width // _CELL + 2
+        self._taken = 0
+
+    def add(self, left: int, top: int, width: int, height: int) -> None:
+        """Takes a rectangle that begins in the picture."""
+        mask = _rectangle(width // _CELL + 1, height // _CELL + 1, self._stride)
+        self._taken |= mask << (top // _CELL * self._stride + left // _CELL)
+
+    def share(self, left: int, top: int, width: int, height: int) -> float:
+        """How much of a rectangle is taken, 0 to 1."""
+        columns, rows = width // _CELL + 1, height // _CELL + 1
+        there = self._taken >> (top // _CELL * self._stride + left // _CELL)
+        return (there & _rectangle(columns, rows, self._stride)).bit_count() / (columns * rows)
+
+    def holds(self, left: int, top: int, width: int, height: int) -> bool:
+        """Whether a rectangle is inside of the picture."""
+        return left >= 0 and top >= 0 and left + width <= self.width and top + height <= self.height
+
+
+@functools.lru_cache(1024)
+def _rectangle(columns: int, rows: int, stride: int) -> int:
+    """The bits of a rectangle in the corner of a plan."""
+    line = (1 << columns) - 1
+    return sum(line << (row * stride) for row in range(rows))
+
+
+_WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
+"""Beside a body, right first: y downwards, so that bars above it stay free."""
+
+
+def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
+    """Where a mark hides least; None if every place is over other marks."""
+    width, height = stamp.size
+    best: tuple[float, _Spot] | None = None
+    for ring, gap in enumerate(_RINGS_PX):
+        beside, corner = one.radius + gap, round(0.72 * one.radius) + gap
+        for way, (right, down) in enumerate(_WAYS):
+            reach = corner if right and down else beside
+            x, y = one.x + right * (reach + width // 2), one.y + down * (reach + height // 2)
+            left, top = x - width // 2, y - height // 2
+            if not hidden.holds(left, top, width, height):
+                continue
+            over = hidden.share(left, top, width, height)
+            if over > _WORST:
+                continue
+            cost = _OVER_MARK * over + _OVER_BODY * covered.share(left, top, width, height) + _FAR * ring + way / 100
+            if best is None or cost < best[0]:
+                best = cost, _Spot(left, top, ring, (x, y))
+            if cost < _FAR * ring + (way + 1) / 100:  # nothing is hidden, and all that follows is less handy
+                return best[1]
+        if best is not None and best[0] < _FAR * (ring + 1):
+            break  # further away is no better
+    return best[1] if best else None
+
+
+def _lead(image: Image, one: Marked, spot: _Spot) -> None:
+    """A line from a body to its mark."""
+    colour = palette.mixed(LIVERIES[one.side].mark, palette.INK, 0.25)
+    cv2.line(image, (one.x, one.y), spot.middle, palette.INK, 2)
+    cv2.line(image, (one.x, one.y), spot.middle, colour, 1)

@@ -1,0 +1,215 @@
+"""What there is to be drawn at one moment: units, effects, power, creep and fog, taken from a snapshot once.
+
+Every picture of a step is drawn from the same `Moment`. Positions are those of the world; a picture puts them into its
+frame. It draws nothing, and knows no team.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+
+from bridge.compat import features
+from bridge.ground import grid, land_of
+from bridge.knowledge import knowledge
+from bridge.names import order_name, unit_name
+from bridge.observe.image.codes import code_of
+from bridge.observe.image.painting import Painting, Veil, upright
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bridge.ground import Land
+    from bridge.observe.image.bodies import Shape
+    from bridge.observe.image.palette import Side
+    from bridge.snapshot import Snapshot
+
+_SIDES: dict[int, Side] = {
+    raw_pb2.Self: "own",
+    raw_pb2.Ally: "ally",
+    raw_pb2.Enemy: "enemy",
+    raw_pb2.Neutral: "neutral",
+}
+_CLOAKED = (raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied)
+_EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
+_STRUCTURE_RADIUS = 1.0
+"""A type that nobody knows is taken for a structure if it is this large and does not fly."""
+_LEVELS: dict[Shape, int] = {
+    "field": 0, "stone": 1, "geyser": 1, "minerals": 1, "rich": 1, "structure": 2, "ground": 3, "air": 4
+}  # fmt: skip
+UNDRAWN = frozenset({"Larva", "KarakFemale", "CollapsiblePurifierTowerDiagonal"})
+"""Types without a body worth a place; larvae crawl under their hatchery in swarms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """One unit as it is drawn."""
+
+    tag: int
+    type_id: int
+    owner: int
+    x: float
+    y: float
+    radius: float
+    facing: float
+    name: str
+    code: str
+    side: Side
+    shape: Shape
+    ghost: bool
+    """Cloaked, burrowed, a hallucination, or remembered under the fog of war."""
+    built: float
+    health: float
+    """Health, shield and energy as shares of what is full, 0 to 1; negative where the unit has none."""
+    shield: float
+    energy: float
+    order: str
+    """Name of what it does; own units only."""
+    target: tuple[float, float] | None
+    """Where that leads, in the world."""
+
+    @property
+    def level(self) -> int:
+        """Its place in the order of drawing: what is flat first, flyers last."""
+        return _LEVELS[self.shape]
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """An effect on the ground, or a source of power."""
+
+    name: str
+    side: Side
+    radius: float
+    places: tuple[tuple[float, float], ...]
+
+
+class Moment:
+    """One snapshot for the eye."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        """Takes a snapshot; what is not asked for is not made."""
+        self.snapshot = snapshot
+        self._raw = snapshot.response.observation.raw_data
+
+    @cached_property
+    def painting(self) -> Painting:
+        """The map's ground."""
+        return Painting.of(self.snapshot.info)
+
+    @cached_property
+    def land(self) -> Land:
+        """What stands and lies on the ground."""
+        return land_of(self.snapshot)
+
+    @cached_property
+    def veil(self) -> Veil:
+        """Creep and fog."""
+        creep, sight = grid(self._raw.map_state.creep), grid(self._raw.map_state.visibility)
+        return Veil(None if creep is None else upright(creep), None if sight is None else upright(sight))
+
+    @cached_property
+    def subjects(self) -> tuple[Subject, ...]:
+        """Every unit that is shown or remembered, in the order of drawing."""
+        units = {unit.tag: unit for unit in self._raw.units}
+        found = (_subject(unit, units) for unit in self._raw.units if unit.display_type != raw_pb2.Placeholder)
+        drawn = [one for one in found if one.name not in UNDRAWN]
+        return tuple(sorted(drawn, key=lambda one: (one.level, -one.radius, one.tag)))
+
+    @cached_property
+    def places(self) -> NDArray[np.float64]:
+        """World positions and radii of the subjects, (n, 3)."""
+        return np.array([(one.x, one.y, one.radius) for one in self.subjects]).reshape(-1, 3)
+
+    def around(self, x: float, y: float, reach: float) -> list[Subject]:
+        """The subjects whose bodies come within `reach` of a point on both axes, in the order of drawing."""
+        off = np.abs(self.places[:, :2] - (x, y)).max(axis=1) - self.places[:, 2] if len(self.places) else np.empty(0)
+        return [self.subjects[index] for index in np.flatnonzero(off < reach).tolist()]
+
+    @cached_property
+    def effects(self) -> tuple[Patch, ...]:
+        """What lies on the ground: storms, biles, clouds."""
+        return tuple(
+            Patch(
+                _EFFECTS.get(effect.effect_id, f"Effect{effect.effect_id}"),
+                _SIDES.get(effect.alliance, "neutral"),
+                effect.radius or 0.5,
+                tuple((point.x, point.y) for point in effect.pos),
+            )
+            for effect in self._raw.effects
+        )
+
+    @cached_property
+    def power(self) -> tuple[Patch, ...]:
+        """The player's sources of power."""
+        return tuple(
+            Patch("Power", "own", source.radius, ((source.pos.x, source.pos.y),))
+            for source in self._raw.player.power_sources
+        )
+
+
+def _subject(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> Subject:
+    name = unit_name(unit.unit_type)
+    side = _SIDES.get(unit.alliance, "neutral")
+    order, target = _order(unit, units) if side == "own" else ("", None)
+    shape = _shape(unit, name, side)
+    is_ghost = (
+        unit.display_type == raw_pb2.Snapshot or unit.cloak in _CLOAKED or unit.is_hallucination or unit.is_burrowed
+    )
+    return Subject(
+        tag=unit.tag,
+        type_id=unit.unit_type,
+        owner=unit.owner,
+        x=unit.pos.x,
+        y=unit.pos.y,
+        radius=unit.radius or 0.5,
+        facing=unit.facing,
+        name=name,
+        code=code_of(name) if shape in {"ground", "air", "structure"} else "",
+        side=side,
+        shape=shape,
+        ghost=is_ghost,
+        built=unit.build_progress if unit.display_type != raw_pb2.Snapshot else 1.0,
+        health=_share(unit.health, unit.health_max),
+        shield=_share(unit.shield, unit.shield_max),
+        energy=_share(unit.energy, unit.energy_max),
+        order=order,
+        target=target,
+    )
+
+
+def _shape(unit: raw_pb2.Unit, name: str, side: Side) -> Shape:
+    if name == "ForceField":
+        return "field"
+    if side == "neutral":
+        if "MineralField" in name:
+            return "rich" if "Rich" in name else "minerals"
+        return "geyser" if "Geyser" in name else "stone"
+    if unit.is_flying:
+        return "air"
+    known = knowledge().get(name)
+    is_structure = known.structure if known else unit.radius >= _STRUCTURE_RADIUS
+    return "structure" if is_structure else "ground"
+
+
+def _share(value: float, full: float) -> float:
+    return min(max(value / full, 0.0), 1.0) if full else -1.0
+
+
+def _order(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> tuple[str, tuple[float, float] | None]:
+    """What an own unit does, and where that leads; whom it fires at comes first."""
+    if unit.engaged_target_tag in units:
+        enemy = units[unit.engaged_target_tag]
+        return "Attack", (enemy.pos.x, enemy.pos.y)
+    if not unit.orders:
+        return "", None
+    order = unit.orders[0]
+    name = order_name(order.ability_id)
+    if order.HasField("target_world_space_pos"):
+        return name, (order.target_world_space_pos.x, order.target_world_space_pos.y)
+    target = units.get(order.target_unit_tag)
+    return name, None if target is None else (target.pos.x, target.pos.y)

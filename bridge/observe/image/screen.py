@@ -1,0 +1,157 @@
+"""The screen of a team: 24 by 24 world units around its camera, from above.
+
+It is drawn from what the raw interface tells, so that each team has a screen of its own, wherever the game's camera is.
+`draw` is the whole of it; what stands in a picture's title, `Legend` says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from bridge.frames import CAMERA_WIDTH
+from bridge.observe.image import palette
+from bridge.observe.image.bodies import LETTERS_FROM_PX, Look, body, direction_of
+from bridge.observe.image.canvas import SMALL_PX, Canvas
+from bridge.observe.image.effects import draw_orders, draw_patches
+from bridge.observe.image.marks import Marked, marks_of, place
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bridge.frames import Camera
+    from bridge.observe.image.lettering import Image
+    from bridge.observe.image.moment import Moment, Subject
+    from bridge.observe.image.palette import Colour, Side
+
+_BAR_PX = 3
+_RANK: dict[Side, int] = {"team": 0, "enemy": 1, "own": 2, "ally": 3, "neutral": 4}
+"""Whose marks get the best places."""
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What there is to be said of a picture in words."""
+
+    sides: tuple[Side, ...] = ()
+    """Whose units are on it."""
+    codes: dict[str, str] = field(default_factory=dict)
+    """Letters on bodies → the types that they stand for."""
+    example: tuple[str, int] | None = None
+    """A mark, and the tag that it is of."""
+    unmarked: int = 0
+    """Units for whose mark there was no room."""
+
+
+class _Drawn(NamedTuple):
+    """A subject, its side as this team sees it, and where it is in pixels."""
+
+    subject: Subject
+    side: Side
+    x: int
+    y: int
+    radius: int
+
+
+def draw(moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, marks: bool) -> tuple[Image, Legend]:
+    """The screen of a team.
+
+    Args:
+        moment: what there is.
+        camera: the team's.
+        team: tags of its units.
+        size_px: of the picture on both axes, margins included.
+        marks: whether units carry the digits of their tags.
+    """
+    canvas = Canvas.on(size_px, camera.size, lambda size: moment.painting.seen(camera, size, moment.veil))
+    canvas.rule()
+    return canvas.image, draw_units(canvas, moment, camera, team, marks=marks)
+
+
+def draw_units(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int], *, marks: bool) -> Legend:
+    """Draws everything that stands on the ground."""
+    image, scale = canvas.inner, canvas.inner.shape[0] / CAMERA_WIDTH
+
+    def place_of(x: float, y: float) -> tuple[int, int]:
+        return canvas.pixel(*camera.screen(x, y))
+
+    draw_patches(image, moment.power, place_of, scale, names=False)
+    seen = [
+        _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
+        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
+    ]
+    seen.sort(key=lambda one: (one.subject.level, one.side == "team"))  # one's own lie on top of their like
+    draw_orders(image, (one.subject for one in seen if one.side == "team"), place_of)
+    for one in seen:
+        stamp = body(_look(one))
+        stamp.press(image, one.x - stamp.size[0] // 2, one.y - stamp.size[1] // 2)
+    draw_patches(image, moment.effects, place_of, scale, names=True)
+    for one in seen:
+        _bars(image, one)
+    return _legend(seen, _mark(canvas, seen) if marks else _Marks())
+
+
+def _look(one: _Drawn) -> Look:
+    unit = one.subject
+    direction = direction_of(unit.facing, unit.shape)
+    return Look(unit.shape, one.side, one.radius, direction, unit.code, unit.ghost, unit.built < 1)
+
+
+def _bars(image: Image, one: _Drawn) -> None:
+    """Construction, health and shield above a unit that is hurt, and the energy of the team's own."""
+    unit = one.subject
+    if one.side == "neutral" or unit.health < 0:
+        return
+    rows: list[tuple[float, Colour]] = []
+    if unit.built < 1:
+        rows.append((unit.built, palette.PROGRESS))
+    if unit.health < 1 or 0 <= unit.shield < 1:
+        rows += [(unit.shield, palette.SHIELD)] if unit.shield >= 0 else []
+        rows.append((unit.health, palette.health_colour(unit.health)))
+    if unit.energy >= 0 and one.side == "team":
+        rows.append((unit.energy, palette.ENERGY))
+    width = max(2 * one.radius, 12)
+    left, top = one.x - width // 2, one.y - one.radius - 2 - _BAR_PX * len(rows)
+    if rows:
+        _fill(image, left - 1, top - 1, width + 2, _BAR_PX * len(rows) + 1, palette.INK)
+    for number, (share, colour) in enumerate(rows):
+        _fill(image, left, top + number * _BAR_PX, round(width * share), _BAR_PX - 1, colour)
+
+
+def _fill(image: Image, left: int, top: int, width: int, height: int, colour: Colour) -> None:
+    """A rectangle; what is outside of the image is left away."""
+    image[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)] = colour
+
+
+class _Marks(NamedTuple):
+    """Which marks a picture got."""
+
+    example: tuple[str, int] | None = None
+    left_out: int = 0
+
+
+def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
+    """Draws the marks."""
+    image = canvas.inner
+    size = image.shape[0]
+    inside = [one for one in seen if 0 <= one.x < size and 0 <= one.y < size]
+    wanting = [one for one in inside if one.side != "neutral" and one.subject.shape != "field"]
+    wanting.sort(key=lambda one: (_RANK[one.side], abs(2 * one.x - size) + abs(2 * one.y - size), one.subject.tag))
+    texts = marks_of(one.subject.tag for one in wanting)
+    tags = {text: tag for tag, text in texts.items()}
+    placed = place(
+        image,
+        [Marked(texts[one.subject.tag], one.side, one.x, one.y, one.radius) for one in wanting],
+        [Marked("", one.side, one.x, one.y, one.radius) for one in inside],
+        6 if canvas.image.shape[0] < SMALL_PX else 8,
+    )
+    example = (placed[0].text, tags[placed[0].text]) if placed else None
+    return _Marks(example, len(wanting) - len(placed))
+
+
+def _legend(seen: Sequence[_Drawn], marks: _Marks) -> Legend:
+    """What the picture shows."""
+    sides = tuple(sorted({one.side for one in seen}, key=_RANK.__getitem__))
+    codes = {one.subject.code: one.subject.name for one in seen if one.subject.code and one.radius >= LETTERS_FROM_PX}
+    ordered = dict(sorted(codes.items(), key=lambda item: item[1]))
+    return Legend(sides, ordered, marks.example, marks.left_out)
