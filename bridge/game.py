@@ -48,6 +48,8 @@ class GameConfig(Frozen):
     minimap_px: int = 64
     limit_loops: int | None = None
     """Game loops after which an episode ends without a result; None leaves it to the map."""
+    abilities: bool = True
+    """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
     start_timeout_s: int = 120
     """How long the game may take until it listens."""
 

@@ -8,6 +8,7 @@ positions in world units are only there. It knows no agent, no team and no text.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import os
 import threading
@@ -18,8 +19,10 @@ from absl import flags
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act.plan import Played, Step
+from bridge.available import available, question
 from bridge.compat import maps, sc2_env
 from bridge.errors import GameError, GameMissing
+from bridge.functions import check_against_pysc2
 from bridge.game import GameConfig, GameInfo, Turn, check_install
 from bridge.snapshot import Snapshot
 
@@ -46,10 +49,13 @@ class PySC2Game:
         Raises:
             GameMissing: there is no game or no such map in the install.
             GameError: it could not be started.
+            CatalogueError: this PySC2 has other functions than the text actions were made for.
         """
         self._config = config
+        self._asks = config.abilities
         self._episode = 0
         self._ended = True
+        check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
         self._env = _start(config)
@@ -80,7 +86,7 @@ class PySC2Game:
                 if all(snapshot.own or snapshot.ended for snapshot in snapshots):
                     break
                 snapshots = self._snapshots(self._env.step([[] for _ in snapshots], step_mul=1))
-        return snapshots
+            return self._with_abilities(snapshots)
 
     def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
         """Plays one plan of each player, step by step, all players in the same steps."""
@@ -97,6 +103,7 @@ class PySC2Game:
                 snapshots = self._snapshots(steps, snapshots)
                 for player, snapshot in zip(players, snapshots, strict=True):
                     player.pass_loops(loops, snapshot)
+            snapshots = self._with_abilities(snapshots)
         for player in players:
             player.close()
         return tuple(Turn(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
@@ -131,6 +138,16 @@ class PySC2Game:
             )
         self._ended = made[0].ended
         return tuple(made)
+
+    def _with_abilities(self, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
+        """Asks once for each player what its units can do; a game that is over takes no questions."""
+        if self._ended or not self._asks:
+            return tuple(snapshots)
+        controllers = self._env._controllers  # noqa: SLF001  # `SC2Env` has no query of its own
+        return tuple(
+            dataclasses.replace(snapshot, abilities=available(controller.query(question(snapshot))))
+            for snapshot, controller in zip(snapshots, controllers, strict=True)
+        )
 
 
 class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
@@ -208,6 +225,7 @@ def _start(config: GameConfig) -> Any:
         use_feature_units=True,
         use_raw_units=True,
         send_observation_proto=True,
+        hide_specific_actions=False,  # a general action would do what the unit can, not what was said
     )
     players: list[Any] = [sc2_env.Agent(sc2_env.Race[config.map.race], "Khala")]
     if config.map.opponent is not None:

@@ -33,8 +33,12 @@ class RawExecutor:
 
 
 def unit_command(command: Command) -> sc_pb.Action:
-    """A command in the words of the SC2 API."""
+    """A command in the words of the SC2 API: an order to units, or a switch of what they do by themselves."""
     action = sc_pb.Action()
+    if command.function.kind == "autocast":
+        action.action_raw.toggle_autocast.ability_id = command.function.ability_id
+        action.action_raw.toggle_autocast.unit_tags.extend(command.units)
+        return action
     order = action.action_raw.unit_command
     order.ability_id = command.function.ability_id
     order.unit_tags.extend(command.units)
@@ -47,12 +51,13 @@ def unit_command(command: Command) -> sc_pb.Action:
 
 
 def _words(command: Command) -> str:
-    arguments: list[object] = ["queued" if command.queued else "now", listed(command.units)]
-    form = "quick"
+    """As PySC2's raw functions are written, `Attack_unit(now, [0x1], 0x2)`."""
+    stem, units = command.function.stem, listed(command.units)
+    if command.function.kind == "autocast":
+        return written(f"{stem}_autocast", units)
+    when = "queued" if command.queued else "now"
     if isinstance(command.target, int):
-        form = "unit"
-        arguments.append(hex(command.target))
-    elif command.target is not None:
-        form = "pt"
-        arguments.append(f"[{command.target.x:.1f}, {command.target.y:.1f}]")
-    return written(f"{command.function.stem}_{form}", *arguments)
+        return written(f"{stem}_unit", when, units, hex(command.target))
+    if command.target is not None:
+        return written(f"{stem}_pt", when, units, f"[{command.target.x:.1f}, {command.target.y:.1f}]")
+    return written(f"{stem}_quick", when, units)

@@ -148,7 +148,7 @@ def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[Turn, 
 
     game = object.__new__(PySC2Game)
     env = StubEnv(last_loop)
-    game._env, game._ended = env, False
+    game._env, game._ended, game._asks = env, False, False
     return env, game.act([plan(steps) for steps in plans])
 
 
