@@ -16,6 +16,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from bridge.action import GROUP_SELECTOR, Action
 from bridge.catalog import alias_of, catalogue, chosen
+from bridge.imagespec import ImageSpec  # noqa: TC001  # pydantic evaluates it
 from bridge.knowledge import knowledge
 from bridge.maps import Difficulty, MapSpec, Race, known_maps
 from protocol.errors import WrongKey
@@ -121,18 +122,6 @@ class TeamConfig(Frozen):
         elif self.actions or not self.unit_types:
             raise ValueError(f"team {self.name} needs unit_types; what they may be told is listed by type of unit")
         return self
-
-
-class ImageSpec(Frozen):
-    """One picture that an agent is shown with each observation."""
-
-    what: str
-    """What it shows."""
-    size_px: int = Field(default=512, ge=64, le=2048)
-    """Length of its sides."""
-    format: Literal["jpeg", "png", "webp"] = "jpeg"
-    marks: bool = True
-    """Whether units are marked with the last digits of their tags."""
 
 
 class AutoConfig(Frozen):

@@ -17,8 +17,6 @@ from bridge.observe.image import palette
 from bridge.observe.image.lettering import written
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from bridge.observe.image.lettering import Image
     from bridge.observe.image.palette import Colour
 
@@ -38,6 +36,11 @@ def margin_of(size_px: int, extent: float) -> int:
     return 4 + 5 * digits if size_px < SMALL_PX else 6 + 7 * digits
 
 
+def inner_px(size_px: int, extent: float) -> int:
+    """Pixels on both axes that the frame itself has in a picture of this size."""
+    return size_px - margin_of(size_px, extent)
+
+
 @dataclass(frozen=True, eq=False)
 class Canvas:
     """An image with a frame."""
@@ -48,11 +51,11 @@ class Canvas:
     """Size of the frame on both axes, in its own cells."""
 
     @classmethod
-    def on(cls, size_px: int, extent: float, paint: Callable[[int], Image]) -> Canvas:
-        """A canvas with a ground, painted by a function of the ground's size in pixels."""
+    def on(cls, ground: Image, size_px: int, extent: float) -> Canvas:
+        """A canvas with a ground of `inner_px` pixels on both axes."""
         margin = margin_of(size_px, extent)
         image = _blank(size_px, extent).copy()
-        image[margin:, margin:] = paint(size_px - margin)
+        image[margin:, margin:] = ground
         return cls(image, extent)
 
     @property

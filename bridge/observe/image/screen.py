@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from bridge.frames import CAMERA_WIDTH
 from bridge.observe.image import palette
 from bridge.observe.image.bodies import LETTERS_FROM_PX, Look, body, direction_of
-from bridge.observe.image.canvas import SMALL_PX, Canvas
+from bridge.observe.image.canvas import SMALL_PX, Canvas, inner_px
 from bridge.observe.image.effects import draw_orders, draw_patches
 from bridge.observe.image.marks import Marked, marks_of, place
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from bridge.frames import Camera
     from bridge.observe.image.lettering import Image
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bridge.observe.image.palette import Colour, Side
 
 _BAR_PX = 3
-_RANK: dict[Side, int] = {"team": 0, "enemy": 1, "own": 2, "ally": 3, "neutral": 4}
+RANK: dict[Side, int] = {"team": 0, "enemy": 1, "own": 2, "ally": 3, "neutral": 4}
 """Whose marks get the best places."""
 
 
@@ -53,7 +53,9 @@ class _Drawn(NamedTuple):
     radius: int
 
 
-def draw(moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, marks: bool) -> tuple[Image, Legend]:
+def draw(
+    moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, marks: bool = True, grid: bool = True
+) -> tuple[Image, Legend]:
     """The screen of a team.
 
     Args:
@@ -61,40 +63,65 @@ def draw(moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, 
         camera: the team's.
         team: tags of its units.
         size_px: of the picture on both axes, margins included.
-        marks: whether units carry the digits of their tags.
+        marks: whether units carry the digits of their tags, and the letters of their types.
+        grid: whether grid lines are drawn.
     """
-    canvas = Canvas.on(size_px, camera.size, lambda size: moment.painting.seen(camera, size, moment.veil))
-    canvas.rule()
-    return canvas.image, draw_units(canvas, moment, camera, team, marks=marks)
-
-
-def draw_units(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int], *, marks: bool) -> Legend:
-    """Draws everything that stands on the ground."""
-    image, scale = canvas.inner, canvas.inner.shape[0] / CAMERA_WIDTH
-
-    def place_of(x: float, y: float) -> tuple[int, int]:
-        return canvas.pixel(*camera.screen(x, y))
-
+    ground = moment.painting.seen(camera, inner_px(size_px, camera.size), moment.veil)
+    canvas = Canvas.on(ground, size_px, camera.size)
+    if grid:
+        canvas.rule()
+    image, scale, place_of = canvas.inner, canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
     draw_patches(image, moment.power, place_of, scale, names=False)
-    seen = [
-        _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
-        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
-    ]
-    seen.sort(key=lambda one: (one.subject.level, one.side == "team"))  # one's own lie on top of their like
+    seen = _seen(canvas, moment, camera, team)
     draw_orders(image, (one.subject for one in seen if one.side == "team"), place_of)
     for one in seen:
-        stamp = body(_look(one))
+        stamp = body(_look(one, lettered=marks))
         stamp.press(image, one.x - stamp.size[0] // 2, one.y - stamp.size[1] // 2)
     draw_patches(image, moment.effects, place_of, scale, names=True)
     for one in seen:
         _bars(image, one)
-    return _legend(seen, _mark(canvas, seen) if marks else _Marks())
+    return canvas.image, _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=marks)
 
 
-def _look(one: _Drawn) -> Look:
+def draw_over(
+    pixels: Image,
+    moment: Moment,
+    camera: Camera,
+    team: frozenset[int],
+    size_px: int,
+    *,
+    marks: bool = True,
+    grid: bool = True,
+) -> tuple[Image, Legend]:
+    """The same from pixels of the game, on which units are drawn already: axes, grid and marks are added."""
+    canvas = Canvas.on(pixels, size_px, camera.size)
+    if grid:
+        canvas.rule()
+    seen = _seen(canvas, moment, camera, team)
+    return canvas.image, _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=False)
+
+
+def _placing(canvas: Canvas, camera: Camera) -> Callable[[float, float], tuple[int, int]]:
+    def place_of(x: float, y: float) -> tuple[int, int]:
+        return canvas.pixel(*camera.screen(x, y))
+
+    return place_of
+
+
+def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) -> list[_Drawn]:
+    """What is on the screen, in the order of drawing; a team's own lie on top of their like."""
+    scale, place_of = canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
+    seen = [
+        _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
+        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
+    ]
+    return sorted(seen, key=lambda one: (one.subject.level, one.side == "team"))
+
+
+def _look(one: _Drawn, *, lettered: bool) -> Look:
     unit = one.subject
     direction = direction_of(unit.facing, unit.shape)
-    return Look(unit.shape, one.side, one.radius, direction, unit.code, unit.ghost, unit.built < 1)
+    return Look(unit.shape, one.side, one.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1)
 
 
 def _bars(image: Image, one: _Drawn) -> None:
@@ -136,7 +163,7 @@ def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
     size = image.shape[0]
     inside = [one for one in seen if 0 <= one.x < size and 0 <= one.y < size]
     wanting = [one for one in inside if one.side != "neutral" and one.subject.shape != "field"]
-    wanting.sort(key=lambda one: (_RANK[one.side], abs(2 * one.x - size) + abs(2 * one.y - size), one.subject.tag))
+    wanting.sort(key=lambda one: (RANK[one.side], abs(2 * one.x - size) + abs(2 * one.y - size), one.subject.tag))
     texts = marks_of(one.subject.tag for one in wanting)
     tags = {text: tag for tag, text in texts.items()}
     placed = place(
@@ -149,9 +176,10 @@ def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
     return _Marks(example, len(wanting) - len(placed))
 
 
-def _legend(seen: Sequence[_Drawn], marks: _Marks) -> Legend:
+def _legend(seen: Sequence[_Drawn], marks: _Marks, *, lettered: bool) -> Legend:
     """What the picture shows."""
-    sides = tuple(sorted({one.side for one in seen}, key=_RANK.__getitem__))
-    codes = {one.subject.code: one.subject.name for one in seen if one.subject.code and one.radius >= LETTERS_FROM_PX}
+    sides = tuple(sorted({one.side for one in seen}, key=RANK.__getitem__))
+    readable = (one.subject for one in seen if lettered and one.subject.code and one.radius >= LETTERS_FROM_PX)
+    codes = {subject.code: subject.name for subject in readable}
     ordered = dict(sorted(codes.items(), key=lambda item: item[1]))
     return Legend(sides, ordered, marks.example, marks.left_out)

@@ -1,0 +1,115 @@
+"""What pictures can be asked for in a task file, and how: names and sizes, nothing that draws.
+
+`bridge.observe.image` draws what is asked for here.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import Literal, TypeAlias
+
+from pydantic import Field, field_validator, model_validator
+
+from protocol.messages import Frozen
+
+ImageFormat: TypeAlias = Literal["jpeg", "png", "webp"]
+
+DRAWN_LAYERS = (
+    "height_map",
+    "visibility_map",
+    "creep",
+    "power",
+    "player_relative",
+    "unit_type",
+    "unit_hit_points_ratio",
+    "unit_shields_ratio",
+    "unit_energy_ratio",
+    "unit_density",
+    "build_progress",
+    "effects",
+    "pathable",
+    "buildable",
+)
+"""Feature layers of the screen that can be drawn for any team, wherever the game's camera is."""
+GAME_LAYERS = (
+    "player_id",
+    "selected",
+    "unit_hit_points",
+    "unit_energy",
+    "unit_shields",
+    "unit_density_aa",
+    "hallucinations",
+    "cloaked",
+    "blip",
+    "buffs",
+    "buff_duration",
+    "active",
+    "placeholder",
+)
+"""Those that only the game itself draws, where its own camera is."""
+MINIMAP_LAYERS = (
+    "height_map",
+    "visibility_map",
+    "creep",
+    "camera",
+    "player_id",
+    "player_relative",
+    "selected",
+    "unit_type",
+    "alerts",
+    "pathable",
+    "buildable",
+)
+"""Feature layers of the minimap; the game draws them at any time."""
+WHOLE = ("screen", "minimap", "features")
+KINDS = (*WHOLE, *(f"layer:{n}" for n in (*DRAWN_LAYERS, *GAME_LAYERS)), *(f"minimap:{n}" for n in MINIMAP_LAYERS))
+"""Everything that `ImageSpec.what` may be."""
+
+
+class ImageSpec(Frozen):
+    """One kind of picture that an agent is shown with each observation."""
+
+    what: str
+    """`screen`: what a team sees, in colours; `minimap`: the whole map; `features`: nine feature layers of a team's
+    screen in one picture; `layer:<name>`: one of them alone, such as `layer:buildable`; `minimap:<name>`: one of the
+    minimap's."""
+    size_px: int = Field(default=512, ge=128, le=2048)
+    """Length of its sides, the labels of its axes included."""
+    format: ImageFormat = "jpeg"
+    quality: int = Field(default=85, ge=1, le=100)
+    """Of JPEG and WebP."""
+    marks: bool = True
+    """Whether units on a screen carry three digits of their tags, and their types two letters."""
+    grid: bool = True
+    """Whether grid lines are drawn."""
+    source: Literal["auto", "drawn", "game"] = "auto"
+    """`drawn` draws a screen, a minimap or a layer from raw data; `game` takes the game's own pixels, and shows
+    nothing where its camera is not at the team; `auto` takes them where they are there, and draws otherwise."""
+    max_teams: int = Field(default=3, ge=1)
+    """A picture is made for so many of the agent's teams, the first ones of its observation."""
+
+    @field_validator("what")
+    @classmethod
+    def _known(cls, what: str) -> str:
+        if what in KINDS:
+            return what
+        close = difflib.get_close_matches(what, KINDS, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(WHOLE)}, layer:<name>, minimap:<name>"
+        raise ValueError(f"there is no picture '{what}', {hint}")
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> ImageSpec:
+        kind, _, name = self.what.partition(":")
+        if self.source == "drawn" and ((kind == "minimap" and name) or name in GAME_LAYERS):
+            raise ValueError(f"{self.what} comes from the game only: leave source out, or say source: game")
+        return self
+
+    @property
+    def layer(self) -> str:
+        """Name of the feature layer; empty for other pictures."""
+        return self.what.partition(":")[2]
+
+    @property
+    def of_teams(self) -> bool:
+        """Whether it shows what a team sees, and not the whole map."""
+        return not self.what.startswith("minimap")
