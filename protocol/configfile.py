@@ -1,8 +1,12 @@
 """A YAML file ↔ a pydantic model, with errors that name file, line and field.
 
 One page for every package that is configured by files. It is no configuration system: there are no
-defaults here (the model has them), no layers, no interpolation, no environment. Above it are the modules
-`config` of the packages; below it are PyYAML, read with its safe loader, and pydantic.
+defaults here (the model has them), no interpolation, no environment. A file may begin with all that another one says:
+
+    like: pvz_task1_level1     # the file beside this one, or a path from here that ends in .yaml
+    map: pvz_task1_level2      # a field that is given takes the place of the other file's, as a whole
+
+Above it are the modules `config` of the packages; below it are PyYAML, read with its safe loader, and pydantic.
 """
 
 from __future__ import annotations
@@ -23,6 +27,8 @@ M = TypeVar("M", bound=BaseModel)
 Place = tuple[str | int, ...]
 """Keys and indices from the top of the document to a value."""
 
+LIKE = "like"
+"""Field at the top of a file that names another one."""
 _MAX_DEPTH = 32  # an alias that contains itself would be followed for ever
 
 
@@ -32,17 +38,7 @@ def load(path: Path | str, model: type[M]) -> M:
     Raises:
         ConfigError: the file cannot be read, is no YAML, or does not fit the model; the text says where.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ConfigError("there is no such file", source=str(path)) from None
-    except IsADirectoryError:
-        raise ConfigError("this is a directory, a YAML file is wanted", source=str(path)) from None
-    except UnicodeDecodeError:
-        raise ConfigError("this is no UTF-8 text", source=str(path)) from None
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror}", source=str(path)) from None
-    return loads(text, model, source=str(path))
+    return _fitted(_opened(Path(path)), model)
 
 
 def loads(text: str, model: type[M], *, source: str) -> M:
@@ -51,12 +47,38 @@ def loads(text: str, model: type[M], *, source: str) -> M:
     Raises:
         ConfigError: it is no YAML, or does not fit the model.
     """
-    document = _Document(text, source)
-    data = document.read()
+    return _fitted(_Document(text, source), model)
+
+
+def _fitted(document: _Document, model: type[M]) -> M:
     try:
-        return model.model_validate(data)
+        return model.model_validate(document.data)
     except ValidationError as error:
         raise _explain(document, model, error) from None
+
+
+def _opened(path: Path, *users: Path) -> _Document:
+    """The document at a path, laid over the one that it is like; `users` are those that are like it."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError("there is no such file", source=str(path)) from None
+    except IsADirectoryError:
+        raise ConfigError("this is a directory, a YAML file is wanted", source=str(path)) from None
+    except UnicodeDecodeError:
+        raise ConfigError("this is no UTF-8 text", source=str(path)) from None
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", source=str(path)) from None
+    document = _Document(text, str(path))
+    if isinstance(document.data, dict) and isinstance(name := document.data.get(LIKE), str):
+        other = path.parent / (name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
+        if other in (path, *users):
+            raise ConfigError("this file is like itself", source=str(path), line=document.lines[(LIKE,)], field=LIKE)
+        if not other.is_file():
+            fault = f"there is no file {other.name} for it"
+            raise ConfigError(fault, source=str(path), line=document.lines[(LIKE,)], field=LIKE)
+        document.lay_over(_opened(other, path, *users))
+    return document
 
 
 class _Document:
@@ -65,9 +87,27 @@ class _Document:
     def __init__(self, text: str, source: str) -> None:
         self.source = source
         self.lines: dict[Place, int] = {(): 1}
+        self._below: _Document | None = None
         self._loader = yaml.SafeLoader(text)
+        self.data = self._read()
 
-    def read(self) -> object:
+    def lay_over(self, other: _Document) -> None:
+        """Takes the fields of another document that this one does not give itself."""
+        if isinstance(self.data, dict) and isinstance(other.data, dict):
+            self._below = other
+            self.data = other.data | {key: value for key, value in self.data.items() if key != LIKE}
+
+    def origin(self, place: Place) -> tuple[str, int | None]:
+        """File and line of the value at `place`."""
+        if self._below is not None and place[:1] not in self.lines and self._below.knows(place[:1]):
+            return self._below.origin(place)
+        return self.source, self.line_of(place)
+
+    def knows(self, place: Place) -> bool:
+        """Whether there is a value at `place`."""
+        return place in self.lines or (self._below is not None and self._below.knows(place))
+
+    def _read(self) -> object:
         """The data; an empty document is an empty mapping, so that a model can say what is missing."""
         try:
             root = self._loader.get_single_node()
@@ -132,18 +172,23 @@ class _Document:
 def _explain(document: _Document, model: type[BaseModel], error: ValidationError) -> ConfigError:
     faults = error.errors(include_url=False)
     placed = [(_known_place(document, fault), fault) for fault in faults]
-    place, fault = min(placed, key=lambda item: document.line_of(item[0]) or 0)
+    place, fault = min(placed, key=lambda item: (document.origin(item[0])[0] != document.source, _line(document, item)))
     text = _sentence(fault, model)
     if len(faults) > 1:
         text += f" (and {len(faults) - 1} more)"
-    return ConfigError(text, source=document.source, line=document.line_of(place), field=_dotted(place) or None)
+    source, line = document.origin(place)
+    return ConfigError(text, source=source, line=line, field=_dotted(place) or None)
+
+
+def _line(document: _Document, placed: tuple[Place, ErrorDetails]) -> int:
+    return document.origin(placed[0])[1] or 0
 
 
 def _known_place(document: _Document, fault: ErrorDetails) -> Place:
     """The place of a fault without what pydantic adds to it: names of union members, of validators."""
     place: Place = ()
     for part in fault["loc"]:
-        if (*place, part) in document.lines:
+        if document.knows((*place, part)):
             place = (*place, part)
     return (*place, fault["loc"][-1]) if fault["type"] == "missing" else place
 
