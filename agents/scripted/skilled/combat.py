@@ -12,7 +12,7 @@ from agents.scripted.skilled.kinds import IGNORED, TOWN_HALLS, kind_of
 from agents.scripted.skilled.space import away, distance, middle, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from agents.scripted.reading import Team, Unit
     from agents.scripted.skilled.plan import Plan
@@ -24,6 +24,8 @@ STEP_BACK = 3.5
 BLINK = 7.5
 WALK_COST = 3.0
 """World units of walking that halve what a target is worth."""
+MELEE_WALK_COST = 1.0
+"""The same for those who stand in each other's way."""
 COOLING_S = 0.3
 
 
@@ -63,17 +65,33 @@ def worth(enemy: Unit, prey: str) -> float:
     return value
 
 
-def best_target(team: Team, prey: str = "") -> Unit | None:
-    """The enemy whose loss helps most for the time and the way that it takes the team; None without targets."""
+def support(teams: Iterable[Team]) -> dict[str, float]:
+    """By the tag of an enemy: how many units of all teams have it in reach, or nearly."""
+    count: dict[str, float] = {}
+    for team in teams:
+        for enemy in team.enemies:
+            able = sum(_gap(unit, enemy) < 1.0 and kind_of(unit).hits(kind_of(enemy)) for unit in team.own)
+            count[enemy.tag] = count.get(enemy.tag, 0.0) + able
+    return count
+
+
+def best_target(plan: Plan, prey: str = "") -> Unit | None:
+    """The enemy whose loss helps most for the time and the way that it takes; None without targets.
+
+    What others have in reach, too, is the better target.
+    """
+    team, most = plan.team, max(1.0, *plan.support.values()) if plan.support else 1.0
     shooters = [unit for unit in team.own if kind_of(unit).reach >= 0]
     if not shooters:
         return None
+    patience = MELEE_WALK_COST if all(kind_of(unit).melee for unit in shooters) else WALK_COST
 
     def value(enemy: Unit) -> tuple[float, str]:
         able = [unit for unit in shooters if kind_of(unit).hits(kind_of(enemy))]
         ways = sorted(max(0.0, distance(unit, enemy) - _range(unit, enemy) - 1.0) for unit in able)
         way = ways[len(ways) // 2]
-        return -worth(enemy, prey) / (enemy.hit_points + 30.0) / 2 ** (way / WALK_COST), enemy.tag
+        shared = 0.5 + plan.support.get(enemy.tag, 0.0) / most
+        return -shared * worth(enemy, prey) / (enemy.hit_points + 30.0) / 2 ** (way / patience), enemy.tag
 
     return min(targets(team), key=value, default=None)
 
@@ -81,7 +99,7 @@ def best_target(team: Team, prey: str = "") -> Unit | None:
 def fight(plan: Plan, prey: str = "") -> bool:
     """Plans a fight of one team against what it sees; says whether there is one."""
     team = plan.team
-    target = best_target(team, prey)
+    target = best_target(plan, prey)
     foes = threats(team)
     if target is None and not foes:
         return False
@@ -129,6 +147,8 @@ def step_back(plan: Plan, foes: Sequence[Unit]) -> bool:
     chased = [foe for foe in close if kind_of(foe).reach < reach - 0.9 and kind_of(foe).speed <= speed + 0.1]
     if not chased or 2 * len(chased) < len(close):
         return False
+    if any(kind_of(ally).melee for ally in team.allies):
+        return False  # they hold the line, and need the fire
     centre = middle(team.own)
     return plan.give("Move_Screen", away(team, centre, foes, STEP_BACK))
 

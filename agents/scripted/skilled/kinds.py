@@ -123,13 +123,13 @@ _GUNS = {
     "PlanetaryFortress": Kind(6, NONE, 28, 0),
 }
 _PLAIN = (
-    "Nexus Pylon Assimilator Gateway WarpGate Forge CyberneticsCore TwilightCouncil RoboticsFacility RoboticsBay "
-    "Stargate FleetBeacon TemplarArchive DarkShrine ShieldBattery StasisTrap OracleStasisTrap CommandCenter "
-    "OrbitalCommand SupplyDepot SupplyDepotLowered Refinery Barracks EngineeringBay Armory Factory Starport FusionCore "
-    "GhostAcademy SensorTower Reactor TechLab BarracksTechLab BarracksReactor FactoryTechLab FactoryReactor StarportTechLab "
-    "StarportReactor Hatchery Lair Hive Extractor SpawningPool EvolutionChamber RoachWarren BanelingNest HydraliskDen "
-    "LurkerDen InfestationPit Spire GreaterSpire UltraliskCavern NydusNetwork NydusCanal CreepTumor CreepTumorBurrowed "
-    "CreepTumorQueen"
+    "Nexus Pylon Assimilator Gateway WarpGate Forge CyberneticsCore TwilightCouncil RoboticsFacility "
+    "RoboticsBay Stargate FleetBeacon TemplarArchive DarkShrine ShieldBattery StasisTrap OracleStasisTrap "
+    "CommandCenter OrbitalCommand SupplyDepot SupplyDepotLowered Refinery Barracks EngineeringBay Armory "
+    "Factory Starport FusionCore GhostAcademy SensorTower Reactor TechLab BarracksTechLab BarracksReactor "
+    "FactoryTechLab FactoryReactor StarportTechLab StarportReactor Hatchery Lair Hive Extractor "
+    "SpawningPool EvolutionChamber RoachWarren BanelingNest HydraliskDen LurkerDen InfestationPit Spire "
+    "GreaterSpire UltraliskCavern NydusNetwork NydusCanal CreepTumor CreepTumorBurrowed CreepTumorQueen"
 )
 STRUCTURE = Kind(NONE, NONE, 1, 0, role="structure", structure=True)
 TOWN_HALLS = frozenset(

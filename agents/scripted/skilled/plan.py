@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from agents.scripted.writing import call, inside
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from agents.scripted.reading import Point, Situation, Team, Unit
 
 
@@ -18,6 +20,8 @@ class Plan:
     team: Team
     situation: Situation
     calls: list[str] = field(default_factory=list)
+    support: Mapping[str, float] = field(default_factory=dict)
+    """By the tag of an enemy: how many units of all teams have it in reach."""
     busy: set[str] = field(default_factory=set)
     """Tags of units that have an order in this reply."""
 

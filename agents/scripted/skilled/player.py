@@ -25,9 +25,10 @@ _ATTACK = re.compile(r"\b(raid|kill|destroy)\b", re.IGNORECASE)
 def skilled(observation: str, rng: random.Random) -> str:
     """Uses skills, concentrates fire, keeps its distance, raids, and builds; by the text of the observation alone."""
     situation = read(observation)
+    support = combat.support(situation.teams.values())
     orders: dict[str, list[str]] = {}
     for team in situation.teams.values():
-        plan = Plan(team, situation)
+        plan = Plan(team, situation, support=support)
         _lead(plan, observation)
         if plan.calls:
             orders[team.name] = plan.calls
