@@ -1,0 +1,111 @@
+"""A unit as every team of a side sees it: the part of its view that does not depend on who looks.
+
+Numbers of the game become names and rounded values here, once per unit and snapshot. Where a unit stands on whose
+screen is the business of `bridge.observe.scene`, which is above; below are names, frames and the raw unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import raw_pb2
+
+from bridge.knowledge import is_armed, knowledge
+from bridge.names import buff_name, order_name, unit_name
+from protocol.messages import LOOPS_PER_S, OrderView, UnitView
+
+if TYPE_CHECKING:
+    from bridge.frames import MapFrame
+    from protocol.messages import Point
+
+_CLOAKED = (raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied)
+_BLANK = UnitView(
+    tag="", type="", alliance="neutral", screen=(0.0, 0.0), minimap=(0.0, 0.0), health=0.0, health_max=0.0
+)  # copied with `but`, which takes a tenth of the time of a checked one
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A unit, and its view from nowhere: `screen`, `distance` and `alliance` are left to those who look."""
+
+    tag: int
+    x: float
+    y: float
+    name: str
+    alliance: int
+    view: UnitView
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it belongs to the player."""
+        return self.alliance == raw_pb2.Self
+
+
+def body(unit: raw_pb2.Unit, world: MapFrame) -> Body:
+    """The body of a unit; orders, passengers and weapons are told of the player's own ones only."""
+    name, x, y = unit_name(unit.unit_type), unit.pos.x, unit.pos.y
+    view = _BLANK.but(
+        tag=hex(unit.tag),
+        type=name,
+        minimap=rounded(world.minimap(x, y), world.minimap_size),
+        health=round(unit.health, 1),
+        health_max=unit.health_max,
+        shield=round(unit.shield, 1),
+        shield_max=unit.shield_max,
+        energy=round(unit.energy, 1),
+        energy_max=unit.energy_max,
+        build_progress=round(unit.build_progress, 2),
+        flying=unit.is_flying,
+        cloaked=unit.cloak in _CLOAKED,
+        burrowed=unit.is_burrowed,
+        hallucination=unit.is_hallucination,
+        buffs=tuple(map(buff_name, unit.buff_ids)),
+    )
+    if unit.alliance == raw_pb2.Self:
+        view = view.but(**_own(unit, name, world))
+    elif contents := unit.mineral_contents or unit.vespene_contents:
+        view = view.but(contents=contents)
+    return Body(unit.tag, x, y, name, unit.alliance, view)
+
+
+def _own(unit: raw_pb2.Unit, name: str, world: MapFrame) -> dict[str, object]:
+    """What is known of a player's own unit besides."""
+    orders = tuple(_order(order, world) for order in unit.orders)
+    more: dict[str, object] = {"orders": orders, "order": orders[0].name if orders else None}
+    if is_armed(name):
+        more["weapon_cooldown_s"] = round(unit.weapon_cooldown / LOOPS_PER_S, 2)
+    if unit.cargo_space_max:
+        more["cargo_max"] = unit.cargo_space_max
+        more["passengers"] = tuple(sorted(unit_name(passenger.unit_type) for passenger in unit.passengers))
+    if unit.ideal_harvesters:
+        more["harvesters"] = (unit.assigned_harvesters, unit.ideal_harvesters)
+    if unit.build_progress >= 1 and not unit.is_powered and name in knowledge():
+        more["unpowered"] = knowledge()[name].needs_power
+    return more
+
+
+_NO_ORDER = OrderView(name="")
+
+
+def _order(order: raw_pb2.UnitOrder, world: MapFrame) -> OrderView:
+    found: dict[str, object] = {"name": order_name(order.ability_id)}
+    target = order.WhichOneof("target")
+    if target == "target_unit_tag":
+        found["target"] = hex(order.target_unit_tag)
+    elif target == "target_world_space_pos":
+        place = order.target_world_space_pos
+        found["minimap"] = rounded(world.minimap(place.x, place.y), world.minimap_size)
+    if order.progress > 0:
+        found["progress"] = round(order.progress, 2)
+    return _NO_ORDER.but(**found)
+
+
+def rounded(point: tuple[float, float], size: float) -> Point:
+    """To a tenth of a cell; a position within a frame stays within it, whose end is open."""
+    return _tenth(point[0], size), _tenth(point[1], size)
+
+
+def _tenth(value: float, size: float) -> float:
+    near = round(value, 1) + 0.0  # no negative zero
+    return round(size - 0.1, 1) if value < size <= near else near

@@ -1,0 +1,113 @@
+"""Things on the map whose tags an action takes: power fields, free places for a base, free geysers, own structures.
+
+Functions of a scene. Where a base could stand is known by `bridge.ground`; here a place gets the tag that an agent
+can name it by, which is that of the resource nearest to its middle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from bridge.ground import land_of
+from bridge.observe.body import rounded
+from bridge.observe.chronicle import PASSING, is_structure
+from bridge.observe.scene import on_screen, screen_of
+from protocol.messages import Landmark
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Literal, TypeAlias
+
+    from bridge.frames import Camera, WorldPoint
+    from bridge.ground import Land
+    from bridge.observe.body import Body
+    from bridge.observe.scene import Scene
+
+    What: TypeAlias = Literal["base place", "geyser", "power field", "structure"]
+
+MAX_PLACES = 5
+"""Free places for a base that are told, the nearest ones."""
+BASE_TAKEN = 6.0
+"""World units from the middle of a base's place within which a town hall takes it."""
+GAS_OF_BASE = 10.0
+"""World units from a town hall within which a geyser is its own; as workers are counted."""
+ON_TOP = 1.0
+"""World units between the middles of a geyser and of the structure on it."""
+
+
+def power_fields(scene: Scene) -> Iterator[Landmark]:
+    """What one can warp in at and build by, in the order of tags."""
+    sources = scene.snapshot.response.observation.raw_data.player.power_sources
+    for source in sorted(sources, key=lambda source: source.tag):
+        body = scene.bodies.get(source.tag)
+        minimap = rounded(scene.world.minimap(source.pos.x, source.pos.y), scene.world.minimap_size)
+        name = body.name if body else "power field"
+        yield Landmark(
+            what="power field", tag=hex(source.tag), type=name, minimap=minimap, about=f"radius {source.radius:g}"
+        )
+
+
+def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+    """Free places for a base, the nearest to the own bases first, then the geysers of own bases that nobody uses."""
+    land = land_of(scene.snapshot)
+    halls = [(unit.pos.x, unit.pos.y) for unit in land.halls]
+    own = [(unit.pos.x, unit.pos.y) for unit in land.own_halls]
+    free = [base.place for base in land.bases if _nearest(base.place, halls) > BASE_TAKEN]
+    fields = [body for body in scene.resources if "Mineral" in body.name]
+    for place in sorted(free, key=lambda place: (_nearest(place, own), place))[:MAX_PLACES]:
+        yield from _base(scene, camera, place, fields, own)
+    yield from _geysers(scene, camera, land)
+
+
+def _base(
+    scene: Scene, camera: Camera | None, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
+) -> Iterator[Landmark]:
+    nearest = min(fields, key=lambda body: (math.dist((body.x, body.y), place), body.tag), default=None)
+    if nearest is not None:
+        far = _nearest(place, own)
+        about = f"{far:.0f} from your nearest base" if math.isfinite(far) else ""
+        middle = rounded(scene.world.minimap(*place), scene.world.minimap_size)
+        yield _landmark("base place", nearest, camera, about).but(minimap=middle)
+
+
+def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landmark]:
+    built = [(b.x, b.y) for b in scene.bodies.values() if b.name.removesuffix("Rich") in GAS_STRUCTURES]
+    for body in scene.resources:
+        if "Geyser" not in body.name or _nearest((body.x, body.y), built) < ON_TOP:
+            continue
+        for hall in land.own_halls:
+            if math.dist((body.x, body.y), (hall.pos.x, hall.pos.y)) <= GAS_OF_BASE:
+                yield _landmark("geyser", body, camera, f"by your {scene.bodies[hall.tag].name} {hex(hall.tag)}")
+                break
+
+
+GAS_STRUCTURES = frozenset({"Assimilator", "Extractor", "Refinery"})
+
+
+def structures(scene: Scene) -> Iterator[Landmark]:
+    """The own structures with what they do, by type and tag."""
+    own = [b for b in scene.bodies.values() if b.is_own and is_structure(b.name) and b.name not in PASSING]
+    for body in sorted(own, key=lambda body: (body.name, body.tag)):
+        yield _landmark("structure", body, None, _busy(body))
+
+
+def _busy(body: Body) -> str:
+    view = body.view
+    if view.build_progress < 1:
+        return f"{100 * view.build_progress:.0f}% built"
+    doing = [order.name + (f" {100 * order.progress:.0f}%" if order.progress else "") for order in view.orders]
+    parts = [" then ".join(doing)] if doing else []
+    parts += ["no power"] if view.unpowered else []
+    parts += [f"{view.harvesters[0]} of {view.harvesters[1]} workers"] if view.harvesters else []
+    parts += [f"{view.energy:.0f} energy"] if view.energy_max else []
+    return ", ".join(parts)
+
+
+def _landmark(what: What, body: Body, camera: Camera | None, about: str) -> Landmark:
+    screen = screen_of(camera, body) if camera is not None and on_screen(camera, body) else None
+    return Landmark(what=what, tag=body.view.tag, type=body.name, minimap=body.view.minimap, screen=screen, about=about)
+
+
+def _nearest(place: tuple[float, float], others: Sequence[tuple[float, float]]) -> float:
+    return min((math.dist(place, other) for other in others), default=math.inf)

@@ -1,0 +1,185 @@
+"""What a team may be told now, what that costs, and why the rest is not possible.
+
+Valid is what the game itself would take from some unit of the team (`Snapshot.abilities`); where the game was not
+asked, what nothing known speaks against. Reasons and costs come from `bridge.knowledge`. A team without units is
+judged by the units of the whole side that would carry its actions out; which of them it will be, and where, is left
+to the rules of `bridge.macro`. Whether a call is carried out is decided by `bridge.act`, by the state it meets.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+from bridge.catalog import catalogue
+from bridge.knowledge import ability_of, is_armed, knowledge, stand_ins
+from protocol.messages import Barred, Offer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from bridge.action import Action
+    from bridge.knowledge import AbilityFacts
+    from bridge.observe.body import Body
+    from bridge.snapshot import Snapshot
+    from bridge.task import AgentConfig
+    from protocol.messages import ActionSpec, OrderView
+
+
+class Choice(NamedTuple):
+    """What a team may be told: a part of its view."""
+
+    actions: tuple[ActionSpec, ...]
+    offers: tuple[Offer, ...]
+    barred: tuple[Barred, ...]
+
+
+class Possible:
+    """The means of a side at one moment, and what they allow."""
+
+    def __init__(self, snapshot: Snapshot, bodies: Mapping[int, Body], upgrades: Sequence[str]) -> None:
+        common = snapshot.response.observation.player_common
+        self._abilities = snapshot.abilities
+        self._upgrades = frozenset(upgrades)
+        self._purse = common.minerals, common.vespene, float(common.food_cap) - float(common.food_used)
+        self._own: dict[str, list[Body]] = {}
+        for body in bodies.values():
+            if body.is_own:
+                self._own.setdefault(body.name, []).append(body)
+        self._standing = {name for name, there in self._own.items() if any(b.view.build_progress >= 1 for b in there)}
+
+    def for_team(self, agent: AgentConfig, members: Sequence[Body]) -> Choice:
+        """The actions of a team's types of units, in the order in which they are listed for them."""
+        by_type: dict[str, list[Body]] = {}
+        for body in members:
+            by_type.setdefault(body.name, []).append(body)
+        found: dict[str, str | None] = {}  # by action, why it is not possible
+        for unit_type, units in by_type.items():
+            able = self._able(units)
+            for name in agent.actions.get(unit_type, ()):
+                if name not in found or found[name] is not None:
+                    found[name] = self._why_not(catalogue()[name], units, able)
+        return self._choice(found, next(iter(by_type), ""))
+
+    def for_side(self, names: Iterable[str]) -> Choice:
+        """Those of the actions of a side team that somebody of the side can carry out."""
+        return self._choice({name: self._why_nobody(catalogue()[name]) for name in names}, "")
+
+    def _able(self, units: Iterable[Body]) -> frozenset[int] | None:
+        """Abilities that any of some units could use now; None if the game was not asked."""
+        if self._abilities is None:
+            return None
+        return frozenset().union(*(self._abilities.get(unit.tag, ()) for unit in units))
+
+    def _choice(self, judged: Mapping[str, str | None], unit_type: str) -> Choice:
+        valid = [catalogue()[name] for name, reason in judged.items() if reason is None]
+        offers = (self._offer(action, unit_type or _carrier(action)) for action in valid)
+        barred = tuple(Barred(action=name, reason=reason) for name, reason in judged.items() if reason is not None)
+        return Choice(tuple(a.spec for a in valid), tuple(offer for offer in offers if offer is not None), barred)
+
+    def _offer(self, action: Action, unit_type: str) -> Offer | None:
+        facts = _facts(action.name, unit_type)
+        if facts is None or not (facts.minerals or facts.vespene or facts.supply):
+            return None
+        prices = zip(self._purse, (facts.minerals, facts.vespene, facts.supply), strict=True)
+        made = facts.produces
+        return Offer(
+            action=action.name,
+            minerals=round(facts.minerals),
+            vespene=round(facts.vespene),
+            supply=facts.supply,
+            times=max(0, min(int(purse // price) for purse, price in prices if price > 0)),
+            first=made in knowledge() and knowledge()[made].structure and not stand_ins(made) & self._own.keys(),
+        )
+
+    # --- why not ----------------------------------------------------------------------------------------------
+
+    def _why_not(self, action: Action, units: Sequence[Body], able: frozenset[int] | None) -> str | None:
+        """Why units of one type cannot do an action now, as the end of a sentence; None if one of them can."""
+        unit_type = units[0].name
+        reason = unmet(action, unit_type, self._upgrades)
+        function = action.pysc2
+        if reason is not None or able is None or function is None or function.ability_id in able:
+            return reason
+        facts = _facts(action.name, unit_type)
+        if facts is None:
+            return f"{unit_type} cannot"
+        return self._lacking(facts) or _not_ready(facts, units) or "not in its present state"
+
+    def _why_nobody(self, action: Action) -> str | None:
+        """Why nobody of the side can do an action now; None if somebody can."""
+        units = [body for name in action.units for body in self._own.get(name, ())]
+        if action.units and not units:
+            return f"no {' or '.join(action.units)}"
+        ready = [body for body in units if body.view.build_progress >= 1]
+        if units and not ready:
+            return f"{units[0].name} is not finished"
+        function = action.pysc2
+        if function is None:
+            return None
+        able = self._able(ready or (body for there in self._own.values() for body in there))
+        if able is not None and function.ability_id in able:
+            return None
+        facts = _facts(action.name, ready[0].name if ready else "")
+        if facts is None:
+            return None if able is None else "nobody can now"
+        reason = self._lacking(facts)
+        if reason is None and able is not None:
+            unpowered = ready and all(body.view.unpowered for body in ready)
+            busy = f"{'no' if unpowered else 'every'} {' or '.join(dict.fromkeys(b.name for b in ready))} "
+            reason = busy + ("has power" if unpowered else "is busy or not ready") if ready else "nobody can now"
+        return reason
+
+    def _lacking(self, facts: AbilityFacts) -> str | None:
+        """What the side lacks for a use of an ability."""
+        if facts.researches in self._upgrades:
+            return "researched already"
+        if facts.researches and any(o.name == facts.name for there in self._own.values() for o in _orders(there)):
+            return "being researched"
+        for name in facts.requires:
+            if name not in knowledge():
+                if name not in self._upgrades:
+                    return f"{name} is not researched"
+            elif not stand_ins(name) & self._standing:
+                return f"no {name}"
+        return self._short_of(facts)
+
+    def _short_of(self, facts: AbilityFacts) -> str | None:
+        prices = facts.minerals, facts.vespene, facts.supply
+        missing = zip(("minerals", "vespene", "supply"), prices, self._purse, strict=True)
+        return ", ".join(f"{price - purse:g} {what} too few" for what, price, purse in missing if price > purse) or None
+
+
+def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None:
+    """Why units of a type cannot do an action now, as the end of a sentence; None if they can."""
+    if action.needs.weapon and not is_armed(unit_type):
+        return f"{unit_type} has no weapon"
+    if action.needs.upgrade is not None and action.needs.upgrade not in upgrades:
+        return f"{action.needs.upgrade} is not researched"
+    return None
+
+
+def _not_ready(facts: AbilityFacts, units: Sequence[Body]) -> str | None:
+    """What the units themselves lack."""
+    best = max(body.view.energy for body in units)
+    if facts.energy > best:
+        return f"needs {facts.energy:g} energy, there is {int(best)}"
+    if facts.addon:
+        return f"needs a {facts.addon}"
+    return "cooling down" if facts.cooldown_s else None
+
+
+def _orders(bodies: Iterable[Body]) -> Iterable[OrderView]:
+    return (order for body in bodies for order in body.view.orders)
+
+
+def _carrier(action: Action) -> str:
+    """A type of unit that carries an action of the side out; empty for any."""
+    return action.units[0] if action.units else ""
+
+
+@functools.cache
+def _facts(action: str, unit_type: str) -> AbilityFacts | None:
+    """What is known of the ability in which an action ends, for a type of unit."""
+    function = catalogue()[action].pysc2
+    return None if function is None else ability_of(function.ability_id, unit_type)

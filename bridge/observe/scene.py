@@ -1,0 +1,190 @@
+"""One snapshot while views are made of it: what stands on which team's screen.
+
+A team sees what its camera shows: a square of 24 world units around its head unit. The camera is virtual, it needs
+no move in the game and does not stop at the border of the map. The team's own units are listed wherever they are,
+with a position outside of the frame if the camera does not reach them; everything else only within it. Neutral units
+(resources, rocks) and larvae are left out; builders are shown resources apart. A team without units of its own, which
+orders those of the whole side, has no camera and sees nothing.
+
+What all teams see alike is made once per scene, and who is on a screen is found with arrays, since a dozen teams look
+at a hundred units in each step. Views of the whole side are made by `bridge.observe.side`, words by
+`bridge.observe.text`; `bridge.observe.observer` is above.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+
+from bridge.frames import CAMERA_WIDTH, Camera, MapFrame
+from bridge.knowledge import knowledge
+from bridge.names import upgrade_name
+from bridge.observe.body import body, rounded
+from bridge.observe.events import Events
+from bridge.observe.possible import Possible
+from bridge.observe.sight import TeamSight
+from protocol.messages import LOOPS_PER_S, Resources, TeamView, View
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
+    from bridge.observe.body import Body
+    from bridge.observe.possible import Choice
+    from bridge.observe.teams import Team
+    from bridge.snapshot import Snapshot
+    from bridge.task import AgentConfig
+    from protocol.messages import Alliance, Frames, Point, UnitView
+
+    Floats: TypeAlias = NDArray[np.float64]
+
+UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
+_HALF = CAMERA_WIDTH / 2
+
+
+class Scene:
+    """A snapshot, and what every team sees alike."""
+
+    def __init__(self, snapshot: Snapshot, frames: Frames, before: Scene | None = None) -> None:
+        """Takes a snapshot, the frames that its views are given in, and the scene before, which it does not keep."""
+        self.snapshot = snapshot
+        self.world = MapFrame.of(snapshot.info, frames)
+        self._screen_size = frames.screen
+        units = [unit for unit in snapshot.units.values() if unit.alliance != raw_pb2.Neutral]
+        self.bodies: dict[int, Body] = {unit.tag: body(unit, self.world) for unit in units}
+        """Every unit in sight but the neutral ones, in ascending order of tags."""
+        self.fallen = {tag: before.bodies[tag] for tag in snapshot.dead if before and tag in before.bodies}
+        """Those who died since the scene before, as they were in it."""
+        self.totals = {b.view.tag: b.view.health + b.view.shield for b in self.bodies.values()}
+        """Health and shield by tag."""
+        self.events = Events(before.totals if before else {}, self.totals, frozenset(map(hex, snapshot.dead)))
+        observation = snapshot.response.observation
+        self.upgrades = tuple(upgrade_name(number) for number in sorted(observation.raw_data.player.upgrade_ids))
+        self.possible = Possible(snapshot, self.bodies, self.upgrades)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Puts the bodies in order as arrays: one row a body, in ascending order of tags."""
+        order = self._order = tuple(self.bodies.values())
+        self._index = {b.tag: index for index, b in enumerate(order)}
+        self._x = np.array([b.x for b in order], dtype=float)  # world
+        self._y = np.array([b.y for b in order], dtype=float)
+        ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
+        self._rank = np.array([ranks[b.name] for b in order], dtype=int)  # of the type, by name
+        foe = [b.alliance == raw_pb2.Enemy and b.name not in UNSEEN_TYPES for b in order]
+        self._foe = np.array(foe, dtype=bool)
+        self._friend = np.array([b.alliance != raw_pb2.Enemy for b in order], dtype=bool)
+
+    @functools.cached_property
+    def resources(self) -> tuple[Body, ...]:
+        """Minerals and geysers as they are now or were seen last, in ascending order of tags."""
+        neutral = (u for u in self.snapshot.response.observation.raw_data.units if u.alliance == raw_pb2.Neutral)
+        found = (body(unit, self.world) for unit in sorted(neutral, key=lambda unit: unit.tag))
+        return tuple(b for b in found if b.name in knowledge() and knowledge()[b.name].resource)
+
+    @functools.cached_property
+    def view(self) -> View:
+        """What every agent is told alike."""
+        common = self.snapshot.response.observation.player_common
+        return View(
+            time_s=round(self.snapshot.game_loop / LOOPS_PER_S, 3),
+            resources=Resources(
+                minerals=common.minerals,
+                vespene=common.vespene,
+                supply_used=common.food_used,
+                supply_cap=common.food_cap,
+            ),
+            upgrades=self.upgrades,
+        )
+
+    def team(self, agent: AgentConfig, team: Team, before: TeamView | None, *, resources: bool = False) -> TeamSight:
+        """What one team sees.
+
+        Args:
+            agent: whose team it is.
+            team: its units; they are in the snapshot.
+            before: what the team saw before, for events; None if it saw nothing.
+            resources: whether it is told of minerals and geysers.
+        """
+        if not team.tags:
+            names = team.config.actions
+            return TeamSight(team, None, _team_view(team.name, None, self.possible.for_side(names)))
+        members = np.array([self._index[tag] for tag in team.tags])
+        head = self._order[members[0]]
+        camera = Camera(head.x, head.y, self._screen_size)
+        looked = _Look(camera, self._x, self._y, members)
+        friends = np.flatnonzero(looked.others & self._friend)
+        foes = np.flatnonzero(looked.others & self._foe)
+        friends = friends[np.argsort(self._rank[friends], kind="stable")]
+        foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
+        bodies = [self._order[index] for index in members.tolist()]
+        view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies)).but(
+            units=self._units(looked, members, "own"),
+            allies=self._units(looked, friends, "ally"),
+            enemies=self._units(looked, foes, "enemy"),
+            resources=self._resources_on(camera) if resources else (),
+            bounds=_edges(camera.bounds(self.world)),
+        )
+        return TeamSight(team, camera, view.but(events=self.events.of_team(before, view)))
+
+    def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Alliance) -> tuple[UnitView, ...]:
+        points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)
+        views = [self._order[row].view for row in rows.tolist()]
+        if alliance != "enemy":
+            return tuple([v.but(alliance=alliance, screen=at) for v, at in zip(views, points, strict=True)])
+        far = looked.distance[rows].tolist()
+        seen = zip(views, points, far, strict=True)
+        return tuple([view.but(alliance=alliance, screen=at, distance=d) for view, at, d in seen])
+
+    def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
+        """The resources on a camera's screen, by type and tag."""
+        seen = [b for b in self.resources if on_screen(camera, b)]
+        return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
+
+
+class _Look:
+    """Where all bodies are for one team's camera; one row a body in each array."""
+
+    def __init__(self, camera: Camera, x: Floats, y: Floats, members: NDArray[np.intp]) -> None:
+        right, down = x - (camera.x - _HALF), (camera.y + _HALF) - y
+        inside = (right >= 0) & (right < CAMERA_WIDTH) & (down >= 0) & (down < CAMERA_WIDTH)
+        inside[members] = False
+        scale = camera.size / CAMERA_WIDTH
+        self.others: NDArray[np.bool_] = inside
+        """Who is on the screen and not of the team."""
+        self.screen_x = _tenths(right * scale, camera.size)
+        self.screen_y = _tenths(down * scale, camera.size)
+        middle = x[members].mean(), y[members].mean()
+        self.distance = np.round(np.hypot(x - middle[0], y - middle[1]), 1)
+        """From the middle of the team, in world units."""
+
+
+def _tenths(values: Floats, size: float) -> Floats:
+    """To a tenth of a cell; a position within the frame stays within it, whose end is open."""
+    near = np.round(values, 1) + 0.0  # no negative zero
+    near[(values < size) & (near >= size)] = round(size - 0.1, 1)
+    return near
+
+
+def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:
+    return TeamView(name=name, minimap=minimap, actions=choice.actions, offers=choice.offers, barred=choice.barred)
+
+
+def on_screen(camera: Camera, seen: Body) -> bool:
+    """Whether a camera shows a body."""
+    right, down = seen.x - camera.x, camera.y - seen.y
+    return -_HALF <= right < _HALF and -_HALF <= down < _HALF
+
+
+def screen_of(camera: Camera, seen: Body) -> Point:
+    """Where a camera shows a body, to a tenth of a cell."""
+    return rounded(camera.screen(seen.x, seen.y), camera.size)
+
+
+def _edges(bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    x0, y0, x1, y1 = bounds
+    return round(x0, 1), round(y0, 1), round(x1, 1), round(y1, 1)

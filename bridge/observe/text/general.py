@@ -1,0 +1,59 @@
+"""Sections that every agent has: the game, the task, and how to answer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bridge.observe.text.page import section
+from bridge.observe.text.words import INDENT, n, one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bridge.observe.text.page import Page
+
+
+@section("game")
+def game(page: Page) -> Iterator[str]:
+    """Time, and resources for those who spend them."""
+    view, used = page.view, page.view.resources
+    yield "Game"
+    minutes, seconds = divmod(int(view.time_s), 60)
+    yield f"{INDENT}Time: {minutes}:{seconds:02}"
+    if used.minerals or used.vespene or page.sight.agent.kind != "combat_group":
+        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}"
+        yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
+    if view.upgrades:
+        yield f"{INDENT}Upgrades: {', '.join(view.upgrades)}"
+    if page.sight.idle_teams:
+        yield f"{INDENT}Teams without units: {', '.join(page.sight.idle_teams)}"
+
+
+@section("task")
+def task(page: Page) -> Iterator[str]:
+    """What is to be done, by all, by this agent, and by its teams at this time."""
+    yield "Task"
+    yield f"{INDENT}{one_line(page.task.task)}"
+    if page.sight.agent.task:
+        yield f"{INDENT}{one_line(page.sight.agent.task)}"
+    always = {team.team.config.name: team.team.config.task for team in page.sight.teams}
+    yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
+    now: dict[str, list[str]] = {}
+    for team in page.teams:
+        if team.task:
+            now.setdefault(one_line(team.task), []).append(team.name)
+    yield from (f"{INDENT}Team {', '.join(names)}, now: {words}" for words, names in now.items())
+
+
+@section("answer")
+def answer(page: Page) -> Iterator[str]:
+    """The limit, one piece of advice, and the signal to begin."""
+    limit = page.task.max_actions
+    talks = bool(page.correspondents or page.channels)
+    parts = '"Analysis:", "Actions:" and "Communications:"' if talks else '"Analysis:" and "Actions:"'
+    yield "Answer"
+    actions = f"{limit} action{'s' if limit > 1 else ''}"
+    fights = any(team.minimap is not None for team in page.teams) and page.sight.agent.kind == "combat_group"
+    yield f"{INDENT}At most {actions} per team" + ("; use abilities before moving or attacking." if fights else ".")
+    yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'
+    yield f"{INDENT}Now answer in the parts {parts}."
