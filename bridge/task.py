@@ -151,7 +151,8 @@ class AgentConfig(Frozen):
     """Agents that it may write to; None for all."""
     admits: Admission = "combat"
     """Which units it takes of those that its teams list; see `bridge.observe.teams`."""
-    teams: Annotated[tuple[TeamConfig, ...], AfterValidator(_some)]
+    teams: tuple[TeamConfig, ...] = ()
+    """One or more; a commander may have none, and only talk."""
     actions: dict[UnitTypeName, tuple[ActionName, ...]] = Field(default_factory=dict)
     """Names of text actions by unit type, in the order in which they are shown; `group:<name>` stands for those of a
     group that the type has."""
@@ -172,6 +173,8 @@ class AgentConfig(Frozen):
     @model_validator(mode="after")
     def _every_type_has_actions(self) -> Self:
         _once((team.name for team in self.teams), "team")
+        if not self.teams and self.kind != "commander":
+            raise ValueError(f"agent {self.name} needs a team; only a commander may have none")
         for team in self.teams:
             if missing := [name for name in team.unit_types if name not in self.actions]:
                 raise ValueError(f"team {team.name} has units of type {missing[0]}, for which no actions are listed")
