@@ -46,6 +46,8 @@ class GameConfig(Frozen):
     screen_px: int = 128
     """Resolution of the feature layers of the screen, which shows 24 world units."""
     minimap_px: int = 64
+    render_px: int | None = None
+    """Resolution of the real pictures of the screen and the minimap, for a game that can draw; None for none."""
     limit_loops: int | None = None
     """Game loops after which an episode ends without a result; None leaves it to the map."""
     abilities: bool = True

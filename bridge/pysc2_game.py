@@ -219,8 +219,11 @@ def _map_data(config: GameConfig) -> bytes:
 
 
 def _start(config: GameConfig) -> Any:
+    pictures = config.render_px and sc2_env.Dimensions(screen=config.render_px, minimap=config.render_px)
     interface = sc2_env.AgentInterfaceFormat(
         feature_dimensions=sc2_env.Dimensions(screen=config.screen_px, minimap=config.minimap_px),
+        rgb_dimensions=pictures or None,
+        action_space=sc2_env.ActionSpace.FEATURES,
         camera_width_world_units=config.camera_width,
         use_feature_units=True,
         use_raw_units=True,

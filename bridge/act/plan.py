@@ -66,22 +66,24 @@ class Executor(Protocol):
         """A plan that carries the commands out and lets `loops` game loops pass, or more if it needs them."""
 
 
-def refuse(command: Command, why: str) -> Refusal:
-    """The game said no to a command; `why` is the end of a sentence."""
+def refuse(command: Command, why: str) -> Refusal | None:
+    """The game said no to a command; `why` is the end of a sentence. None if it was the host's own command."""
     said = command.said
+    if said is None:
+        return None
     message = f"The game refused {said.action.name}: {why}."
     return Refusal(said.team.team.agent, reject(said.call, Refused("refused_by_game", message), said.team.view.name))
 
 
 def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[Refusal, ...]:
     """The refusals among the errors that the game reported; one for each command at most."""
-    found: dict[int, Refusal] = {}
+    found: dict[int, Refusal | None] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
         same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]
         for index in (same or suspects)[-1:]:
             found.setdefault(index, refuse(commands[index], words(error.result)))
-    return tuple(found[index] for index in sorted(found))
+    return tuple(refusal for _, refusal in sorted(found.items()) if refusal is not None)
 
 
 def _order(command: Command) -> str:

@@ -3,13 +3,18 @@
 For each team that has commands: move the camera to its head, select who is meant, call the function. It costs a game
 loop and an `SC2Env.step` for each of these; what a picture of the real screen shows, and what can be compared with
 the paper's runs, is bought with that. Positions are taken from the snapshot of the moment, since units move on
-while others are being told.
+while others are being told. Who is selected is read back from the game; what the hand did not get right is clicked
+again, and a command whose units cannot be selected is refused, never given to others.
 
-| team | selected by |
+| who is meant | how they are selected |
 |---|---|
-| kind `select`, or some units of a team | `select_point` on the first, `toggle` on the others |
-| kind `select_all_type` | `select_point` with `select_all_type` on the head |
-| kind `group` with a control group | recall; the group is set when its units are not in it yet |
+| a whole team of kind `group` with a control group | recall; the group is set when its units are not in it yet |
+| WarpGates that warp in | `select_warp_gates`: the game takes one that is ready |
+| Larvae that hatch | a click on their hatchery, `select_larva`: the game takes one of them |
+| the only idle worker; the whole army | `select_idle_worker`; `select_army` |
+| anybody else | `select_point`: all of a type on the screen at once if all of them are meant, else one by one |
+
+The camera goes to a target that is not on the screen, and back to the team if the team's screen shows it.
 """
 
 from __future__ import annotations
@@ -17,25 +22,26 @@ from __future__ import annotations
 import contextlib
 import math
 from itertools import groupby
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bridge.act.aim import RealScreen
 from bridge.act.plan import Plan, Played, Refusal, Step, refuse, refused_by_game, written
+from bridge.act.select import Hand, Missed
 from bridge.compat import actions as pysc2
-from bridge.frames import CAMERA_WIDTH, MapFrame, WorldPoint
-from protocol.messages import Frames
+from bridge.frames import WorldPoint
+from bridge.functions import raw_forms
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
+    from bridge.act.aim import Pixel
     from bridge.act.plan import GameAction
     from bridge.act.translate import Command
-    from bridge.observe.teams import Team
     from bridge.snapshot import Snapshot
 
-Pixel: TypeAlias = tuple[int, int]
 SAME_PLACE = 0.25
 """World units within which the camera is where it should be; it snaps to a grid in the game."""
 
@@ -54,7 +60,7 @@ class ScreenExecutor:
         """One step for each move of the camera, selection and function, then what is left of `loops`."""
         tour = _Tour(snapshot, self._groups)
         places = {_team(command): place for place, command in reversed(list(enumerate(commands)))}
-        in_order = sorted(commands, key=lambda command: places[_team(command)])
+        in_order = sorted(commands, key=lambda command: (command.said is None, places[_team(command)]))
         with contextlib.suppress(_EpisodeOver):
             for _, of_team in groupby(in_order, key=_team):
                 yield from tour.visit(list(of_team))
@@ -64,6 +70,9 @@ class ScreenExecutor:
 
 
 def _team(command: Command) -> tuple[str, str]:
+    """Whose command it is; the host's own are a group of their own, and come last."""
+    if command.said is None:
+        return "", ""
     team = command.said.team.team
     return team.agent, team.name
 
@@ -80,114 +89,99 @@ class _Tour:
         self.loops = 0
         self.functions: list[str] = []
         self.refusals: list[Refusal] = []
-        self._groups = groups
+        self._hand = Hand(self, groups)
         self._wanted: WorldPoint | None = None
 
     def step(self, action: GameAction | None, loops: int = 1) -> Generator[Step, Snapshot, None]:
+        """Lets something enter the game, and loops pass."""
         self.now = yield Step(() if action is None else (action,), loops)
         self.loops += loops
         if self.now.ended:
             raise _EpisodeOver
 
-    def visit(self, commands: Sequence[Command]) -> Generator[Step, Snapshot, None]:
-        """Carries out the commands of one team."""
-        camera = commands[0].said.team.camera
-        selected: frozenset[int] = frozenset()
-        yield from self._look_at(WorldPoint(camera.x, camera.y))
-        for command in commands:
-            alive = [tag for tag in command.units if tag in self.now.units]
-            if not alive:
-                self.refusals.append(refuse(command, "its units are gone"))
-                continue
-            if selected & self.now.units.keys() != set(alive):
-                yield from self._select(command.said.team.team, alive)
-                yield from self._look_at(WorldPoint(camera.x, camera.y))
-                selected = frozenset(alive)
-            yield from self._call(command)
-
-    # --- the hands --------------------------------------------------------------------------------------------
-
-    def _look_at(self, world: WorldPoint) -> Generator[Step, Snapshot, None]:
-        if self._wanted is not None and math.dist(world, self._wanted) < SAME_PLACE:
+    def look_at(self, place: WorldPoint) -> Generator[Step, Snapshot, None]:
+        """Moves the camera, unless it is there or was sent there last."""
+        if self._wanted is not None and math.dist(place, self._wanted) < SAME_PLACE:
             return
-        self._wanted = world
+        self._wanted = place
         action = sc_pb.Action()
-        action.action_raw.camera_move.center_world_space.CopyFrom(common_pb2.Point(x=world.x, y=world.y, z=0))
-        self.functions.append(written("camera_move", f"[{world.x:.1f}, {world.y:.1f}]"))
+        action.action_raw.camera_move.center_world_space.CopyFrom(common_pb2.Point(x=place.x, y=place.y, z=0))
+        self.functions.append(written("camera_move", f"[{place.x:.1f}, {place.y:.1f}]"))
         yield from self.step(action)
 
-    def _select(self, team: Team, alive: Sequence[int]) -> Generator[Step, Snapshot, None]:
-        whole = set(alive) == {tag for tag in team.tags if tag in self.now.units}
-        group = team.control_group
-        if whole and team.kind == "select_all_type":
-            yield from self._click(alive[0], "select_all_type")
-        elif whole and team.kind == "group" and group is not None:
-            if not set(alive) <= self._groups.get(group, frozenset()):
-                yield from self._click_all(alive)
-                yield from self._function("select_control_group", "set", group)
-                self._groups[group] = frozenset(
-                    t for t in alive if t in self.now.units and self.now.units[t].is_selected
-                )
-            else:
-                yield from self._function("select_control_group", "recall", group)
-        else:
-            yield from self._click_all(alive)
-
-    def _click_all(self, tags: Sequence[int]) -> Generator[Step, Snapshot, None]:
-        for place, tag in enumerate(tags):
-            yield from self._click(tag, "toggle" if place else "select")
-
-    def _click(self, tag: int, how: str) -> Generator[Step, Snapshot, None]:
-        unit = self.now.units.get(tag)
-        if unit is not None and self._pixel(unit.pos.x, unit.pos.y) is None:
-            yield from self._look_at(WorldPoint(unit.pos.x, unit.pos.y))
-            unit = self.now.units.get(tag)
-        pixel = None if unit is None else self._pixel(unit.pos.x, unit.pos.y)
-        if pixel is not None:
-            yield from self._function("select_point", how, pixel)
-
-    def _call(self, command: Command) -> Generator[Step, Snapshot, None]:
-        function = pysc2.FUNCTIONS[command.function.id]
-        if function.id not in self.now.functions:
-            self.refusals.append(refuse(command, f"{function.name} is not available to what is selected"))
-            return
-        place = command.target
-        if isinstance(place, int):
-            unit = self.now.units.get(place)
-            if unit is None:
-                self.refusals.append(refuse(command, "the target is gone"))
-                return
-            place = WorldPoint(unit.pos.x, unit.pos.y)
-        arguments: list[object] = []
-        for argument in function.args:
-            if argument.name == "queued":
-                arguments.append("queued" if command.queued else "now")
-                continue
-            assert place is not None  # the catalogue gives functions with a target to actions with a target
-            pixel = self._minimap_pixel(place) if argument.name == "minimap" else self._pixel(place.x, place.y)
-            if pixel is None:
-                self.refusals.append(refuse(command, "the target is not on the screen"))
-                return
-            arguments.append(pixel)
-        yield from self._function(function.name, *arguments)
-
-    def _function(self, name: str, *arguments: object) -> Generator[Step, Snapshot, None]:
+    def function(self, name: str, *arguments: object) -> Generator[Step, Snapshot, None]:
+        """Calls a function of PySC2."""
         shown = [list(value) if isinstance(value, tuple) else value for value in arguments]
         self.functions.append(written(name, *shown))
         yield from self.step(pysc2.FUNCTIONS[name](*arguments))
 
-    # --- the eyes ---------------------------------------------------------------------------------------------
+    def visit(self, commands: Sequence[Command]) -> Generator[Step, Snapshot, None]:
+        """Carries out the commands of one team."""
+        home = _home(commands[0])
+        if home is not None:
+            yield from self.look_at(home)
+        for command in commands:
+            try:
+                yield from self._hand.select(command)
+                yield from self._call(command)
+            except Missed as missed:
+                self._missed(command, str(missed))
 
-    def _pixel(self, x: float, y: float) -> Pixel | None:
-        """Where a world position is on the real screen; None if it is not on it."""
-        size = self.now.info.options.feature_layer.resolution
-        camera = self.now.response.observation.raw_data.player.camera
-        px = math.floor((x - camera.x) * size.x / CAMERA_WIDTH + size.x / 2)
-        py = math.floor((camera.y - y) * size.y / CAMERA_WIDTH + size.y / 2)
-        return (px, py) if 0 <= px < size.x and 0 <= py < size.y else None
+    def _missed(self, command: Command, why: str) -> None:
+        if refusal := refuse(command, why):
+            self.refusals.append(refusal)
 
-    def _minimap_pixel(self, place: WorldPoint) -> Pixel:
-        size = self.now.info.options.feature_layer.minimap_resolution
-        world = MapFrame.of(self.now.info, Frames(minimap=float(size.x)))
-        x, y = world.minimap(place.x, place.y)
-        return min(math.floor(x), size.x - 1), min(math.floor(y), size.y - 1)
+    def _call(self, command: Command) -> Generator[Step, Snapshot, None]:
+        function = command.function
+        if function.id not in self.now.functions:
+            raise Missed(f"{function.name} is not available to what is selected")
+        arguments: list[object] = []
+        for argument in function.args:
+            match argument:
+                case "queued":
+                    arguments.append("queued" if command.queued else "now")
+                case "minimap":
+                    arguments.append(RealScreen(self.now).minimap(self._place(command)))
+                case _:
+                    arguments.append((yield from self._pixel(command)))
+        yield from self.function(function.name, *arguments)
+
+    # --- the target -------------------------------------------------------------------------------------------
+
+    def _place(self, command: Command) -> WorldPoint:
+        """Where the target is now."""
+        assert command.target is not None  # the catalogue gives functions with a target to actions with a target
+        if not isinstance(command.target, int):
+            return command.target
+        unit = self.now.units.get(command.target)
+        if unit is None:
+            raise Missed("the target is gone")
+        return WorldPoint(unit.pos.x, unit.pos.y)
+
+    def _pixel(self, command: Command) -> Generator[Step, Snapshot, Pixel]:
+        """Where to click for the target, with the camera moved if that is needed."""
+        for place in (None, _home(command), self._place(command)):
+            if place is not None:
+                yield from self.look_at(place)
+            if RealScreen(self.now).pixel(self._place(command)) is not None:
+                return self._hit(command)
+        raise Missed("the target is beyond the reach of the camera")
+
+    def _hit(self, command: Command) -> Pixel:
+        screen, place = RealScreen(self.now), self._place(command)
+        if isinstance(command.target, int):
+            pixel = screen.hit(self.now.units[command.target])
+        elif "unit" in raw_forms(command.function.ability_id):
+            pixel = screen.bare(place)  # a click on somebody would mean him and not the place
+        else:
+            pixel = screen.pixel(place)
+        if pixel is None:
+            raise Missed("the target cannot be clicked, something stands over it")
+        return pixel
+
+
+def _home(command: Command) -> WorldPoint | None:
+    """Where a team's camera is; None for one without a screen of its own."""
+    if command.said is None or command.said.team.camera is None:
+        return None
+    return WorldPoint(command.said.team.camera.x, command.said.team.camera.y)

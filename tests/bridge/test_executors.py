@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from s2clientprotocol import error_pb2
+from s2clientprotocol import common_pb2, error_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act import Actor, JointAction, executor_of
 from bridge.act.raw import RawExecutor
 from bridge.act.screen import ScreenExecutor
 from bridge.compat import actions as pysc2
+from bridge.frames import WorldPoint
+from bridge.functions import functions
 from bridge.observe import Observer
 from protocol.speech import parse
 
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.act import Executor, Played, Step
+    from bridge.act import Command, Executor, Played, Step
     from bridge.snapshot import Snapshot
     from bridge.task import TaskConfig
 
@@ -36,34 +40,44 @@ Team Stalker-1:
 
 
 class Table:
-    """A game of one team on a table: it shows where the camera is and who is selected, and nothing moves."""
+    """A game on a table: it shows where the camera is and who is selected, and nothing moves."""
 
     def __init__(self, unit: Make, snapshot: Snap, **fields: Any) -> None:
         self._unit, self._snapshot, self._fields = unit, snapshot, fields
         self.camera = (16.0, 16.0)
         self.places = {S1: (10.0, 10.0), S2: (12.0, 11.0), FOE: (15.0, 10.0)}
+        self.types: dict[int, str] = {}
+        self.traits: dict[int, dict[str, Any]] = {FOE: {"alliance": "enemy"}}
         self.selected: set[int] = set()
+        self.groups: dict[int, set[int]] = {}
         self.steps: list[Step] = []
+
+    def put(self, tag: int, kind: str, x: float, y: float, **traits: Any) -> int:
+        """One more unit."""
+        self.places[tag], self.types[tag], self.traits[tag] = (x, y), kind, traits
+        return tag
 
     def now(self) -> Snapshot:
         units = [
             self._unit(
                 tag,
-                "Stalker",
+                self.types.get(tag, "Stalker"),
                 *place,
-                alliance="enemy" if tag == FOE else "own",
                 is_selected=tag in self.selected,
+                **self.traits.get(tag, {}),
             )
             for tag, place in self.places.items()
         ]
         return self._snapshot(units, camera=self.camera, **{"functions": ALL} | self._fields)
 
-    def play(self, executor: Executor, joint: JointAction, loops: int = 8) -> Played:
-        plan = executor.plan(joint.commands, self.now(), loops)
+    def play(self, executor: Executor, joint: JointAction | Sequence[Command], loops: int = 8) -> Played:
+        commands = joint.commands if isinstance(joint, JointAction) else joint
+        plan = executor.plan(commands, self.now(), loops)
         step = next(plan)
         while True:
             self.steps.append(step)
-            self._carry_out(step)
+            for action in step.actions:
+                self._carry_out(action)
             try:
                 step = plan.send(self.now())
             except StopIteration as done:
@@ -75,19 +89,54 @@ class Table:
         calls = [action for step in self.steps for action in step.actions if not isinstance(action, sc_pb.Action)]
         return [(pysc2.FUNCTIONS[call.function].name, [list(map(int, a)) for a in call.arguments]) for call in calls]
 
-    def _carry_out(self, step: Step) -> None:
-        for action in step.actions:
-            if isinstance(action, sc_pb.Action):
-                centre = action.action_raw.camera_move.center_world_space
-                self.camera = (centre.x, centre.y)
-            elif pysc2.FUNCTIONS[action.function].name == "select_point":
-                self._click(*map(int, action.arguments[1]), add=int(action.arguments[0][0]) == 1)
+    def moves(self) -> list[tuple[float, float]]:
+        """Where the camera was sent."""
+        sent = [action for step in self.steps for action in step.actions if isinstance(action, sc_pb.Action)]
+        centres = [action.action_raw.camera_move.center_world_space for action in sent]
+        return [(centre.x, centre.y) for centre in centres]
 
-    def _click(self, px: int, py: int, *, add: bool) -> None:
+    def _carry_out(self, action: Any) -> None:
+        if isinstance(action, sc_pb.Action):
+            centre = action.action_raw.camera_move.center_world_space
+            self.camera = (centre.x, centre.y)
+            return
+        arguments = [list(map(int, a)) for a in action.arguments]
+        match pysc2.FUNCTIONS[action.function].name:
+            case "select_point":
+                self._click(arguments[0][0], *arguments[1])
+            case "select_control_group":
+                (how,), (group,) = arguments
+                if how:
+                    self.groups[group] = set(self.selected)
+                self.selected = set(self.groups.get(group, ()))
+            case "select_warp_gates":
+                self.selected = self._own("WarpGate")
+            case "select_larva":
+                self.selected = self._own("Larva")
+            case "select_idle_worker":
+                self.selected = {min(self._own("Probe"))}
+            case "select_army":
+                self.selected = self._own("Stalker")
+
+    def _own(self, kind: str) -> set[int]:
+        mine = {t for t in self.places if self.traits.get(t, {}).get("alliance", "own") == "own"}
+        return {tag for tag in mine if self.types.get(tag, "Stalker") == kind}
+
+    def _click(self, how: int, px: int, py: int) -> None:
+        """Hits the unit that was put on the table last, of those under the pixel."""
         x = (px + 0.5 - 64) * 24 / 128 + self.camera[0]
         y = self.camera[1] - (py + 0.5 - 64) * 24 / 128
-        hit = {t for t, place in self.places.items() if abs(place[0] - x) < 0.3 and abs(place[1] - y) < 0.3}
-        self.selected = self.selected | hit if add else hit
+        reach = {tag: self.traits.get(tag, {}).get("radius", 0.0) + 0.14 for tag in self.places}
+        under = [tag for tag, place in self.places.items() if math.dist(place, (x, y)) <= reach[tag]]
+        hit = set(under[-1:])
+        for top in hit.copy():
+            same = self._own(self.types.get(top, "Stalker"))
+            if how in {2, 3} and top in same:
+                hit = {tag for tag in same if self._on_screen(tag)}
+        self.selected = hit if how in {0, 2} else self.selected | hit if how == 3 else self.selected ^ hit
+
+    def _on_screen(self, tag: int) -> bool:
+        return max(abs(self.places[tag][0] - self.camera[0]), abs(self.places[tag][1] - self.camera[1])) < 12
 
 
 @pytest.fixture
@@ -174,27 +223,32 @@ def test_an_error_of_the_game_becomes_a_rejection_of_the_call(table: Any, joint:
 
 # --- screen -------------------------------------------------------------------------------------------------------
 
+BOTH = ("select_point", [[2], [64, 64]])
 CLICKS = [("select_point", [[0], [64, 64]]), ("select_point", [[1], [74, 58]])]
 ATTACK, MOVE = ("Attack_screen", [[0], [90, 64]]), ("Move_screen", [[1], [69, 64]])
 ONE = ("select_point", [[0], [74, 58]])
+SET = ("select_control_group", [[1], [4]])
+STRANGER = 0x100300001
+"""A Stalker of nobody's team: it is still being built."""
 
 
+@pytest.mark.parametrize("kind", ["group", "select_all_type"])
 @pytest.mark.parametrize(
-    ("team", "functions"),
+    ("stranger", "group", "functions"),
     [
-        (
-            {"kind": "group", "control_group": 4},
-            [*CLICKS, ("select_control_group", [[1], [4]]), ATTACK, ONE, MOVE],
-        ),
-        ({"kind": "group", "control_group": None}, [*CLICKS, ATTACK, ONE, MOVE]),
-        ({"kind": "select_all_type"}, [("select_point", [[2], [64, 64]]), ATTACK, ONE, MOVE]),
+        (False, 4, [BOTH, SET, ATTACK, ONE, MOVE]),
+        (False, None, [BOTH, ATTACK, ONE, MOVE]),
+        (True, 4, [*CLICKS, SET, ATTACK, ONE, MOVE]),
+        (True, None, [*CLICKS, ATTACK, ONE, MOVE]),
     ],
 )
-def test_the_screen_executor_selects_a_team_by_its_kind(
-    team: dict[str, Any], functions: Sequence[Any], table: Any, joint: Any
+def test_the_screen_executor_selects_a_team_and_nobody_else(
+    kind: str, stranger: bool, group: int | None, functions: Sequence[Any], table: Any, joint: Any
 ) -> None:
     game = table()
-    played = game.play(ScreenExecutor(), joint(game, **team), loops=30)
+    if stranger:
+        game.put(STRANGER, "Stalker", 14, 14, build_progress=0.5)
+    played = game.play(ScreenExecutor(), joint(game, kind=kind, control_group=group), loops=30)
     assert game.functions() == list(functions)
     assert game.camera == (10, 10)
     assert [step.loops for step in game.steps] == [1] * (len(functions) + 1) + [30 - len(functions) - 1]
@@ -202,18 +256,27 @@ def test_the_screen_executor_selects_a_team_by_its_kind(
     assert played.refusals == ()
 
 
+def test_who_is_selected_already_is_not_selected_again(table: Any, joint: Any) -> None:
+    game = table()
+    game.selected = {S1, S2}
+    game.play(ScreenExecutor(), joint(game, "<Stop()>", control_group=None))
+    assert [name for name, _ in game.functions()] == ["Stop_quick"]
+
+
 def test_a_control_group_is_recalled_once_it_is_set_and_set_again_when_a_unit_joins(table: Any, joint: Any) -> None:
     executor, stop = ScreenExecutor(), "Actions:\n<Stop()>"
     tours = []
+    groups: dict[int, set[int]] = {}
     for places in ((S1,), (S1,), (S1, S2)):
         game = table()
+        game.groups = groups
         game.places = {tag: place for tag, place in game.places.items() if tag in (*places, FOE)}
         game.play(executor, joint(game, stop, control_group=4))
         tours.append([name for name, _ in game.functions()])
     assert tours == [
         ["select_point", "select_control_group", "Stop_quick"],
         ["select_control_group", "Stop_quick"],
-        ["select_point", "select_point", "select_control_group", "Stop_quick"],
+        ["select_point", "select_control_group", "Stop_quick"],
     ]
 
 
@@ -223,27 +286,124 @@ def test_a_new_episode_begins_with_empty_control_groups(table: Any, joint: Any) 
         executor.begin()
         game = table()
         game.play(executor, joint(game, "<Stop()>", control_group=4))
-        assert game.functions()[-2] == ("select_control_group", [[1], [4]])
+        assert game.functions()[-2] == SET
 
 
-def test_the_camera_goes_to_a_unit_that_is_off_the_screen_and_comes_back(table: Any, joint: Any) -> None:
+def test_the_camera_goes_to_a_unit_that_is_off_the_screen(table: Any, joint: Any) -> None:
     game = table()
     game.places[S2] = (30.0, 11.0)
     game.play(ScreenExecutor(), joint(game, "<Stop()>", control_group=None))
-    moves = [
-        a.action_raw.camera_move.center_world_space
-        for s in game.steps
-        for a in s.actions
-        if isinstance(a, sc_pb.Action)
-    ]
-    assert [(move.x, move.y) for move in moves] == [(10, 10), (30, 11), (10, 10)]
+    assert game.moves() == [(10, 10), (30, 11)]
     assert game.selected == {S1, S2}
+
+
+def test_the_camera_comes_back_to_the_team_for_a_target_on_its_screen(table: Any, joint: Any) -> None:
+    game = table()
+    game.places[S2] = (30.0, 11.0)
+    game.play(ScreenExecutor(), joint(game, "<Select_Unit_Move_Screen(0x100080001, [4, 5])>", control_group=None))
+    assert game.moves() == [(10, 10), (30, 11), (10, 10)]
+    assert game.functions()[-1] == ("Move_screen", [[0], [21, 26]])
+
+
+def test_the_camera_goes_to_a_target_that_is_far_away(table: Any, joint: Any) -> None:
+    game = table()
+    (stop,) = joint(game, "<Stop()>", control_group=None).commands
+    far = replace(stop, function=functions()["Attack_screen"], target=WorldPoint(28.0, 28.0))
+    game.play(ScreenExecutor(), [far])
+    assert game.moves() == [(10, 10), (28, 28)]
+    assert game.functions()[-1] == ("Attack_screen", [[0], [64, 64]])
 
 
 def test_a_point_of_the_minimap_is_clicked_on_the_minimap(table: Any, joint: Any) -> None:
     game = table()
     game.play(ScreenExecutor(), joint(game, "<Move_Minimap([40.9, 12.2])>", control_group=None))
     assert game.functions()[-1] == ("Move_minimap", [[0], [40, 12]])
+
+
+@pytest.mark.parametrize(
+    ("kind", "function", "units", "way"),
+    [
+        ("WarpGate", "TrainWarp_Zealot_screen", 1, ["select_warp_gates", "TrainWarp_Zealot_screen"]),
+        ("WarpGate", "Rally_Building_screen", 1, ["select_point", "Rally_Building_screen"]),
+        ("Larva", "Train_Drone_quick", 1, ["select_point", "select_larva", "Train_Drone_quick"]),
+        ("Larva", "Stop_quick", 1, ["select_point", "Stop_quick"]),
+        ("Probe", "Build_Pylon_screen", 1, ["select_idle_worker", "Build_Pylon_screen"]),
+        ("Probe", "Stop_quick", 2, ["select_point", "Stop_quick"]),
+        ("Stalker", "Stop_quick", 7, ["select_army", "Stop_quick"]),
+    ],
+)
+def test_the_hand_takes_the_short_way_where_there_is_one(
+    kind: str, function: str, units: int, way: list[str], table: Any, joint: Any
+) -> None:
+    game = table(player={"idle_worker_count": 1, "army_count": 9})
+    (stop,) = joint(game, "<Stop()>", control_group=None).commands
+    tags = [game.put(0x200000001 + (i << 18), kind, 6 + 2 * i, 15) for i in range(max(2, units))]
+    game.put(0x300000001, "Hatchery", 8, 12)
+    if kind == "Stalker":
+        tags += [S1, S2]
+    chosen = tuple(tags) if kind == "Stalker" else tuple(tags[:units])
+    target = None if function.endswith("quick") else WorldPoint(12.0, 7.0)
+    played = game.play(ScreenExecutor(), [replace(stop, function=functions()[function], units=chosen, target=target)])
+    assert [name for name, _ in game.functions()] == way
+    assert played.refusals == ()
+
+
+def test_a_target_is_clicked_where_nobody_stands_over_it(table: Any, joint: Any) -> None:
+    game = table()
+    game.traits[FOE]["radius"] = 0.6
+    wanted = joint(game, "<Attack_Unit(0x100180001)>", control_group=None)
+    game.put(0x100500001, "Overlord", 15.3, 10.0, radius=0.5)
+    game.play(ScreenExecutor(), wanted)
+    name, (_, (px, py)) = game.functions()[-1]
+    x, y = (px + 0.5 - 64) * 24 / 128 + 10, 10 - (py + 0.5 - 64) * 24 / 128
+    assert name == "Attack_screen"
+    assert math.dist((x, y), (15.0, 10.0)) < 0.6
+    assert math.dist((x, y), (15.3, 10.0)) > 0.5
+
+
+def test_an_order_to_a_place_is_clicked_on_the_ground_beside_who_stands_there(table: Any, joint: Any) -> None:
+    game = table()
+    game.put(0x100500001, "Zealot", 13.0, 8.0, radius=0.5)
+    wanted = joint(game, "<Move_Screen([15, 14])>", control_group=None)
+    game.play(ScreenExecutor(), wanted)
+    _, (_, (px, py)) = game.functions()[-1]
+    x, y = (px + 0.5 - 64) * 24 / 128 + 10, 10 - (py + 0.5 - 64) * 24 / 128
+    assert 0.5 < math.dist((x, y), (13.0, 8.0)) < 1.0
+
+
+@pytest.mark.parametrize(("seen", "clicked"), [("Stalker", True), ("Overlord", False)])
+def test_what_covers_a_target_is_seen_on_the_feature_layers(seen: str, clicked: bool, table: Any, joint: Any) -> None:
+    game = table()
+    wanted = joint(game, "<Attack_Unit(0x100180001)>", control_group=None)
+    game.put(0x100500001, "Overlord", 15.0, 10.0, radius=1.0)
+    kind, owner = (74, 4) if seen == "Stalker" else (106, 1)
+    plan = ScreenExecutor().plan(wanted.commands, _with_layers(game.now(), kind, owner), 8)
+    step = next(plan)
+    called: list[str] = []
+    played = None
+    while played is None:
+        for action in step.actions:
+            game._carry_out(action)
+            called += [] if isinstance(action, sc_pb.Action) else [pysc2.FUNCTIONS[action.function].name]
+        try:
+            step = plan.send(_with_layers(game.now(), kind, owner))
+        except StopIteration as done:
+            played = done.value
+    assert ("Attack_screen" in called) == clicked
+    said = [refusal.rejection.message for refusal in played.refusals]
+    covered = "The game refused Attack_Unit: the target cannot be clicked, something stands over it."
+    assert said == ([] if clicked else [covered])
+
+
+def _with_layers(now: Snapshot, unit_type: int, owner: int) -> Snapshot:
+    """Feature layers that show this type of unit everywhere."""
+    renders = now.response.observation.feature_layer_data.renders
+    size = common_pb2.Size2DI(x=128, y=128)
+    renders.unit_type.CopyFrom(
+        common_pb2.ImageData(bits_per_pixel=32, size=size, data=unit_type.to_bytes(4, "little") * 128 * 128)
+    )
+    renders.player_relative.CopyFrom(common_pb2.ImageData(bits_per_pixel=8, size=size, data=bytes([owner]) * 128 * 128))
+    return now
 
 
 def test_a_tour_ends_where_the_episode_ends_and_says_what_it_played(table: Any, joint: Any) -> None:
@@ -266,17 +426,19 @@ def test_a_tour_takes_as_long_as_it_needs(table: Any, joint: Any) -> None:
     [
         ({}, {"functions": frozenset()}, "Attack_screen is not available to what is selected"),
         ({FOE: None}, {}, "the target is gone"),
-        ({FOE: (31.0, 10.0)}, {}, "the target is not on the screen"),
         ({S1: None, S2: None}, {}, "its units are gone"),
+        ({S1: (15.0, 10.0), S2: (15.0, 10.0)}, {}, "its units could not be selected, something stands over them"),
     ],
 )
 def test_a_command_that_has_become_impossible_is_refused(
     change: dict[int, tuple[float, float] | None], fields: dict[str, Any], message: str, table: Any, joint: Any
 ) -> None:
     game = table(**fields)
-    wanted = joint(game, "<Attack_Unit(0x100180001)>")
+    wanted = joint(game, "<Attack_Unit(0x100180001)>", control_group=None)
     places = game.places | change
     game.places = {tag: place for tag, place in places.items() if place is not None}
+    if (15.0, 10.0) in change.values():
+        game.places[FOE] = game.places.pop(FOE)  # on top
     played = game.play(ScreenExecutor(), wanted)
     assert [r.rejection.message for r in played.refusals] == [f"The game refused Attack_Unit: {message}."]
     assert "Attack_screen" not in [name for name, _ in game.functions()]
