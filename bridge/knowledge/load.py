@@ -1,26 +1,27 @@
-"""What is known of the game, read once: the facts of a version, merged with the words about them.
+"""What is known of the game: the facts of a version, merged with the words about them, read once when asked for.
 
-Facts are generated (`khala knowledge write`) into `bridge/data/knowledge/<version>/*.json`, words are written by hand
-in `bridge/data/knowledge/words/*.yaml`. Nothing is read before it is asked for.
+Words are written by hand in `bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above: everything
+that speaks of the game. Below: `facts`, which reads what was generated, and `words`, which fills in.
 """
 
 from __future__ import annotations
 
 import functools
-import json
-from typing import Any, Final, TypeVar
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Final
 
-from pydantic import TypeAdapter
+from pydantic import Field
 
 from bridge import data
-from bridge.knowledge.model import AbilityFacts, UnitType, UpgradeFacts
+from bridge.knowledge.facts import VERSION, ability_facts, buff_facts, unit_facts, upgrade_facts
+from bridge.knowledge.words import Filler
 from protocol.messages import Frozen
 
-M = TypeVar("M", bound=Frozen)
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
-VERSION: Final = "4.10"
-"""Version whose facts are told: the one that PySC2's ids belong to."""
-VERSIONS: Final = (VERSION, "5.0.13")
+    from bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts
+
 RACES: Final = ("protoss", "terran", "zerg")
 
 
@@ -39,6 +40,11 @@ def upgrades(version: str = VERSION) -> dict[str, UpgradeFacts]:
     return _upgrades(version)
 
 
+def buffs(version: str = VERSION) -> dict[str, BuffFacts]:
+    """Every buff that changes anything or that observations tell of, by name, in alphabetical order."""
+    return buff_facts(version)
+
+
 def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFacts | None:
     """What an ability, special or general, is for units of one type; None if they do not have it.
 
@@ -47,58 +53,126 @@ def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFa
     facts = abilities(version).get(number)
     if facts is None:
         return None
-    found = (abilities(version)[special] for special in facts.special)
-    return next((case for case in (*found, facts) if not case.special and unit_type in case.users), None)
+    cases = [abilities(version)[special] for special in facts.special] or [facts]
+    return next((case for case in cases if unit_type in case.users), None)
 
 
 @functools.cache
 def stand_ins(name: str, version: str = VERSION) -> frozenset[str]:
     """Types with which a requirement of this structure is met: itself, and what counts as it (a Hive as a Lair)."""
-    return frozenset({name, *(kind.name for kind in knowledge(version).values() if name in kind.counts_as)})
+    return frozenset({name, *(kind.name for kind in unit_facts(version).values() if name in kind.counts_as)})
 
 
 def is_armed(unit_type: str) -> bool:
     """Whether a type has a weapon; a type that is not known is taken to have one."""
-    known = knowledge().get(unit_type)
+    known = unit_facts(VERSION).get(unit_type)
     return known is None or bool(known.weapons)
+
+
+# --- words ----------------------------------------------------------------------------------------------------
+
+
+class UnitWords(Frozen):
+    """What is written about one unit type, or about several that are alike."""
+
+    types: tuple[str, ...] = ()
+    """Types that it is written about; () for the one that it stands under."""
+    about: str
+    uses: str = ""
+    beats: tuple[str, ...] = ()
+    """Types that it counters; the other direction follows."""
+    traits: dict[str, str] = Field(default_factory=dict)
+    """What it can do without being told, a title and a sentence each."""
+
+
+class AbilityWords(Frozen):
+    """What is written about one ability."""
+
+    title: str = ""
+    """Short name under which a unit's own abilities list it; '' for what is no ability in the eyes of a player."""
+    about: str
+
+
+@functools.cache
+def unit_words() -> dict[str, UnitWords]:
+    """What is written about unit types, by name."""
+    files = [f"knowledge/words/{race}.yaml" for race in (*RACES, "neutral")]
+    entries = [entry for file in files for entry in data.table(file, UnitWords).items()]
+    return {name: words for heading, words in entries for name in words.types or (heading,)}
+
+
+@functools.cache
+def ability_words() -> dict[str, AbilityWords]:
+    """What is written about abilities: by name, or by kind in angle brackets."""
+    return data.table("knowledge/words/abilities.yaml", AbilityWords)
+
+
+@functools.cache
+def upgrade_words() -> dict[str, str]:
+    """What is written about upgrades, by name; a star stands for any end of it."""
+    written: dict[str, str] = data.document("knowledge/words/upgrades.yaml")
+    return written
+
+
+def words_of(ability: AbilityFacts) -> AbilityWords | None:
+    """What is written about an ability under its name, or else about its kind."""
+    return ability_words().get(ability.name) or ability_words().get(f"<{ability.does}>")
+
+
+# --- both -----------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _filler(version: str) -> Filler:
+    return Filler(unit_facts(version), ability_facts(version), buff_facts(version))
 
 
 @functools.cache
 def _units(version: str) -> dict[str, UnitType]:
-    words = {name: said for race in RACES for name, said in _words(race).items()}
-    return _records(UnitType, {n: _unit(n, raw, words.get(n, {})) for n, raw in _facts(version, "units").items()})
+    beaten_by: dict[str, list[str]] = {}
+    for name, words in unit_words().items():
+        for other in words.beats:
+            beaten_by.setdefault(other, []).append(name)
+    return {
+        name: _described(kind, tuple(beaten_by.get(name, ())), version) for name, kind in unit_facts(version).items()
+    }
 
 
-def _unit(name: str, raw: dict[str, Any], words: dict[str, Any]) -> dict[str, Any]:
-    return {"name": name, **raw, "ability_ids": raw.get("abilities", ()), "abilities": {}, **words}
+def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> UnitType:
+    words, filler = unit_words()[kind.name], _filler(version)
+    traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
+    told = {
+        "about": filler.fill(words.about, kind),
+        "uses": filler.fill(words.uses, kind),
+        "counters": words.beats,
+        "countered_by": beaten_by,
+        "abilities": {**traits, **dict(_titled(kind, version))},
+    }
+    return kind.model_copy(update=told)
+
+
+def _titled(kind: UnitType, version: str) -> Iterator[tuple[str, str]]:
+    """The abilities of a type that have a title, with what is said about them."""
+    for number in kind.ability_ids:
+        if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:
+            yield words.title, ability.about
 
 
 @functools.cache
 def _abilities(version: str) -> dict[int, AbilityFacts]:
-    facts = {number: _ability(int(number), raw) for number, raw in _facts(version, "abilities").items()}
-    return {int(number): record for number, record in _records(AbilityFacts, facts).items()}
+    return {number: _explained(ability, version) for number, ability in ability_facts(version).items()}
 
 
-def _ability(number: int, raw: dict[str, Any]) -> dict[str, Any]:
-    everywhere = raw.pop("everywhere", False)
-    return {"id": number, **raw, **({"range": None} if everywhere else {})}
+def _explained(ability: AbilityFacts, version: str) -> AbilityFacts:
+    words = words_of(ability) if ability.melee else None
+    return ability.model_copy(update={"about": _filler(version).fill(words.about, ability)}) if words else ability
 
 
 @functools.cache
 def _upgrades(version: str) -> dict[str, UpgradeFacts]:
-    return _records(UpgradeFacts, {name: {"name": name, **raw} for name, raw in _facts(version, "upgrades").items()})
+    return {name: _praised(upgrade, version) for name, upgrade in upgrade_facts(version).items()}
 
 
-def _records(model: type[M], raw: dict[str, Any]) -> dict[str, M]:
-    return TypeAdapter(dict[str, model]).validate_python(raw)  # type: ignore[valid-type]  # a type known at run time
-
-
-def _facts(version: str, kind: str) -> dict[str, dict[str, Any]]:
-    path = data.path("knowledge") / version / f"{kind}.json"
-    entries: dict[str, dict[str, Any]] = json.loads(path.read_bytes())["entries"]
-    return entries
-
-
-def _words(name: str) -> dict[str, dict[str, Any]]:
-    words: dict[str, dict[str, Any]] = data.document(f"knowledge/words/{name}.yaml")
-    return words
+def _praised(upgrade: UpgradeFacts, version: str) -> UpgradeFacts:
+    said = next((said for name, said in upgrade_words().items() if fnmatchcase(upgrade.name, name)), "")
+    return upgrade.model_copy(update={"about": _filler(version).fill(said, upgrade)})

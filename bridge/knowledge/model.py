@@ -200,3 +200,26 @@ class UpgradeFacts(Frozen):
     changes: dict[str, dict[str, float]] = Field(default_factory=dict)
     """By unit type, what is added: `speed`, `armor`, `health`, `range`, `damage`, `damage_against_light`, …;
     `attack_speed` is a share of what it was."""
+
+
+class BuffFacts(Frozen):
+    """What is known of one buff: what lies on a unit for a time, and what it changes there."""
+
+    name: str = ""
+    """As observations call it; where they do not tell of it, as the game's data does."""
+    id: int = 0
+    """0 for one that clients are not told of."""
+    duration_s: float = 0
+    """0 for one without an end of its own."""
+    speed: float = 1
+    attack_rate: float = 1
+    work_rate: float = 1
+    """Factors of what its bearer has; the last one is of training, research and the like."""
+    stops_work: bool = False
+    armor: float = 0
+    damage_taken: float = 0
+    """What is added to each hit, of the kinds that it is about."""
+    absorbs: float = 0
+    """Damage that it takes in all."""
+    flags: tuple[str, ...] = ()
+    """What its bearer is meanwhile: `stunned`, `disarmed`, `rooted`, `invulnerable`, `cloak`, …"""

@@ -142,10 +142,11 @@ def _filter(filters: Filter) -> dict[str, Any]:
 def _outcome(ability: Ability) -> dict[str, Any]:
     """What comes of it, and how long that takes."""
     research = ability.does == "research"
+    count = max(ability.count, len(ability.units), ability.numbers.get("count", 1))
     return {
         "produces": unit_name(ability.unit) if ability.unit else "",
         "researches": upgrade_name(ability.upgrade) if ability.upgrade else "",
-        "count": ability.count if ability.count != 1 else len(ability.units) if len(ability.units) > 1 else 0,
+        "count": count if count > 1 else 0,
         "time_s": seconds(ability.loops) if ability.loops and (research or ability.unit) else 0,
     }
 

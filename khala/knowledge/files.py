@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bridge import data
 from khala.knowledge.abilities import ability_facts
+from khala.knowledge.buffs import buff_facts
 from khala.knowledge.units import unit_facts
 from khala.knowledge.upgrades import upgrade_facts
 from simulator.catalog import load_catalog
@@ -25,7 +26,12 @@ def facts(version: str) -> dict[str, str]:
         CatalogError: the simulator has no tables of this version.
     """
     catalog = load_catalog(version)
-    made = {"units": unit_facts(catalog), "abilities": ability_facts(catalog), "upgrades": upgrade_facts(catalog)}
+    made = {
+        "units": unit_facts(catalog),
+        "abilities": ability_facts(catalog),
+        "upgrades": upgrade_facts(catalog),
+        "buffs": buff_facts(catalog),
+    }
     return {f"{kind}.json": _text(catalog.version, catalog.build, records) for kind, records in made.items()}
 
 

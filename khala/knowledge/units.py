@@ -56,7 +56,7 @@ def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
         "counts_as": [
             unit_name(catalog.unit(number).name) for number in unit.tech_alias if number in catalog.row_of_id
         ],
-        "abilities": [ability.id for ability in catalog.abilities_of(unit.row)],
+        "ability_ids": [ability.id for ability in catalog.abilities_of(unit.row)],
         "weapons": [sparse(weapon) for weapon in _weapons(unit, catalog)],
     }
 

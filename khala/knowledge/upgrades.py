@@ -95,11 +95,12 @@ def _field(unit: UnitType, change: Change) -> str:
 def _damage(unit: UnitType, changes: dict[tuple[str, str], float]) -> dict[str, float]:
     """What is added to the strongest hit: by plane, if the type has different weapons for the ground and the air.
 
-    Left out are hits of one's own units.
+    Left out are hits of one's own units, and weapons that clients are not told of where there are others.
     """
     own: dict[str, float] = {}
-    split = len({weapon.targets for weapon in unit.weapons}) > 1
-    for weapon in unit.weapons:
+    weapons = [weapon for weapon in unit.weapons if not (weapon.hidden or weapon.disabled)] or unit.weapons
+    split = len({weapon.targets for weapon in weapons}) > 1
+    for weapon in weapons:
         for hit in weapon.hits:
             for (effect, field), value in changes.items():
                 if effect != hit.effect or hit.when.startswith("Friendly"):

@@ -1,0 +1,32 @@
+"""Facts of buffs, out of the simulator's tables: what lies on a unit for a time, and what it changes there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from khala.knowledge.measures import plain, seconds, sparse
+
+if TYPE_CHECKING:
+    from simulator.buffs import Buff
+    from simulator.catalog import Catalog
+
+
+def buff_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
+    """One record for each buff that changes anything or that clients are told of, by the tables' name of it."""
+    found = {buff.name: sparse(_buff(buff)) for buff in sorted(catalog.buffs, key=lambda buff: buff.name)}
+    return {name: record for name, record in found.items() if record}
+
+
+def _buff(buff: Buff) -> dict[str, Any]:
+    factors = {"speed": buff.speed, "attack_rate": buff.attack_rate, "work_rate": buff.work_rate}
+    response = buff.response
+    return {
+        "id": buff.id,
+        "duration_s": seconds(buff.loops),
+        **{name: plain(value) for name, value in factors.items() if value != 1},
+        "stops_work": buff.work_rate == 0,
+        "armor": plain(buff.armor_add),
+        "damage_taken": plain(response.add) if response and response.on == "defender" else 0,
+        "absorbs": plain(response.limit) if response else 0,
+        "flags": sorted(buff.flags),
+    }
