@@ -15,26 +15,34 @@ from s2clientprotocol import raw_pb2
 
 from bridge.frames import WorldPoint
 from bridge.functions import functions_of
-from bridge.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, footprints, sites, stands_on
+from bridge.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, sites, stands_on
 from bridge.ground.resources import base_places, mark
 from bridge.ground.terrain import Ground, grid
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from bridge.ground.footprints import Footprint
     from bridge.ground.resources import Base, Places
-    from bridge.ground.terrain import Bools, Bytes, Floats
+    from bridge.ground.terrain import Bools, Bytes
     from bridge.snapshot import Snapshot
 
 POWER_RISE = 0.5
 """Ground that lies so much higher than a Pylon is not powered by it: it does not reach up a cliff."""
+GIVE_POWER = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing", ""})
+"""What powers; a source of which nothing else is known does."""
+AROUND_HALL = 4
+"""Cells from the middle of a town hall that stay free on each side: its own 2, and 2 to walk on."""
 LINE_WIDTH = 1.0
 """A cell is in the way of workers if the way over it is longer than the straight one by less than this."""
 LINE_REACH = 10.0
 """Resources farther from a town hall are not its own."""
 SEEN_NOW = 2
 """The game's number for a cell that is in sight; 1 was seen once, 0 never."""
-_DRONE_BEGINS = "Build_"
+RESOURCES = ("mineral_field", "geyser")
+"""Footprints of resources; that of a gas structure is its geyser's."""
+_PLACES = "Build_"
 
 
 class Land:
@@ -51,6 +59,24 @@ class Land:
                 self._standing.append((*found, unit))
             elif unit.alliance != raw_pb2.Self and not unit.is_flying:
                 self._bodies.append(unit)
+
+    def unit(self, tag: int) -> raw_pb2.Unit | None:
+        """A unit that is seen or remembered, by its tag."""
+        return self._by_tag.get(tag)
+
+    @functools.cached_property
+    def _by_tag(self) -> dict[int, raw_pb2.Unit]:
+        return {unit.tag: unit for unit in self._raw.units}
+
+    def standing(self, footprint: str) -> list[raw_pb2.Unit]:
+        """What is known to stand on footprints of one name, by ascending tags."""
+        return sorted((u for name, _, u in self._standing if name == footprint), key=lambda unit: unit.tag)
+
+    def standing_on(self, cells: Iterable[tuple[int, int]]) -> raw_pb2.Unit | None:
+        """What stands on any of some cells; the one with the least tag."""
+        wanted = set(cells)
+        found = (u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u)))
+        return min(found, key=lambda unit: unit.tag, default=None)
 
     # --- what stands there ------------------------------------------------------------------------------------
 
@@ -93,6 +119,15 @@ class Land:
         """(w, h) where a structure could stand now: buildable, and nothing there or planned to be there."""
         return self.ground.buildable & ~self.taken & ~self.planned
 
+    @functools.cached_property
+    def clear(self) -> Bools:
+        """(w, h) where the game lets town halls stand, as far as resources go."""
+        clear = np.ones(self.ground.size, np.bool_)
+        for name, footprint, unit in self._standing:
+            if name in RESOURCES:
+                mark(clear, footprint.near, footprint.cell(unit.pos.x, unit.pos.y), value=False)
+        return clear
+
     # --- what lies on it --------------------------------------------------------------------------------------
 
     @functools.cached_property
@@ -105,6 +140,19 @@ class Land:
         """(w, h) 2 where the player sees, 1 where it once saw, 0 elsewhere."""
         return self._state(grid(self._raw.map_state.visibility))
 
+    @functools.cached_property
+    def power_sources(self) -> tuple[raw_pb2.PowerSource, ...]:
+        """The fields that power structures and take warped in units, by ascending tags.
+
+        The game may also tell of those that only hasten warping in, as a Nexus does.
+        """
+        found = (s for s in self._raw.player.power_sources if self._name(s.tag) in GIVE_POWER)
+        return tuple(sorted(found, key=lambda source: source.tag))
+
+    def _name(self, tag: int) -> str:
+        unit = self.unit(tag)
+        return "" if unit is None else unit_name(unit.unit_type)
+
     def powered(self, *, corner: bool, by: int | None = None) -> Bools:
         """(w, h) in which cells a middle would be in a power field.
 
@@ -115,7 +163,7 @@ class Land:
         """
         result = np.zeros(self.ground.size, np.bool_)
         shift = 0.0 if corner else 0.5
-        for source in self._raw.player.power_sources:
+        for source in self.power_sources:
             if by is not None and source.tag != by:
                 continue
             reach = math.ceil(source.radius) + 1
@@ -174,6 +222,11 @@ class Land:
         return kept
 
 
+def _covered(footprint: Footprint, unit: raw_pb2.Unit) -> list[tuple[int, int]]:
+    x, y = footprint.cell(unit.pos.x, unit.pos.y)
+    return [(x + dx, y + dy) for dx, dy in footprint.cells]
+
+
 def addon_place(structure: WorldPoint) -> WorldPoint:
     """Where the add-on of a structure stands."""
     return WorldPoint(structure.x + ADDON_OFFSET[0], structure.y + ADDON_OFFSET[1])
@@ -183,8 +236,8 @@ def addon_place(structure: WorldPoint) -> WorldPoint:
 def built_by(ability: int) -> str | None:
     """The structure that a worker places with an ability; None for any other ability."""
     for function in functions_of(ability):
-        name = function.stem.removeprefix(_DRONE_BEGINS)
-        if function.stem.startswith(_DRONE_BEGINS) and name in sites():
+        name = function.stem.removeprefix(_PLACES)
+        if function.stem.startswith(_PLACES) and name in sites():
             return name
     return None
 
@@ -206,11 +259,10 @@ def land_of(snapshot: Snapshot) -> Land:
 def _lines(ground: Ground, bases: tuple[Base, ...], halls: Places) -> Bools:
     """(w, h) between town halls and their resources, and where town halls are going to stand."""
     kept = np.zeros(ground.size, np.bool_)
-    hall = footprints()["town_hall"]
-    for base in bases:
-        mark(kept, hall.cells, hall.cell(*base.place), value=True)
     resources = [place for base in bases for place in (*base.fields, *base.geysers)]
     for place in dict.fromkeys((*(tuple(base.place) for base in bases), *halls)):
+        x, y = int(place[0]), int(place[1])
+        kept[max(x - AROUND_HALL, 0) : x + AROUND_HALL + 1, max(y - AROUND_HALL, 0) : y + AROUND_HALL + 1] = True
         for resource in resources:
             if math.dist(place, resource) <= LINE_REACH:
                 _mark_way(kept, place, resource)
@@ -226,10 +278,3 @@ def _mark_way(kept: Bools, start: tuple[float, ...], end: WorldPoint) -> None:
     x, y = np.ogrid[x0 : x0 + part.shape[0], y0 : y0 + part.shape[1]]
     way = np.hypot(x + 0.5 - start[0], y + 0.5 - start[1]) + np.hypot(x + 0.5 - end.x, y + 0.5 - end.y)
     part |= way <= math.dist(start, end) + LINE_WIDTH
-
-
-def distances(grid_: Bools, point: WorldPoint) -> Floats:
-    """(w, h) straight distance of the middle of each cell from a point, in world units."""
-    x, y = np.ogrid[: grid_.shape[0], : grid_.shape[1]]
-    result: Floats = np.hypot(x + 0.5 - point.x, y + 0.5 - point.y).astype(np.float32)
-    return result

@@ -3,10 +3,41 @@
 A rule never overrides what an agent said; it finds the argument that is missing, or says why there is none.
 """
 
+from bridge.macro.army import army_attack, army_defend, army_retreat
+from bridge.macro.build import build_at, build_auto, build_near, lock_base
+from bridge.macro.cast import cast, recall_near, stop_building
+from bridge.macro.chrono import chrono_economy, chrono_military, chrono_research
 from bridge.macro.ledger import Ledger
+from bridge.macro.produce import morph_warpgates, research, train
 from bridge.macro.rule import Ask, Impossible, Order, Rule
+from bridge.macro.sights import scout
+from bridge.macro.spread import creep_tumor, inject, mule
+from bridge.macro.warp import warp_auto, warp_near
 
 __all__ = ["RULES", "Ask", "Impossible", "Ledger", "Order", "Rule"]
 
-RULES: dict[str, Rule] = {}
+RULES: dict[str, Rule] = {
+    "train": train,
+    "research": research,
+    "morph_warpgates": morph_warpgates,
+    "build_at": build_at,
+    "build_near": build_near,
+    "build_auto": build_auto,
+    "lock_base": lock_base,
+    "warp_near": warp_near,
+    "warp_auto": warp_auto,
+    "army_attack": army_attack,
+    "army_defend": army_defend,
+    "army_retreat": army_retreat,
+    "scout": scout,
+    "cast": cast,
+    "recall_near": recall_near,
+    "stop_building": stop_building,
+    "chrono_economy": chrono_economy,
+    "chrono_military": chrono_military,
+    "chrono_research": chrono_research,
+    "mule": mule,
+    "inject": inject,
+    "creep_tumor": creep_tumor,
+}
 """Every rule by the name under which the catalogue asks for it."""

@@ -5,10 +5,12 @@ Two agents that spend the same minerals, or send the same worker, are told so in
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
+    from bridge.frames import WorldPoint
     from bridge.snapshot import Snapshot
 
 
@@ -24,6 +26,18 @@ class Ledger:
     """Tags of the units that an earlier call of this turn took."""
     sites: list[tuple[float, float, float, float]] = field(default_factory=list)
     """Ground that an earlier call of this turn is going to build on: x0, y0, x1, y1 in the world."""
+    queued: Counter[int] = field(default_factory=Counter)
+    """How many orders earlier calls of this turn put into the queue of a producer, by its tag."""
+    changing: set[int] = field(default_factory=set)
+    """Structures that an earlier call of this turn turns into something else, by their tags."""
+    energy: Counter[int] = field(default_factory=Counter)
+    """Energy that earlier calls of this turn spend, by the tag of the caster."""
+    aimed: set[tuple[str, int]] = field(default_factory=set)
+    """What an earlier call of this turn is already aimed at, where once is enough: (function, tag)."""
+    looks: list[tuple[float, float]] = field(default_factory=list)
+    """Points of the world that an earlier call of this turn sent a scout to."""
+    begun: set[int] = field(default_factory=set)
+    """Abilities of research that an earlier call of this turn began: nothing is researched twice."""
 
     @classmethod
     def of(cls, snapshot: Snapshot) -> Self:
@@ -36,3 +50,11 @@ class Ledger:
         self.minerals -= minerals
         self.vespene -= vespene
         self.supply -= supply
+
+    def take(self, *tags: int) -> None:
+        """Notes that these units have something to do in this turn."""
+        self.busy.update(tags)
+
+    def promise(self, middle: WorldPoint, width: float, height: float) -> None:
+        """Notes that something is going to stand around a point."""
+        self.sites.append((middle.x - width / 2, middle.y - height / 2, middle.x + width / 2, middle.y + height / 2))

@@ -1,0 +1,125 @@
+"""Games of the simulator to try rules in: what a rule says is done, and the game is asked what came of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2, raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from bridge.action import Action
+from bridge.available import available, question
+from bridge.functions import functions
+from bridge.knowledge import knowledge
+from bridge.macro import RULES, Ask, Impossible, Ledger
+from bridge.names import unit_name
+from bridge.snapshot import Snapshot
+from simulator.client import Client, command, interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bridge.frames import WorldPoint
+    from bridge.macro import Order
+
+RACES = {"protoss": common_pb2.Protoss, "terran": common_pb2.Terran, "zerg": common_pb2.Zerg}
+FREE = (debug_pb2.all_resources, debug_pb2.tech_tree, debug_pb2.food, debug_pb2.fast_build)
+
+
+class Game:
+    """A melee game against an idle computer player."""
+
+    def __init__(self, map_name: str, race: str, enemy: str, seed: int) -> None:
+        self.client = Client()
+        self.client.ask(
+            create_game=sc.RequestCreateGame(
+                local_map=sc.LocalMap(map_path=map_name),
+                player_setup=[
+                    sc.PlayerSetup(type=sc.Participant),
+                    sc.PlayerSetup(type=sc.Computer, race=RACES[enemy], difficulty=sc.VeryEasy),
+                ],
+                random_seed=seed,
+            )
+        )
+        self.client.ask(join_game=sc.RequestJoinGame(race=RACES[race], options=interface(screen=0)))
+        self.info = self.client.ask(game_info=sc.RequestGameInfo()).game_info
+        self.see()
+
+    def see(self) -> Snapshot:
+        """Looks at the game, and begins a new turn with a new ledger."""
+        response = self.client.observe()
+        blind = Snapshot(response=response, info=self.info)
+        answer = self.client.ask(query=question(blind)).query
+        self.snapshot = Snapshot(response=response, info=self.info, abilities=available(answer))
+        self.ledger = Ledger.of(self.snapshot)
+        return self.snapshot
+
+    def play(self, loops: int) -> Snapshot:
+        """Lets loops pass."""
+        self.client.step(loops)
+        return self.see()
+
+    def cheat(self, *states: debug_pb2.DebugGameState) -> Snapshot:
+        """Has the game's own cheats on: resources, tech, supply, fast building."""
+        self.client.debug(*(debug_pb2.DebugCommand(game_state=state) for state in states or FREE))
+        return self.play(1)
+
+    def put(self, name: str, x: float, y: float, *, owner: int = 1, count: int = 1) -> int:
+        """Puts a unit somewhere, and gives the tag of the newest of its type."""
+        create = debug_pb2.DebugCommand(create_unit=debug_pb2.DebugCreateUnit(
+            unit_type=knowledge()[name].id, owner=owner, pos=common_pb2.Point2D(x=x, y=y), quantity=count
+        ))  # fmt: skip
+        before = set(self.snapshot.units)
+        self.client.debug(create)
+        self.play(2)
+        return max((u.tag for u in self.units(name) if u.tag not in before), default=0)
+
+    def units(self, name: str) -> list[raw_pb2.Unit]:
+        """Units of a type that are there, everybody's."""
+        return [unit for unit in self.snapshot.units.values() if unit_name(unit.unit_type) == name]
+
+    def own(self, name: str) -> list[raw_pb2.Unit]:
+        """Own units of a type."""
+        return [unit for unit in self.snapshot.own if unit_name(unit.unit_type) == name]
+
+    # --- rules ------------------------------------------------------------------------------------------------
+
+    def ask(self, rule: str, function: str, **fields: Any) -> list[Order]:
+        """What a rule answers for an action that ends in a function."""
+        given = {name: fields.pop(name) for name in ("units", "tag", "point") if name in fields}
+        action = Action(name=fields.pop("name", "Try_It"), about="", function=function, rule=rule, **fields)
+        return RULES[rule](Ask(action, self.snapshot, self.ledger, **given))
+
+    def refusal(self, rule: str, function: str, **fields: Any) -> Impossible:
+        """What a rule says that finds nothing."""
+        with pytest.raises(Impossible) as raised:
+            self.ask(rule, function, **fields)
+        return raised.value
+
+    def do(self, orders: Sequence[Order]) -> list[str]:
+        """Carries orders out; what the game says of each."""
+        actions = [
+            command(
+                order.function.ability_id, order.units, queue=order.queued,
+                **({"target": order.target} if isinstance(order.target, int) else {"point": order.target}),
+            )
+            for order in orders
+        ]  # fmt: skip
+        return [error_pb2.ActionResult.Name(result) for result in self.client.act(*actions)]
+
+    def may_stand(self, function: str, point: WorldPoint) -> str:
+        """What the game says of a place for what a function builds or warps in."""
+        asked = query_pb2.RequestQueryBuildingPlacement(
+            ability_id=functions()[function].ability_id, target_pos=common_pb2.Point2D(x=point.x, y=point.y)
+        )
+        answer = self.client.ask(query=query_pb2.RequestQuery(placements=[asked])).query.placements[0]
+        return error_pb2.ActionResult.Name(answer.result)
+
+
+@pytest.fixture(scope="session")
+def make_game() -> Callable[..., Game]:
+    def make(map_name: str = "Simple64", race: str = "protoss", *, enemy: str = "terran", seed: int = 1) -> Game:
+        return Game(map_name, race, enemy, seed)
+
+    return make
