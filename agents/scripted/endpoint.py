@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Self
 
 from aiohttp import web
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import to_json
 
 from agents.scripted.faults import Faults
@@ -39,6 +39,8 @@ NONSENSE = "As an AI I would <Attack_Unit(> them all, \x00 <<MessageTo()> and Te
 MAX_BODY_BYTES = 32 * 2**20
 DRIPS = 10
 CHARACTERS_PER_TOKEN = 4
+TOKENS_PER_IMAGE = 85
+"""Whatever its size."""
 
 
 class EndpointError(KhalaError):
@@ -153,9 +155,21 @@ def count_tokens(text: str) -> int:
     return -(-len(text) // CHARACTERS_PER_TOKEN)
 
 
+class _Address(BaseModel):
+    url: str = Field(pattern="^(data:|https?://)")
+    detail: Literal["auto", "low", "high"] = "auto"
+
+
 class _Part(BaseModel):
-    type: str
+    type: Literal["text", "image_url"]
     text: str = ""
+    image_url: _Address | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if (self.type == "image_url") != (self.image_url is not None):
+            raise ValueError("a part has either a text or an image_url, as its type says")
+        return self
 
 
 class _Said(BaseModel):
@@ -166,7 +180,13 @@ class _Said(BaseModel):
     def text(self) -> str:
         if isinstance(self.content, str):
             return self.content
-        return "".join(part.text for part in self.content)
+        texts = (part.text for part in self.content if part.type == "text")
+        return "".join(text if text.endswith("\n") else f"{text}\n" for text in texts)
+
+    @property
+    def images(self) -> int:
+        """Pictures in it; the players see none of them."""
+        return 0 if isinstance(self.content, str) else sum(part.type == "image_url" for part in self.content)
 
 
 class _Asked(BaseModel):
@@ -180,7 +200,7 @@ class _Asked(BaseModel):
 
 
 def _completion(asked: _Asked, text: str, digest: str) -> bytes:
-    prompt_tokens = sum(count_tokens(message.text) for message in asked.messages)
+    prompt_tokens = sum(count_tokens(message.text) + message.images * TOKENS_PER_IMAGE for message in asked.messages)
     completion_tokens = count_tokens(text)
     return to_json(
         {

@@ -32,7 +32,7 @@ _SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
 _UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
 _MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+)?: '''(.*)'''", re.MULTILINE)
 _ACCEPTED = re.compile(r"^    accepted: (\S+) <(\w+)\((.*)\)>", re.MULTILINE)
-_TASK = re.compile(r"^    (?:Team (\S+): )?(.*)", re.MULTILINE)
+_TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
 _AT = re.compile(_POINT, re.ASCII)
 _PART = re.compile(rf"{_NUMBER}/{_NUMBER}", re.ASCII)
@@ -58,6 +58,7 @@ class Unit(NamedTuple):
     weapon_s: float = 0.0
     """Time until the weapon can be used again; 0 if it can, or if not given."""
     order: str = ""
+    """First word of what it does; "" for nothing."""
     cloaked: bool = False
     hallucination: bool = False
     effects: tuple[str, ...] = ()
@@ -165,8 +166,10 @@ def _read_task(situation: Situation, body: str) -> None:
     for team, text in _TASK.findall(body):
         if not team:
             general.append(text.strip())
-        elif team in situation.teams:
-            situation.teams[team].task = text
+            continue
+        for name, known in situation.teams.items():  # units of one team can be teams of their own, `WarpPrism-2`
+            if name == team or re.fullmatch(rf"{re.escape(team)}-\d+", name):
+                known.task = f"{known.task} {text}".strip()
     situation.task = " ".join(general)
 
 

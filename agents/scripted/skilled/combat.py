@@ -104,10 +104,9 @@ def fight(plan: Plan, prey: str = "") -> bool:
     if target is None and not foes:
         return False
     save_the_hurt(plan, foes)
-    if target is None or (not prey and step_back(plan, foes)):
-        return _keep_off(plan, foes) if target is None else True
-    shoot(plan, target)
-    return True
+    if target is None:
+        return bool(prey) or _keep_off(plan, foes)
+    return (not prey and step_back(plan, foes)) or shoot(plan, target)
 
 
 def shoot(plan: Plan, target: Unit) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from agents.scripted.reading import points
@@ -12,9 +13,18 @@ if TYPE_CHECKING:
     from agents.scripted.skilled.plan import Plan
 
 MAP_CENTRE = (32.0, 32.0)
+_PASSING = re.compile(r"\b(do not stop|around|along|out of sight|unseen)\b", re.IGNORECASE)
 ARRIVED = 2.0
 """Cells of the minimap."""
 FAR = 6.0
+
+
+def passing(plan: Plan) -> bool:
+    """Whether the team is on a way on which it shall not fight."""
+    team, named = plan.team, points(plan.team.task)
+    if not named or team.minimap is None or not _PASSING.search(team.task):
+        return False
+    return math.dist(named[-1], team.minimap) > ARRIVED
 
 
 def travel(plan: Plan) -> bool:

@@ -22,6 +22,8 @@ class Plan:
     calls: list[str] = field(default_factory=list)
     support: Mapping[str, float] = field(default_factory=dict)
     """By the tag of an enemy: how many units of all teams have it in reach."""
+    prey: str = ""
+    """What the team is after besides the fight: "worker" or "hall"; "" for nothing."""
     busy: set[str] = field(default_factory=set)
     """Tags of units that have an order in this reply."""
 

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 from agents.scripted.reading import points, read
 from agents.scripted.skilled import combat, economy, journey, skills
+from agents.scripted.skilled.kinds import kind_of
 from agents.scripted.skilled.plan import Plan
+from agents.scripted.skilled.space import middle
 from agents.scripted.writing import point, reply
 
 if TYPE_CHECKING:
@@ -43,7 +45,13 @@ def _lead(plan: Plan, observation: str) -> None:
     if any(unit.type.startswith("WarpPrism") for unit in team.own):
         prism(plan)
         return
-    skills.use(plan)
+    if all(unit.type == "AdeptPhaseShift" for unit in team.own):
+        shade(plan)
+        return
+    if journey.passing(plan):
+        journey.travel(plan)
+        return
+    skills.use(plan, prey=prey(plan))
     if not combat.fight(plan, prey(plan)):
         journey.travel(plan)
 
@@ -54,6 +62,15 @@ def prey(plan: Plan) -> str:
     if not _ATTACK.search(text):
         return ""
     return "hall" if _HALL.search(text) else "worker" if _RAID.search(text) else ""
+
+
+def shade(plan: Plan) -> None:
+    """To where the Adepts shall appear: among workers, if it sees any."""
+    workers = [unit for unit in plan.team.enemies if kind_of(unit).role == "worker"]
+    if workers:
+        plan.give("Move_Screen", middle(workers))
+    else:
+        journey.travel(plan)
 
 
 def prism(plan: Plan) -> None:

@@ -22,8 +22,9 @@ STORM_RADIUS = 1.5
 NOVA_DAMAGE = 100.0
 
 
-def use(plan: Plan, keep: int = 1) -> None:
+def use(plan: Plan, prey: str = "", keep: int = 1) -> None:
     """Plans the skills of a team that are worth it now; leaves `keep` calls for a fight or a move."""
+    plan.prey = prey
     for name, skill in SKILLS.items():
         if plan.left <= keep:
             return
@@ -134,7 +135,8 @@ def graviton_beam(plan: Plan) -> None:
     if len(team.own) < 2 or any("GravitonBeam" in unit.effects for unit in team.enemies) or len(free) < 1:
         return
     prey = [u for u in _bodies(plan) if not kind_of(u).flying and not {"Ultralisk", "Larva"} & {u.type}]
-    order = {"Queen": 0, "Hydralisk": 1, "Infestor": 1, "Drone": 2, "Probe": 2, "SCV": 2}
+    workers = dict.fromkeys(("Drone", "Probe", "SCV"), -1 if plan.prey == "worker" else 2)
+    order = {"Queen": 0, "Hydralisk": 1, "Infestor": 1, **workers}
     caster = max(free, key=lambda unit: unit.energy)
     target = min(
         (unit for unit in prey if unit.type in order),
