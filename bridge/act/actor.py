@@ -3,7 +3,9 @@
     joint = Actor(task).joint(sight, {"Zealots": parse(text), …})      what everybody wants, checked
     plan = executor.plan(joint.commands, sight.snapshot, loops)        played by bridge.game
 
-An actor keeps nothing between two turns. Whose reply counts and when it is too late is decided above.
+All calls of a turn draw on the same minerals, vespene, supply and workers, in the order of the agents in the task and
+of their words; what the host does by itself comes last, with what nobody ordered. An actor keeps nothing between two
+turns. Whose reply counts and when it is too late is decided above.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from bridge.act.raw import RawExecutor
 from bridge.act.recognise import recognise
 from bridge.act.screen import ScreenExecutor
 from bridge.act.translate import Translator
+from bridge.act.vocabulary import Vocabulary
 from protocol.messages import Rejection
 
 if TYPE_CHECKING:
@@ -43,7 +46,9 @@ class Actor:
     """Makes one joint action of what the agents of a side said."""
 
     def __init__(self, task: TaskConfig) -> None:
+        """Takes the task, which says what each agent may be told."""
         self._task = task
+        self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
 
     def joint(self, sight: Sight, replies: Mapping[str, Speech]) -> JointAction:
         """The joint action of a turn.
@@ -52,6 +57,7 @@ class Actor:
             sight: what the agents see at the moment at which their replies are to take effect.
             replies: by agent; an agent without one goes on with what it does.
         """
+        translator = Translator(sight, self._task.max_actions)
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}
@@ -59,19 +65,21 @@ class Actor:
             speech = replies.get(name)
             if speech is None:
                 continue
-            ordered, said, faults = self._one(sight, agent, speech)
+            ordered, said, faults = self._one(translator, agent, speech)
             commands += ordered
             accepted[name] = tuple(said)
             rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
         return JointAction(tuple(commands), accepted, rejections)
 
-    def _one(self, sight: Sight, agent: AgentSight, speech: Speech) -> tuple[list[Command], list[str], list[Rejection]]:
-        translator = Translator(sight, self._task.max_actions)
+    def _one(
+        self, translator: Translator, agent: AgentSight, speech: Speech
+    ) -> tuple[list[Command], list[str], list[Rejection]]:
+        words = self._words[agent.agent.name]
         commands: list[Command] = []
         accepted: list[str] = []
         faults: list[Rejection] = []
         for call in speech.calls:
-            recognised = recognise(call, agent)
+            recognised = recognise(call, agent, words)
             if isinstance(recognised, Rejection):
                 faults.append(recognised)
                 continue

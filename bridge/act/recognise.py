@@ -1,30 +1,40 @@
 """Calls as written → actions of the catalogue, or rejections that say what would be right.
 
 Only words are judged here: is there such an action, has it these arguments, is there such a team. What is
-possible in the game now is judged in `bridge.act.translate`. Tolerated, because only one thing can be meant: names in
-another case, a missing team heading when there is one team, a heading for all teams at once, a tag written as a
-decimal number.
+possible in the game now is judged in `bridge.act.translate`. Repaired is what can mean one thing only:
+
+| written | taken as |
+|---|---|
+| a name in another case, with blanks or hyphens, an alias | the action (`bridge.act.vocabulary`) |
+| `stalker 1`, no team, several, all teams | those that are meant (`bridge.act.addressee`) |
+| a tag as a decimal number | the tag |
+| a point before the tags | the tags, then the point |
+| `None` for no argument | no argument |
+
+Everything else is said, with what is nearest to it.
 """
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from protocol.messages import Rejection
+from bridge.act.addressee import addressed
+from bridge.act.refused import Refused, reject
 from protocol.speech import render
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from bridge.act.vocabulary import Vocabulary
     from bridge.action import Action, ArgKind
     from bridge.observe.sight import AgentSight, TeamSight
-    from protocol.messages import Call, Point, RejectionReason
+    from protocol.messages import Call, Point, Rejection
+
+__all__ = ["Recognised", "Refused", "recognise", "reject"]
 
 EXAMPLES: dict[ArgKind, str] = {"tag": "0x100140001", "screen": "[12, 9.5]", "minimap": "[30, 41]"}
-ALL_TEAMS = frozenset({"all", "all teams", "both", "both teams", "every team", "each team"})
 _SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, no tags
+_LONGEST_TAG = 20  # digits of 2^64
+_NOTHING = frozenset({"none", "null", "nil", "n/a", "-"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,74 +56,51 @@ class Recognised:
 
     @property
     def written(self) -> str:
-        """The call alone, with the name as in the catalogue: `<Attack_Unit(0x1)>`."""
-        return render(self.call.model_copy(update={"name": self.action.name}))
+        """The call alone, as the catalogue would have it written: `<Attack_Unit(0x1)>`."""
+        tags = tuple(hex(tag) for tag in self.tags)
+        point = () if self.point is None else (self.point,)
+        return render(self.call.but(name=self.action.name, args=(*tags, *point)))
 
 
-class Refused(Exception):
-    """Leaves the checks of a call with the reason of its rejection."""
+def recognise(call: Call, agent: AgentSight, words: Vocabulary) -> list[Recognised] | Rejection:
+    """What a call means: one action, or one for each team if it speaks to several.
 
-    def __init__(self, reason: RejectionReason, message: str) -> None:
-        self.reason, self.message = reason, message
-
-
-def recognise(call: Call, agent: AgentSight) -> list[Recognised] | Rejection:
-    """What a call means: one action, or one for each team if it stands under a heading for all."""
+    Args:
+        call: as read in the reply.
+        agent: what the agent sees now; it names its teams.
+        words: the names that the agent may say.
+    """
     try:
-        action = _action(call, agent)
-        teams = _teams(call, agent)
+        action = _action(call, agent, words)
         tags, point = _arguments(call, action)
+        teams = addressed(call.team, action, tags, agent, words)
     except Refused as refused:
         return reject(call, refused)
     return [Recognised(call, action, team, tags, point) for team in teams]
 
 
-def reject(call: Call, refused: Refused, team: str | None = None) -> Rejection:
-    """A rejection of a call, with its place in the reply."""
-    return Rejection(
-        reason=refused.reason, message=refused.message, text=render(call), start=call.start, team=team or call.team
-    )
-
-
-def _action(call: Call, agent: AgentSight) -> Action:
-    known = {action.name.casefold(): action for action in agent.agent.catalogue()}
-    if action := known.get(call.name.casefold()):
+def _action(call: Call, agent: AgentSight, words: Vocabulary) -> Action:
+    if action := words.find(call.name):
         return action
-    close = difflib.get_close_matches(call.name.casefold(), list(known), n=1)
-    if close:
-        hint = f"did you mean {known[close[0]].form}?"
+    teams = [team for team in agent.teams if team.view.name == call.team] or agent.teams
+    meant, nearest = words.near(call.name, teams)
+    if meant:
+        hint = f"did you mean {nearest[0].form}?"
     else:
-        hint = "your actions are " + ", ".join(action.form for action in known.values()) + "."
+        hint = f"the nearest that you have are {', '.join(action.form for action in nearest)}."
     raise Refused("unknown_action", f"There is no action {call.name}; {hint}")
-
-
-def _teams(call: Call, agent: AgentSight) -> Sequence[TeamSight]:
-    by_name = {team.view.name.casefold(): team for team in agent.teams}
-    names = ", ".join(team.view.name for team in agent.teams)
-    if not agent.teams:
-        raise Refused("unknown_team", "You have no units left, so no team can act.")
-    if call.team is None and len(agent.teams) > 1:
-        ask = 'write "Team <name>:" above the action'
-        raise Refused("unknown_team", f"No team is named: {ask}; your teams are {names}.")
-    wanted = " ".join((call.team or agent.teams[0].view.name).casefold().split())
-    if team := by_name.get(wanted) or by_name.get(wanted.replace(" ", "-")):
-        return [team]
-    if wanted in ALL_TEAMS:
-        return agent.teams
-    if wanted in (name.casefold() for name in agent.idle_teams):
-        raise Refused("unknown_team", f"Team {call.team} has no units left; your teams are {names}.")
-    raise Refused("unknown_team", f"You have no team {call.team}; your teams are {names}.")
 
 
 def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | None]:
     given = [_typed(argument) for argument in call.args]
-    fits = len(given) == len(action.args) and all(
-        isinstance(value, int if kind == "tag" else tuple) for kind, value in zip(action.args, given, strict=True)
-    )
-    if not fits:
-        raise Refused("wrong_arguments", _right_form(action))
+    if not action.args and _is_nothing(given):
+        given = []
     tags = tuple(value for value in given if isinstance(value, int))
-    return tags, next((value for value in given if isinstance(value, tuple)), None)
+    points = [value for value in given if isinstance(value, tuple)]
+    wanted = action.args.count("tag")
+    if len(given) != len(action.args) or len(tags) != wanted or len(points) != len(action.args) - wanted:
+        raise Refused("wrong_arguments", _right_form(action))
+    return tags, points[0] if points else None
 
 
 def _typed(argument: str | Point) -> int | Point | str:
@@ -121,10 +108,16 @@ def _typed(argument: str | Point) -> int | Point | str:
     if not isinstance(argument, str):
         return argument
     if argument.startswith("0x"):
-        return int(argument, 16)
-    if argument.isascii() and argument.isdigit() and int(argument) >= _SMALLEST_TAG:
-        return int(argument)
-    return argument
+        try:
+            return int(argument, 16)
+        except ValueError:
+            return argument
+    is_number = argument.isascii() and argument.isdigit() and len(argument) <= _LONGEST_TAG
+    return int(argument) if is_number and int(argument) >= _SMALLEST_TAG else argument
+
+
+def _is_nothing(given: list[int | Point | str]) -> bool:
+    return len(given) == 1 and isinstance(given[0], str) and given[0].casefold() in _NOTHING
 
 
 def _right_form(action: Action) -> str:

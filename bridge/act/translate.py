@@ -1,12 +1,16 @@
-"""Recognised actions → commands to the game, checked against what the agent saw.
+"""Recognised actions → commands to the game, checked against the state that they meet.
 
-A command knows units, an ability, a unit or a point of the world as its target, and whether it waits behind earlier
-orders. It knows no frame and no PySC2 function call: the two executors play the same commands.
+A command knows units, a function, a unit or a point of the world as its target, and whether it waits behind earlier
+orders. It knows no frame: the two executors play the same commands.
 
-Order of the commands of one reply, unit by unit: the first one replaces what the unit did, a later one waits for it
+    who       units of the team, those that are named, or whoever a rule of `bridge.macro` finds
+    may they  `bridge.act.validity`; only the units that can do it are told to
+    at what   `bridge.act.targets`
+
+Order of the commands of one turn, unit by unit: the first one replaces what the unit did, a later one waits for it
 if the action queues (the catalogue says), and replaces it if not. In the paper it is the first queueing function of a
 *team* that replaces, which makes an order to a second unit wait behind that unit's old order, and lets an attack
-cancel a skill of the same reply, since here all commands of a reply reach the game in one loop.
+cancel a skill of the same reply, since here all commands of a turn reach the game in one loop.
 """
 
 from __future__ import annotations
@@ -14,27 +18,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
-from bridge.act.recognise import Recognised, Refused, reject
-from bridge.frames import MinimapPoint, ScreenPoint, WorldPoint
+from bridge.act.reasons import is_attack
+from bridge.act.refused import Refused, reject
+from bridge.act.targets import Targets
+from bridge.act.validity import Obstacle, Validity
+from bridge.frames import WorldPoint
+from bridge.knowledge import ability_of, knowledge
+from bridge.macro import RULES, Ask, Impossible, Ledger, Order
 from bridge.names import unit_name
-from bridge.observe.sight import Sight, unmet
 
 if TYPE_CHECKING:
-    from bridge.action import Action
+    from collections.abc import Iterable
+
+    from s2clientprotocol import raw_pb2
+
+    from bridge.act.recognise import Recognised
     from bridge.functions import Function
+    from bridge.observe.sight import Sight
     from protocol.messages import Rejection
 
-_SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
+MAKERS = frozenset({"build", "build_gas"})
+"""Kinds of abilities that one unit of a team is enough for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One order to some units of a team."""
+    """One order to some units."""
 
-    said: Recognised
-    """The action that it carries out."""
+    said: Recognised | None
+    """The call that it carries out; None for an order that the host gives by itself."""
     function: Function
     """PySC2's function for it, which names the ability."""
     units: tuple[int, ...]
@@ -42,128 +54,152 @@ class Command:
     """Tag of a unit, or a point of the world."""
     queued: bool = False
 
-    @property
-    def action(self) -> Action:
-        """Its entry in the catalogue."""
-        return self.said.action
-
 
 class Translator:
-    """Translates the calls of one agent's reply, one after the other."""
+    """Translates the calls of one turn, one after the other, those of all agents of a side."""
 
     def __init__(self, sight: Sight, max_actions: int) -> None:
+        """Takes what the agents see now, and how many actions one team may have in a turn."""
         self._sight = sight
+        self._snapshot = sight.snapshot
         self._max_actions = max_actions
-        self._ordered: set[int] = set()
-        self._count: dict[str, int] = {}
+        self.ledger = Ledger.of(sight.snapshot)
+        self.ordered: set[int] = set()
+        """Tags of the units that were told something in this turn."""
+        self._validity = Validity(sight.snapshot, self.ledger)
+        self._targets = Targets(sight)
+        self._count: dict[tuple[str, str], int] = {}
 
     def translate(self, said: Recognised) -> list[Command] | Rejection:
         """Commands for a call: none for an action that orders nothing, two if only some of its units have to wait."""
         try:
-            units, target = self._units(said), self._target(said)
-            self._count_in(said)
+            orders = self._orders(said)
         except Refused as refused:
             return reject(said.call, refused, said.team.view.name)
-        function = said.action.pysc2
+        return [command for order in orders for command in self.commands(order, said)]
+
+    def commands(self, order: Order, said: Recognised | None = None) -> list[Command]:
+        """An order in its place behind those that its units were given before in this turn."""
+        queues = said is not None and said.action.queue
+        first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
+        later = tuple(tag for tag in order.units if queues and tag in self.ordered)
+        self.ordered.update(order.units)
+        self.ledger.busy.update(order.units)
+        found = [Command(said, order.function, first, order.target, order.queued)] if first else []
+        return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
+
+    def _orders(self, said: Recognised) -> list[Order]:
+        """What a call orders; it is counted if it can be carried out.
+
+        Raises:
+            Refused: it cannot.
+        """
+        count = (said.team.team.agent, said.team.team.name)
+        if said.action.rule is not None:
+            found = self._by_rule(said, said.action.rule) if self._may_say(count) else []
+        else:
+            found = self._as_said(said)
+        if not self._may_say(count):
+            limit = f"{self._max_actions} action{'s' if self._max_actions > 1 else ''}"
+            raise Refused("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
+        self._count[count] = self._count.get(count, 0) + 1
+        for order in found if said.action.rule is None else ():
+            for tag in order.units:
+                self._validity.pay(order.function, self._snapshot.units[tag])
+        return found
+
+    def _may_say(self, count: tuple[str, str]) -> bool:
+        return self._count.get(count, 0) < self._max_actions
+
+    def _by_rule(self, said: Recognised, rule: str) -> list[Order]:
+        """What a rule makes of a call; it takes the price from the ledger itself."""
+        units = self._having(said, self._units(said)) if said.team.team.tags else ()
+        tag = self._targets.unit(said).tag if said.action.target_kind == "tag" else None
+        point = None if said.point is None else self._targets.place(said)
+        try:
+            return RULES[rule](Ask(said.action, self._snapshot, self.ledger, units, tag, point))
+        except Impossible as impossible:
+            raise Refused(impossible.reason, impossible.message) from None
+
+    def _as_said(self, said: Recognised) -> list[Order]:
+        """The order of a call whose words say it all."""
+        units, function = self._having(said, self._units(said)), said.action.pysc2
         if function is None:
             return []
-        first = tuple(tag for tag in units if not (said.action.queue and tag in self._ordered))
-        later = tuple(tag for tag in units if said.action.queue and tag in self._ordered)
-        self._ordered.update(units)
-        commands = (Command(said, function, first, target), Command(said, function, later, target, queued=True))
-        return [command for command in commands if command.units]
-
-    def _count_in(self, said: Recognised) -> None:
-        name = said.team.view.name
-        if self._count.get(name, 0) >= self._max_actions:
-            limit = f"{self._max_actions} action{'s' if self._max_actions > 1 else ''}"
-            raise Refused("too_many_actions", f"Team {name} had its {limit} in this reply already.")
-        self._count[name] = self._count.get(name, 0) + 1
+        able = self._able(said, function, units)
+        match said.action.target_kind:
+            case None:
+                return [Order(function, able)]
+            case "tag":
+                return [self._at_unit(said, function, able)]
+            case _:
+                return [Order(function, able, self._targets.place(said))]
 
     # --- who --------------------------------------------------------------------------------------------------
 
     def _units(self, said: Recognised) -> tuple[int, ...]:
-        action, team = said.action, said.team
-        tags = team.team.tags
-        if action.subject == "unit":
-            if said.tags[0] not in tags:
-                known = ", ".join(unit.tag for unit in team.view.units)
-                raise Refused(
-                    "invalid_target",
-                    f"{hex(said.tags[0])} is no unit of team {team.view.name}; its units are {known}.",
-                )
-            tags = said.tags[:1]
-        able = tuple(tag for tag in tags if tag in self._sight.snapshot.units and self._reason(said, tag) is None)
-        if not able:
-            reason = self._reason(said, tags[0]) if tags[0] in self._sight.snapshot.units else "it is gone"
-            raise Refused("not_available", f"Team {team.view.name} cannot do {action.name} now: {reason}.")
-        return able
+        """The units that are spoken of, those that are there."""
+        tags = self._targets.named(said) if said.action.named else said.team.team.tags
+        found = tuple(tag for tag in tags if tag in self._snapshot.units)
+        if not found:
+            raise self._cannot(said, ["it is gone"])
+        return found
 
-    def _reason(self, said: Recognised, tag: int) -> str | None:
-        """Why a unit cannot do it; None if it can."""
-        agent = self._sight.agents[said.team.team.agent]
-        unit_type = unit_name(self._sight.snapshot.units[tag].unit_type)
-        if said.action.name not in agent.agent.actions.get(unit_type, ()):
-            return f"{unit_type} has no such action"
-        return unmet(said.action, unit_type, agent.view.upgrades)
+    def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
+        """Those of some units that may be told to do it, as the task says."""
+        listed = self._sight.agents[said.team.team.agent].agent.actions
+        types = {tag: unit_name(self._snapshot.units[tag].unit_type) for tag in tags}
+        found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
+        if not found:
+            raise self._cannot(said, [f"{name} has no such action" for name in dict.fromkeys(types.values())])
+        return found
+
+    def _able(self, said: Recognised, function: Function, tags: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of some units that can do it now; one, if one is enough for it."""
+        obstacles = {tag: self._validity.obstacle(said.action, function, self._snapshot.units[tag]) for tag in tags}
+        able = tuple(tag for tag, obstacle in obstacles.items() if obstacle is None)
+        if not able:
+            nearest = max((one for one in obstacles.values() if one), key=_nearness)
+            raise self._cannot(said, [nearest.text])
+        if said.action.subject == "two_units" and len(able) < len(tags):
+            raise self._cannot(said, [one.text for one in obstacles.values() if one])
+        facts = ability_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
+        return able[:1] if facts is not None and facts.does in MAKERS else able
+
+    @staticmethod
+    def _cannot(said: Recognised, reasons: list[str]) -> Refused:
+        why = "; ".join(dict.fromkeys(reasons))
+        return Refused("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
 
     # --- at what ----------------------------------------------------------------------------------------------
 
-    def _target(self, said: Recognised) -> int | WorldPoint | None:
-        match said.action.target_kind:
-            case None:
-                return None
-            case "tag":
-                return self._target_unit(said, said.tags[-1])
-            case "screen":
-                return self._screen_point(said)
-            case "minimap":
-                return self._minimap_point(said)
-
-    def _target_unit(self, said: Recognised, tag: int) -> int:
-        view, tag_text = said.team.view, hex(tag)
-        in_sight = (*view.units, *view.allies, *view.enemies)
-        unit = next((unit for unit in in_sight if unit.tag == tag_text), None)
-        if unit is None:
-            raise Refused("unknown_target", self._where_it_is(said, tag))
-        wanted = said.action.target
-        if (wanted == "enemy" and unit.alliance != "enemy") or (wanted == "own" and unit.alliance == "enemy"):
-            whose = {"own": "your own", "ally": "your own", "enemy": "an enemy", "neutral": "nobody's"}[unit.alliance]
-            of = "an enemy unit" if wanted == "enemy" else "an own unit"
-            raise Refused("invalid_target", f"{tag_text} is {whose} {unit.type}; {said.action.name} needs {of}.")
-        return tag
-
-    def _where_it_is(self, said: Recognised, tag: int) -> str:
-        name = said.team.view.name
-        if tag in self._sight.snapshot.dead:
-            return f"The unit {hex(tag)} is dead; choose another target."
-        unit = self._sight.snapshot.units.get(tag)
-        if unit is None:
-            return f"No unit {hex(tag)} is in sight of team {name}; use a tag that stands in its lists."
-        x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
-        what = f"{_SIDES[unit.alliance]} {unit_name(unit.unit_type)} {hex(tag)}"
-        return f"The {what} is out of sight of team {name}, at [{x:.0f}, {y:.0f}] of the minimap; move there first."
-
-    def _screen_point(self, said: Recognised) -> WorldPoint:
-        x, y = self._in_frame(said, "screen", said.team.camera.size)
-        point = said.team.camera.world(ScreenPoint(x, y))
-        if not self._sight.map.holds(point):
-            x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
-            inside = f"for team {said.team.view.name} x is from {x0} to {x1} and y from {y0} to {y1}"
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
-        return point
-
-    def _minimap_point(self, said: Recognised) -> WorldPoint:
-        x, y = self._in_frame(said, "minimap", self._sight.map.minimap_size)
-        point = self._sight.map.world(MinimapPoint(x, y))
-        if not self._sight.map.holds(point):
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map.")
-        return point
+    def _at_unit(self, said: Recognised, function: Function, able: tuple[int, ...]) -> Order:
+        """The order at the unit that is named, for those of the able ones that it can be aimed at by."""
+        unit = self._targets.unit(said)
+        if said.action.aim == "place":
+            return Order(function, able, WorldPoint(unit.pos.x, unit.pos.y))
+        aiming = tuple(tag for tag in able if tag != unit.tag)
+        if is_attack(function):
+            aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
+            where = "air" if unit.is_flying else "ground"
+            what = f"{hex(unit.tag)} is a {unit_name(unit.unit_type)} in the {where}"
+            if not aiming:
+                raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
+        if not aiming:
+            raise Refused(
+                "invalid_target", f"{hex(unit.tag)} is the unit itself; {said.action.name} needs another one."
+            )
+        return Order(function, aiming, unit.tag)
 
     @staticmethod
-    def _in_frame(said: Recognised, frame: str, size: float) -> tuple[float, float]:
-        assert said.point is not None  # recognised by its form
-        x, y = said.point
-        if not (0 <= x <= size and 0 <= y <= size):
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}.")
-        return x, y
+    def _hits(unit: raw_pb2.Unit, target: raw_pb2.Unit) -> bool:
+        """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
+        mine, other = (knowledge().get(unit_name(one.unit_type)) for one in (unit, target))
+        if mine is None or other is None or not mine.weapons:
+            return True
+        planes = {*other.planes, "air"} - {"ground"} if target.is_flying else {*other.planes, "ground"}
+        return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
+
+
+def _nearness(obstacle: Obstacle) -> tuple[int, float]:
+    return obstacle.rank, obstacle.energy

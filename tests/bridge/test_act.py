@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bridge.act import Actor, Command, JointAction
-from bridge.catalog import catalogue
 from bridge.frames import WorldPoint
 from bridge.observe import Observer
 from bridge.task import AgentConfig
@@ -90,8 +89,12 @@ def team(*calls: str, name: str = "Stalker-1") -> str:
     return "\n".join(("Actions:", f"Team {name}:", *calls))
 
 
+def names(joint: JointAction) -> list[str]:
+    return [command.said.action.name for command in joint.commands if command.said]
+
+
 def orders(joint: JointAction) -> list[tuple[str, tuple[int, ...], object, bool]]:
-    return [(c.action.name, c.units, c.target, c.queued) for c in joint.commands]
+    return [(c.said.action.name, c.units, c.target, c.queued) for c in joint.commands if c.said]
 
 
 # --- understood ---------------------------------------------------------------------------------------------------
@@ -189,13 +192,15 @@ def test_teams_do_not_wait_for_each_other(act: Callable[..., JointAction]) -> No
 # --- refused ------------------------------------------------------------------------------------------------------
 
 TEAMS = "your teams are Stalker-1, Mixed-1."
-FORMS = ", ".join(catalogue()[name].form for name in EVERYTHING)
 REFUSED = [
     ("<Atack_Unit(0x1)>", "unknown_action", "There is no action Atack_Unit; did you mean <Attack_Unit(tag)>?"),
     (
         "<Build_Nexus()>",
         "unknown_action",
-        f"There is no action Build_Nexus; your actions are {FORMS}.",
+        (
+            "There is no action Build_Nexus; the nearest that you have are <Ability_Blink_Screen(screen)>, "
+            "<Hold_Position()>, <Select_Unit_Blink_Screen(tag, screen)>."
+        ),
     ),
     ("<Stop(0x1)>", "wrong_arguments", "Stop takes no arguments: write <Stop()>."),
     ("<Attack_Unit()>", "wrong_arguments", "Attack_Unit takes (tag): write it like <Attack_Unit(0x100140001)>."),
@@ -206,7 +211,7 @@ REFUSED = [
     ),
     ("<Move_Screen(12)>", "wrong_arguments", "Move_Screen takes (screen): write it like <Move_Screen([12, 9.5])>."),
     (
-        "<Select_Unit_Move_Screen([3, 4], 0x1)>",
+        "<Select_Unit_Move_Screen([3, 4], [5, 6])>",
         "wrong_arguments",
         "Select_Unit_Move_Screen takes (tag, screen): write it like <Select_Unit_Move_Screen(0x100140001, [12, 9.5])>.",
     ),
@@ -222,7 +227,7 @@ REFUSED = [
     ),
     (
         "<Attack_Unit(0x100200001)>",
-        "unknown_target",
+        "dead_target",
         "The unit 0x100200001 is dead; choose another target.",
     ),
     (
@@ -242,10 +247,21 @@ REFUSED = [
     ),
     (
         "<Select_Unit_Move_Screen(0x1000c0001, [3, 4])>",
-        "invalid_target",
-        "0x1000c0001 is no unit of team Stalker-1; its units are 0x100040001, 0x100080001.",
+        "not_yours",
+        (
+            "0x1000c0001 is your own Zealot of team Mixed-1 and not one of team Stalker-1; units of team Stalker-1 are "
+            "0x100040001, 0x100080001."
+        ),
     ),
-    ("<Move_Screen([25, 4])>", "out_of_bounds", "[25, 4] is outside of the screen: x and y are from 0 to 24."),
+    (
+        "<Move_Screen([50, 4])>",
+        "wrong_frame",
+        (
+            "[50, 4] is outside of the screen, where x and y are from 0 to 24; Move_Screen takes a point of the screen, "
+            "for one of the minimap there is Move_Minimap."
+        ),
+    ),
+    ("<Move_Screen([100, 4])>", "out_of_bounds", "[100, 4] is outside of the screen: x and y are from 0 to 24."),
     ("<Move_Screen([-1, 4])>", "out_of_bounds", "[-1, 4] is outside of the screen: x and y are from 0 to 24."),
     (
         "<Move_Screen([1.5, 4])>",
@@ -277,7 +293,12 @@ def test_a_call_is_refused_in_words_that_help(
 @pytest.mark.parametrize(
     ("reply", "reason", "message"),
     [
-        (team("<Stop()>", name="Stalker-2"), "unknown_team", f"You have no team Stalker-2; {TEAMS}"),
+        (
+            team("<Stop()>", name="Stalker-2"),
+            "unknown_team",
+            f"You have no team Stalker-2; did you mean Stalker-1? Y{TEAMS[1:]}",
+        ),
+        (team("<Stop()>", name="Sentry"), "unknown_team", f"You have no team Sentry; {TEAMS}"),
         (team("<Stop()>", name="Zealot-9"), "unknown_team", f"Team Zealot-9 has no units left; {TEAMS}"),
         (
             "<Stop()>",
@@ -287,7 +308,7 @@ def test_a_call_is_refused_in_words_that_help(
         (
             team("<Hold_Position()>", name="Mixed-1"),
             "not_available",
-            "Team Mixed-1 cannot do Hold_Position now: Zealot has no such action.",
+            "Team Mixed-1 cannot do Hold_Position now: Zealot has no such action; Observer has no such action.",
         ),
         (
             team("<Select_Unit_Attack_Unit(0x100100001, 0x100180001)>", name="Mixed-1"),
@@ -309,7 +330,7 @@ def test_an_agent_without_units_is_told_so(task: Callable[..., TaskConfig], snap
     config = task("2s3z")
     joint = Actor(config).joint(Observer(config).observe(snapshot([])), {"CombatGroupSmac": parse(team("<Stop()>"))})
     assert [r.message for r in joint.rejections["CombatGroupSmac"]] == [
-        "There is no action Stop; your actions are <Attack_Unit(tag)>, <Move_Screen(screen)>."
+        "There is no action Stop; the nearest that you have are <Attack_Unit(tag)>, <Move_Screen(screen)>."
     ]
     joint = Actor(config).joint(
         Observer(config).observe(snapshot([])), {"CombatGroupSmac": parse("<Attack_Unit(0x1)>")}
@@ -323,7 +344,7 @@ def test_more_actions_than_a_team_may_have_are_refused_and_wrong_ones_do_not_cou
     calls = ["<Stop()>", "<Attack_Unit(0x1)>", "<Hold_Position()>", "<Stop()>"]
     other = team("<Stop()>", name="Mixed-1")
     joint = act(team(*calls) + "\n" + other, max_actions=2)
-    assert [c.action.name for c in joint.commands] == ["Stop", "Hold_Position", "Stop"]
+    assert names(joint) == ["Stop", "Hold_Position", "Stop"]
     assert [(r.reason, r.message) for r in joint.rejections["A"]] == [
         ("unknown_target", "No unit 0x1 is in sight of team Stalker-1; use a tag that stands in its lists."),
         ("too_many_actions", "Team Stalker-1 had its 2 actions in this reply already."),
@@ -332,7 +353,7 @@ def test_more_actions_than_a_team_may_have_are_refused_and_wrong_ones_do_not_cou
 
 def test_one_wrong_call_costs_nothing_but_itself(act: Callable[..., JointAction]) -> None:
     joint = act(team("<Move_Screen([12, 12])>", "<Attack_Unit(0x1, 2)>", "<Hold_Position()>"))
-    assert [c.action.name for c in joint.commands] == ["Move_Screen", "Hold_Position"]
+    assert names(joint) == ["Move_Screen", "Hold_Position"]
     assert len(joint.rejections["A"]) == 1
 
 
@@ -350,5 +371,5 @@ def test_commands_come_in_the_order_of_the_agents(
         "Stalkers": parse("<Move_Screen([12, 12])>"),
     }
     joint = Actor(config).joint(Observer(config).observe(world()), replies)
-    assert [c.said.team.team.agent for c in joint.commands] == ["Stalkers", "Zealots"]
+    assert [c.said.team.team.agent for c in joint.commands if c.said] == ["Stalkers", "Zealots"]
     assert all(isinstance(command, Command) for command in joint.commands)

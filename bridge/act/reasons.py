@@ -1,0 +1,164 @@
+"""Why the game does not let a unit do something, worked out from the state and from what is known of the ability.
+
+Each reason is a function that gives the end of a sentence for a model, or None; of several the first one of `REASONS`
+is told:
+
+    it is under construction · a structure, an addon or an upgrade is missing · energy · minerals, vespene, supply ·
+    its queue is full · it has no power · it is cooling down · the game does not allow it
+
+The last two are inferred: the game shows neither the cooldown of an ability nor all that it looks at.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, TypeAlias
+
+from bridge.knowledge import is_armed, knowledge, stand_ins
+from bridge.names import unit_name, upgrade_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from s2clientprotocol import raw_pb2
+
+    from bridge.functions import Function
+    from bridge.knowledge import AbilityFacts
+    from bridge.macro import Ledger
+    from bridge.snapshot import Snapshot
+
+ATTACK = 3674
+"""The general ability to attack."""
+QUEUE_LENGTH = 5
+"""Orders that a structure can hold, the one at work among them; with a Reactor 8."""
+WITH_REACTOR = 8
+FINISHED = 1.0
+"""Build progress of what is finished."""
+
+
+class Means:
+    """What a side has at one moment: its accounts, its structures, its upgrades."""
+
+    def __init__(self, snapshot: Snapshot, ledger: Ledger) -> None:
+        """Takes the state and what the turn may still spend."""
+        self._snapshot = snapshot
+        self.ledger = ledger
+
+    @functools.cached_property
+    def upgrades(self) -> frozenset[str]:
+        """Names of the upgrades that the player has."""
+        return frozenset(map(upgrade_name, self._snapshot.response.observation.raw_data.player.upgrade_ids))
+
+    @functools.cached_property
+    def standing(self) -> frozenset[str]:
+        """Types of the player's finished units and structures."""
+        return frozenset(unit_name(unit.unit_type) for unit in self._snapshot.own if unit.build_progress >= FINISHED)
+
+    def has(self, requirement: str) -> bool:
+        """Whether the side has a structure or an upgrade, or what may stand in for it."""
+        if requirement in knowledge():
+            return not self.standing.isdisjoint(stand_ins(requirement))
+        return requirement in self.upgrades
+
+    def addon(self, unit: raw_pb2.Unit) -> str:
+        """Type of what is attached to a unit; empty for nothing."""
+        found = self._snapshot.units.get(unit.add_on_tag)
+        return unit_name(found.unit_type) if found is not None else ""
+
+
+Reason: TypeAlias = "Callable[[Means, AbilityFacts, raw_pb2.Unit, str], str | None]"
+"""From means, ability, unit and the name of its type to the end of a sentence."""
+
+
+def under_construction(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """It is not there yet."""
+    if unit.build_progress >= FINISHED:
+        return None
+    return f"{name} is still under construction ({unit.build_progress:.0%})"
+
+
+def tech(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """A structure, an addon or an upgrade is missing, or the research is done."""
+    missing = [need for need in facts.requires if not means.has(need)]
+    if structures := [need for need in missing if need in knowledge()]:
+        return f"a finished {' and a '.join(structures)} is needed first"
+    if missing:
+        return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not researched"
+    if facts.researches and facts.researches in means.upgrades:
+        return f"{facts.researches} is researched already"
+    if facts.addon and not means.addon(unit).endswith(facts.addon):
+        return f"{name} needs a {facts.addon} for it"
+    return None
+
+
+def energy(_: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """It has too little energy."""
+    if facts.energy <= unit.energy:
+        return None
+    return f"{name} has {int(unit.energy)} energy and it takes {facts.energy:g}"
+
+
+def price(means: Means, facts: AbilityFacts, _: raw_pb2.Unit, name: str) -> str | None:
+    """Minerals, vespene or supply do not suffice, after what earlier calls of the turn took."""
+    prices = (
+        ("minerals", facts.minerals, means.ledger.minerals),
+        ("vespene", facts.vespene, means.ledger.vespene),
+        ("supply", supply(facts, name), means.ledger.supply),
+    )
+    for what, cost, account in prices:
+        left = max(account, 0.0)
+        if cost > left:
+            return f"it takes {cost:g} {what} and {left:g} {'are' if what == 'minerals' else 'is'} left"
+    return None
+
+
+def queue(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """Its queue of production is full."""
+    places = WITH_REACTOR if means.addon(unit).endswith("Reactor") else QUEUE_LENGTH
+    full = facts.does in ("train", "research") and len(unit.orders) >= places
+    return f"the queue of {name} is full" if full else None
+
+
+def power(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """No Pylon powers it."""
+    known = knowledge().get(name)
+    return f"{name} has no power" if known and known.needs_power and not unit.is_powered else None
+
+
+def cooldown(_: Means, facts: AbilityFacts, __: raw_pb2.Unit, name: str) -> str | None:
+    """It was used a short while ago."""
+    return f"{name} cannot again so soon, it takes {facts.cooldown_s:g} s after each use" if facts.cooldown_s else None
+
+
+def otherwise(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """Nothing that is known speaks against it, but the game does."""
+    doing = f" while it has {len(unit.orders)} orders" if len(unit.orders) > 1 else ""
+    return f"the game does not allow it to {name} now{doing}"
+
+
+REASONS: tuple[Reason, ...] = (under_construction, tech, energy, price, queue, power, cooldown, otherwise)
+"""In the order in which they are tried."""
+
+
+def is_attack(function: Function) -> bool:
+    """Whether a function attacks."""
+    return ATTACK in (function.ability_id, function.general_id)
+
+
+def incapable(function: Function, name: str) -> str:
+    """Why a type can never do it."""
+    return f"{name} has no weapon" if is_attack(function) and not is_armed(name) else f"{name} has no such ability"
+
+
+def supply(facts: AbilityFacts, name: str) -> float:
+    """Supply that a use adds: what a unit becomes counts only above its own."""
+    return _supply(facts.produces, facts.supply, name)
+
+
+@functools.cache
+def _supply(produces: str | None, whole: float, name: str) -> float:
+    made, before = knowledge().get(produces or ""), knowledge().get(name)
+    if made is None or made.structure:
+        return 0.0
+    own = before.supply if before is not None and not before.structure else 0.0
+    return max(whole - own, 0.0)

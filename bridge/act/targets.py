@@ -1,0 +1,179 @@
+"""At what an order is aimed: tags and points of a call → units and places of the world, or what is wrong with them.
+
+A team aims at what stands on its screen and at its own units wherever they are; a rule of `bridge.macro` may be told
+of anything that the side knows, such as a mineral field in the fog. Near misses of a tag are named, never taken: the
+wrong target may be the worst one. Knows no ability of the units that are to do it, except what their targets may be.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import raw_pb2
+
+from bridge.act.filters import unfit
+from bridge.act.refused import Refused
+from bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
+from bridge.names import unit_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bridge.act.recognise import Recognised
+    from bridge.frames import Camera
+    from bridge.observe.sight import Sight
+
+_SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
+_WHOSE = {raw_pb2.Self: "your own", raw_pb2.Ally: "your ally's", raw_pb2.Enemy: "an enemy", raw_pb2.Neutral: "nobody's"}
+SIMILAR = 0.8
+"""Similarity of two tags, 0 to 1, above which one may be a slip of the other; a digit of nine makes 0.9."""
+SHORTEST = 6
+"""Characters that a tag which was cut needs to be known by: `0x1008`."""
+
+
+class Targets:
+    """What can be aimed at, at the moment of a sight."""
+
+    def __init__(self, sight: Sight) -> None:
+        self._sight = sight
+        self._units = sight.snapshot.units
+
+    def named(self, said: Recognised) -> tuple[int, ...]:
+        """The units that the first arguments name.
+
+        Raises:
+            Refused: one of them is no unit of the team.
+        """
+        tags = said.tags[: said.action.named]
+        for tag in tags:
+            if tag not in said.team.team.tags:
+                raise self._not_of_team(said, tag)
+        return tuple(dict.fromkeys(tags))
+
+    def unit(self, said: Recognised) -> raw_pb2.Unit:
+        """The unit that the last tag names.
+
+        Raises:
+            Refused: there is none, it is dead or out of sight, or the action cannot be used on it.
+        """
+        tag, anywhere = said.tags[-1], said.action.rule is not None or said.team.camera is None
+        unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
+        if unit is None:
+            raise self._nowhere(said, tag)
+        if not (anywhere or tag in said.team.team.tags or _shows(said.team.camera, unit)):
+            raise self._out_of_sight(said, unit)
+        if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
+            what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit_name(unit.unit_type)}"
+            raise Refused("invalid_target", f"{what}; {said.action.name} needs {reason}.")
+        return unit
+
+    def place(self, said: Recognised) -> WorldPoint:
+        """The point among the arguments, in the world.
+
+        Raises:
+            Refused: it lies outside of its frame, or beyond the edge of the map.
+        """
+        return self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
+
+    # --- points -----------------------------------------------------------------------------------------------
+
+    def _screen_point(self, said: Recognised) -> WorldPoint:
+        name, camera = said.team.view.name, said.team.camera
+        if camera is None:
+            raise Refused("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
+        x, y = self._in_frame(said, "screen", camera.size, "minimap", self._sight.map.minimap_size)
+        point = camera.world(ScreenPoint(x, y))
+        if not self._sight.map.holds(point):
+            x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
+            inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
+        return point
+
+    def _minimap_point(self, said: Recognised) -> WorldPoint:
+        screen = 0.0 if said.team.camera is None else said.team.camera.size
+        x, y = self._in_frame(said, "minimap", self._sight.map.minimap_size, "screen", screen)
+        point = self._sight.map.world(MinimapPoint(x, y))
+        if not self._sight.map.holds(point):
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map.")
+        return point
+
+    def _in_frame(self, said: Recognised, frame: str, size: float, other: str, its_size: float) -> tuple[float, float]:
+        assert said.point is not None  # recognised by its form
+        x, y = said.point
+        if 0 <= x <= size and 0 <= y <= size:
+            return x, y
+        if not (0 <= x <= its_size and 0 <= y <= its_size):
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}.")
+        sister = said.action.name.replace(frame.capitalize(), other.capitalize())
+        agent = self._sight.agents[said.team.team.agent].agent
+        has_sister = sister in {action.name for action in agent.catalogue()}
+        hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
+        where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
+        raise Refused("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
+
+    # --- tags that are wrong ----------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _remembered(self) -> dict[int, raw_pb2.Unit]:
+        """What is there under the fog as far as the side knows: resources and structures that it saw once."""
+        return {unit.tag: unit for unit in self._sight.snapshot.response.observation.raw_data.units}
+
+    def _nowhere(self, said: Recognised, tag: int) -> Refused:
+        if tag in self._sight.snapshot.dead:
+            return Refused("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
+        wanted = said.action.target
+        fits = [unit.tag for unit in self._units.values() if self._may_be_meant(said, unit, wanted)]
+        hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
+        return Refused("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
+
+    def _may_be_meant(self, said: Recognised, unit: raw_pb2.Unit, wanted: str | None) -> bool:
+        if said.team.camera is not None and not _shows(said.team.camera, unit):
+            return False
+        return wanted is None or (unit.alliance == raw_pb2.Enemy) == (wanted == "enemy")
+
+    def _not_of_team(self, said: Recognised, tag: int) -> Refused:
+        name, own = said.team.view.name, said.team.team.tags
+        if tag in self._sight.snapshot.dead:
+            return Refused("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
+        units = f"units of team {name} are {', '.join(map(hex, own))}"
+        unit = self._units.get(tag)
+        if unit is None:
+            hint = self._near_miss(tag, own) or f"{units}."
+            return Refused("unknown_target", f"There is no unit {hex(tag)}; {hint}")
+        what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit_name(unit.unit_type)}"
+        if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
+            right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
+            return Refused("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
+        owner = self._team_of(tag)
+        whose = f" of team {owner}" if owner else ""
+        return Refused("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
+
+    def _team_of(self, tag: int) -> str | None:
+        teams = (team for agent in self._sight.agents.values() for team in agent.teams)
+        return next((team.view.name for team in teams if tag in team.team.tags), None)
+
+    def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
+        """The tag that was most likely meant, as the end of a sentence; None if none is like it."""
+        wanted, known = hex(tag), list(map(hex, tags))
+        cut = [one for one in known if len(wanted) >= SHORTEST and one.startswith(wanted)]
+        close = cut or difflib.get_close_matches(wanted, known, n=1, cutoff=SIMILAR)
+        if not close:
+            return None
+        unit = self._units[int(close[0], 16)]
+        return f"did you mean {close[0]} ({unit_name(unit.unit_type)})?"
+
+    def _out_of_sight(self, said: Recognised, unit: raw_pb2.Unit) -> Refused:
+        x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
+        what = f"{_SIDES[unit.alliance]} {unit_name(unit.unit_type)} {hex(unit.tag)}"
+        away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
+        return Refused("unknown_target", f"The {what} {away}; move there first.")
+
+
+def _shows(camera: Camera | None, unit: raw_pb2.Unit) -> bool:
+    """Whether a unit stands on a camera's screen."""
+    if camera is None:
+        return False
+    right, down, half = unit.pos.x - camera.x, camera.y - unit.pos.y, CAMERA_WIDTH / 2
+    return -half <= right < half and -half <= down < half

@@ -1,0 +1,76 @@
+"""Whether these very units may do it now: what the game says, and what the turn has left.
+
+The judge is the game (`Snapshot.abilities`), which is asked once an observation; why it says no is worked out by
+`bridge.act.reasons`. What earlier calls of the same turn took from the accounts is gone, so that a price can be refused
+that the game would still take. Where the game was not asked, only what is sure is refused: a weapon or an upgrade that
+is not there. Range is no reason, since units walk.
+
+What a target has to be is judged by `bridge.act.targets`. Above both is `bridge.act.translate`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from bridge.act.reasons import REASONS, Means, incapable, is_attack, price, supply
+from bridge.knowledge import ability_of, is_armed, upgrades
+from bridge.names import unit_name
+
+if TYPE_CHECKING:
+    from s2clientprotocol import raw_pb2
+
+    from bridge.action import Action
+    from bridge.functions import Function
+    from bridge.knowledge import AbilityFacts
+    from bridge.macro import Ledger
+    from bridge.snapshot import Snapshot
+
+
+class Obstacle(NamedTuple):
+    """What stands in the way of one unit."""
+
+    rank: int
+    """Place in the order of reasons; the higher, the nearer the unit is to being able."""
+    energy: float
+    """Of the unit: of two that have too little, the one that has more is spoken of."""
+    text: str
+    """The end of a sentence: `Stalker has no such ability`."""
+
+
+class Validity:
+    """What the units of a side may do at one moment, with the accounts of the turn."""
+
+    def __init__(self, snapshot: Snapshot, ledger: Ledger) -> None:
+        """Takes what the game said, and what the turn may still spend."""
+        self._abilities = snapshot.abilities
+        self._means = Means(snapshot, ledger)
+
+    def obstacle(self, action: Action, function: Function, unit: raw_pb2.Unit) -> Obstacle | None:
+        """What stands in the way of a unit's doing an action with this function now; None if nothing does."""
+        name = unit_name(unit.unit_type)
+        facts = ability_of(function.ability_id, name)
+        able = None if self._abilities is None else self._abilities.get(unit.tag)
+        if able is None or function.kind == "autocast":  # the game is not asked about switches
+            reason = self._surely_not(action, function, name, facts)
+            return None if reason is None else Obstacle(0, unit.energy, reason)
+        if function.ability_id in able:
+            dear = price(self._means, facts, unit, name) if facts else None
+            return None if dear is None else Obstacle(REASONS.index(price) + 1, unit.energy, dear)
+        if facts is None:
+            return Obstacle(0, unit.energy, incapable(function, name))
+        found = ((rank, reason(self._means, facts, unit, name)) for rank, reason in enumerate(REASONS, start=1))
+        return next(Obstacle(rank, unit.energy, text) for rank, text in found if text is not None)
+
+    def pay(self, function: Function, unit: raw_pb2.Unit) -> None:
+        """Takes what a unit's use of a function costs from the accounts of the turn."""
+        name = unit_name(unit.unit_type)
+        if facts := ability_of(function.ability_id, name):
+            self._means.ledger.pay(facts.minerals, facts.vespene, supply(facts, name))
+
+    def _surely_not(self, action: Action, function: Function, name: str, facts: AbilityFacts | None) -> str | None:
+        """What is sure without the game's word."""
+        if is_attack(function) and not is_armed(name):
+            return f"{name} has no weapon"
+        needs = {*(facts.requires if facts else ()), *((action.needs.upgrade,) if action.needs.upgrade else ())}
+        missing = [need for need in sorted(needs) if need in upgrades() and not self._means.has(need)]
+        return f"{missing[0]} is not researched" if missing else None
