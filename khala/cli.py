@@ -21,6 +21,9 @@ import orchestrator.cli
 import simulator.cli
 import simulator.install
 from khala import __version__
+from khala.actions import EPILOG as ACTIONS_EPILOG
+from khala.actions import actions
+from khala.knowledge.cli import app as knowledge
 from orchestrator import show
 from orchestrator.cli import Insecure, Json, Listen
 from orchestrator.config import MatchConfig, change, load_task, new_run_name
@@ -206,10 +209,12 @@ for command, epilog in (
     (orchestrator.cli.router, orchestrator.cli.ROUTER_EPILOG),
     (orchestrator.cli.replay, orchestrator.cli.REPLAY_EPILOG),
     (orchestrator.cli.tasks, None),
+    (actions, ACTIONS_EPILOG),
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
 app.add_typer(simulator.cli.app, name="sc2")
+app.add_typer(knowledge, name="knowledge")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

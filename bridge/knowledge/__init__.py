@@ -4,6 +4,7 @@
 
     model   the records                                words   fills numbers into sentences
     facts   reads what was generated, by version       load    facts and words together, once
+    prompt  the lines of a prompt                      lookup  everything, for people
 
 What happens in a running game is no knowledge but an observation: health, energy and the like of a unit come from
 there; here is what the game does not say of an enemy, and what an order would cost and need.
@@ -21,6 +22,7 @@ from bridge.knowledge.load import (
     upgrades,
 )
 from bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts, Weapon
+from bridge.knowledge.prompt import advice, short
 
 __all__ = [
     "RACES",
@@ -33,9 +35,11 @@ __all__ = [
     "Weapon",
     "abilities",
     "ability_of",
+    "advice",
     "buffs",
     "is_armed",
     "knowledge",
+    "short",
     "stand_ins",
     "upgrades",
 ]

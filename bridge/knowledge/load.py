@@ -129,13 +129,17 @@ def _filler(version: str) -> Filler:
 
 @functools.cache
 def _units(version: str) -> dict[str, UnitType]:
-    beaten_by: dict[str, list[str]] = {}
+    beaten_by = _beaten_by()
+    return {name: _described(kind, beaten_by.get(name, ()), version) for name, kind in unit_facts(version).items()}
+
+
+def _beaten_by() -> dict[str, tuple[str, ...]]:
+    """What counters a type, by name: first those that name it first among what they counter."""
+    found: dict[str, list[tuple[int, str]]] = {}
     for name, words in unit_words().items():
-        for other in words.beats:
-            beaten_by.setdefault(other, []).append(name)
-    return {
-        name: _described(kind, tuple(beaten_by.get(name, ())), version) for name, kind in unit_facts(version).items()
-    }
+        for rank, other in enumerate(words.beats):
+            found.setdefault(other, []).append((rank, name))
+    return {other: tuple(name for _, name in sorted(names)) for other, names in found.items()}
 
 
 def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> UnitType:

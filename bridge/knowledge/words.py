@@ -56,7 +56,7 @@ class Filler:
                 value = math.prod(self._value(name, record) for name in names.split("*"))
             except (LookupError, AttributeError, TypeError, ValueError) as error:
                 raise CatalogueError(f"the words about {record.name} speak of {match.group()}: no such fact") from error
-            return number((-value if sign else value) * (100 if percent else 1)) + percent
+            return rounded((-value if sign else value) * (100 if percent else 1)) + percent
 
         return " ".join(PLACEHOLDER.sub(found, text).split())
 
@@ -80,6 +80,11 @@ class Filler:
 def number(value: float) -> str:
     """A number without needless digits: 12, 12.5."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
+
+
+def rounded(value: float) -> str:
+    """A number as one says it, with three digits: 10.7 for 10.71, and 1440."""
+    return number(value) if value == int(value) else number(float(f"{value:.3g}"))
 
 
 def listed(names: tuple[str, ...]) -> str:

@@ -1,0 +1,80 @@
+"""`khala knowledge`: look up what agents are told of the game, and make it anew from the simulator's tables."""
+
+import json
+from typing import Annotated, Literal
+
+import typer
+
+from bridge.knowledge.facts import VERSIONS
+from bridge.knowledge.lookup import find, long
+from orchestrator.cli import Json
+from protocol.errors import KhalaError
+
+SHOW_EPILOG = """
+Examples:\n
+    khala knowledge show Stalker\n
+    khala knowledge show "siege tank" --version 5.0.13\n
+    khala knowledge show Effect_Blink\n
+    khala knowledge show 1442 --json
+"""
+WRITE_EPILOG = """
+Examples:\n
+    khala knowledge write\n
+    khala knowledge write --check
+"""
+
+app = typer.Typer(
+    help="What agents are told of unit types, abilities and upgrades: look it up, or make it anew.",
+    no_args_is_help=True,
+    add_completion=False,
+)
+
+Version = Annotated[
+    Literal["4.10", "5.0.13"], typer.Option(help="Version of the game: PySC2's names and numbers are those of 4.10.")
+]
+
+
+@app.command(epilog=SHOW_EPILOG)
+def show(
+    name: Annotated[str, typer.Argument(help="A unit type, an upgrade or an ability, or an ability's number.")],
+    *,
+    version: Version = "4.10",
+    as_json: Json = False,
+) -> None:
+    """Tell all that is known of NAME.
+
+    Names are PySC2's; upper case, blanks and underscores do not matter. What agents read of it in an observation is
+    shorter.
+    """
+    found = find(name, version)
+    if as_json:
+        typer.echo(json.dumps([one.model_dump(mode="json", exclude_defaults=True) for one in found]))
+    else:
+        typer.echo("\n".join(long(one, version) for one in found), nl=False)
+
+
+@app.command(epilog=WRITE_EPILOG)
+def write(
+    *,
+    version: Annotated[
+        Literal["4.10", "5.0.13"] | None, typer.Option(help="Only of this version of the game.", show_default="all")
+    ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Write nothing; fail if a file is out of date.")] = False,
+) -> None:
+    """Make the facts in bridge/data/knowledge anew from the simulator's tables.
+
+    To be done after a change of the tables: one line is one unit type, ability, upgrade or buff. Words about them, in
+    bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts by themselves.
+    """
+    from khala.knowledge import files  # noqa: PLC0415  # the tables and PySC2's names: seconds that --help need not wait
+
+    versions = [version] if version else VERSIONS
+    if not check:
+        for path in (path for one in versions for path in files.write(one)):
+            typer.echo(f"wrote {path}")
+    elif old := [f"{one}/{name}" for one in versions for name in files.outdated(one)]:
+        raise OutOfDate(f"out of date in bridge/data/knowledge: {', '.join(old)}; `khala knowledge write` makes them")
+
+
+class OutOfDate(KhalaError):
+    """Files of facts do not say what the tables say."""
