@@ -1,39 +1,36 @@
 """The catalogue of text actions: those that were written by hand, and those that follow from PySC2's functions.
 
 The files of `bridge/data/actions/` hold the actions of the paper and others that deserve words of their own;
-`bridge.generated` makes one of every function that none of them stands for, and the forms for a single unit. The
-whole is checked while it is loaded. It does not import PySC2: that PySC2 has every function that is named here is
-checked where a game starts.
+`bridge.generated` makes one of every function that none of them stands for, and the forms for a single unit. What
+contradicts itself or PySC2's functions is found while the whole is loaded. It does not import PySC2: that PySC2 has
+every function that is named here is checked where a game starts.
 """
 
 from __future__ import annotations
 
+import difflib
 import functools
 import hashlib
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from bridge import data
 from bridge.action import GROUP_SELECTOR, Action, ArgKind
+from bridge.actionfault import fault
 from bridge.errors import CatalogueError
-from bridge.functions import functions
 from bridge.generated import generated
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
 
-__all__ = ["Action", "ArgKind", "alias_of", "catalogue", "catalogue_sha256", "chosen", "curated"]
+__all__ = ["Action", "ArgKind", "alias_of", "catalogue", "catalogue_sha256", "chosen", "curated", "example", "read"]
 
 DIRECTORY = "actions"
-_TARGETS: dict[str, frozenset[ArgKind | None]] = {
-    "quick": frozenset({None}),
-    "autocast": frozenset({None}),
-    "screen": frozenset({"tag", "screen", "minimap"}),
-    "minimap": frozenset({"minimap"}),
-    "interface": frozenset({None}),
-}
-"""What the target of an action may be, by the kind of the function that it ends in."""
+_KEY = re.compile(r"  (\w+):")
+"""Begins an action in a file."""
 
 
 @functools.cache
@@ -44,9 +41,12 @@ def catalogue() -> dict[str, Action]:
         CatalogueError: an entry contradicts another one or PySC2's functions.
     """
     written = curated()
-    found = dict(written)
+    found, spellings = dict(written), _Spellings()
+    for action in written.values():
+        spellings.add(action)
     for action in generated(written):
-        _check(action, found, "made by rule")
+        if wrong := spellings.add(action) or fault(action):
+            raise CatalogueError(f"text action {action.name}, made by rule: {wrong}")
         found[action.name] = action
     return found
 
@@ -58,31 +58,55 @@ def curated() -> dict[str, Action]:
     Raises:
         CatalogueError: an entry contradicts another one or PySC2's functions.
     """
+    return read(*sorted(data.path(DIRECTORY).glob("*.yaml")))
+
+
+def read(*files: Path) -> dict[str, Action]:
+    """The actions of some files, by name, in their order.
+
+    Raises:
+        CatalogueError: what is wrong, with the file and the line in which the action begins.
+    """
     found: dict[str, Action] = {}
-    for file in _files():
-        for action in _read(file):
-            _check(action, found, file)
-            found[action.name] = action
+    spellings = _Spellings()
+    for file in files:
+        page = data.document(file)
+        lines = _lines(file)
+        for name, fields in page["actions"].items():
+            place = f"{file.name}:{lines[name][-1]}: text action {name}"
+            action = _action(place, {**page.get("common", {}), **fields, "name": name})
+            if wrong := _twice(lines[name]) or spellings.add(action) or fault(action):
+                raise CatalogueError(f"{place}: {wrong}")
+            found[name] = action
     return found
 
 
-def _read(file: str) -> Iterable[Action]:
-    """The actions of a file: each has the fields that stand under `common`, and its own."""
-    page = data.document(file)
-    for name, fields in page["actions"].items():
-        try:
-            yield Action.model_validate({**page["common"], **fields, "name": name})
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            place = ".".join(map(str, first["loc"]))
-            raise CatalogueError(f"text action {name} ({file}): {place}: {first['msg']}") from None
+def _action(place: str, fields: dict[str, Any]) -> Action:
+    try:
+        return Action.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise CatalogueError(f"{place}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+
+
+def _lines(file: Path) -> dict[str, list[int]]:
+    """Numbers of the lines in which actions begin, by name."""
+    found: dict[str, list[int]] = {}
+    for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
+        if match := _KEY.match(line):
+            found.setdefault(match[1], []).append(number)
+    return found
+
+
+def _twice(lines: list[int]) -> str | None:
+    """YAML takes the last of several equal keys without a word."""
+    return f"it stands in line {lines[0]} as well" if len(lines) > 1 else None
 
 
 @functools.cache
 def _by_any_name() -> dict[str, Action]:
     names = {action.name.casefold(): action for action in catalogue().values()}
-    aliases = {alias.casefold(): action for action in catalogue().values() for alias in action.aliases}
-    return aliases | names
+    return names | {alias.casefold(): action for action in catalogue().values() for alias in action.aliases}
 
 
 def alias_of(name: str) -> Action | None:
@@ -94,12 +118,12 @@ def chosen(names: Iterable[str], unit_type: str | None = None) -> tuple[str, ...
     """Names of actions, with each `group:<name>` replaced by the actions of that group, each once.
 
     Args:
-        names: names of actions and groups.
+        names: names of actions and groups; `group:<name>/<race>` takes only those of one race and of every race.
         unit_type: of a group only what units of this type have, and no more than they are told one by one; None for
             the actions of a side.
 
     Raises:
-        ValueError: there is no such group.
+        ValueError: there is no such group, or a side is given actions of several races.
     """
     found: dict[str, None] = {}
     for name in names:
@@ -110,14 +134,32 @@ def chosen(names: Iterable[str], unit_type: str | None = None) -> tuple[str, ...
     return tuple(found)
 
 
-def _of_group(group: str, unit_type: str | None) -> list[str]:
-    members = [action for action in catalogue().values() if action.group == group]
+def _of_group(selector: str, unit_type: str | None) -> Iterator[str]:
+    group, _, race = selector.partition("/")
+    members = [action for action in catalogue().values() if action.group == group and race in ("", action.race or race)]
     if not members:
-        groups = ", ".join(dict.fromkeys(action.group for action in catalogue().values()))
-        raise ValueError(f"there is no group of actions '{group}', there are {groups}")
-    if unit_type is None:
-        return [action.name for action in members if action.subject == "side"]
-    return [action.name for action in members if action.subject != "side" and action.fits(unit_type)]
+        known = dict.fromkeys(action.group for action in catalogue().values())
+        raise ValueError(
+            f"there is no group of actions '{selector}'{_close(group, known)}, there are {', '.join(known)}"
+        )
+    if unit_type is not None:
+        return (action.name for action in members if action.subject != "side" and action.fits(unit_type))
+    ours = [action for action in members if action.subject == "side"]
+    if len(races := sorted({action.race for action in ours if action.race})) > 1:
+        raise ValueError(f"group '{group}' has actions of {', '.join(races)}: write group:{group}/{races[0]}")
+    return (action.name for action in ours)
+
+
+def _close(name: str, known: Iterable[str]) -> str:
+    found = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean '{found[0]}'?)" if found else ""
+
+
+def example(action: Action) -> str:
+    """A call as an agent would write it, with made-up arguments."""
+    tags = iter(("0x1002c0001", "0x100340002"))
+    points = {"screen": "[15, 9]", "minimap": "[40, 25]"}
+    return f"<{action.name}({', '.join(points.get(kind) or next(tags) for kind in action.args)})>"
 
 
 def catalogue_sha256() -> str:
@@ -128,27 +170,16 @@ def catalogue_sha256() -> str:
     return digest.hexdigest()
 
 
-def _files() -> list[str]:
-    return [f"{DIRECTORY}/{file.name}" for file in sorted(data.path(DIRECTORY).glob("*.yaml"))]
+class _Spellings:
+    """Every name and alias so far, in any case of letters."""
 
+    def __init__(self) -> None:
+        self._owners: dict[str, str] = {}
 
-def _check(action: Action, others: dict[str, Action], source: str) -> None:
-    """Raises `CatalogueError` if an action cannot be what it says."""
-    if fault := _fault(action, others):
-        raise CatalogueError(f"text action {action.name} ({source}): {fault}")
-
-
-def _fault(action: Action, others: dict[str, Action]) -> str | None:
-    function = action.function and functions().get(action.function)
-    named = action.args[: action.named]
-    faults = {
-        "there are two of this name": action.name in others,
-        f"one of its aliases is the name of another one: {action.aliases}": any(a in others for a in action.aliases),
-        f"it names {action.named} unit(s) first, which are tags": named != ("tag",) * action.named,
-        f"it has more than one target: {action.args}": len(action.args) > action.named + 1,
-        f"PySC2 has no function {action.function}": action.function is not None and not function,
-        f"{action.function} takes no {action.target_kind or 'order without a target'}": (
-            action.rule is None and function and action.target_kind not in _TARGETS[function.kind]
-        ),
-    }
-    return next((fault for fault, is_so in faults.items() if is_so), None)
+    def add(self, action: Action) -> str | None:
+        """Takes an action's names; what is wrong if another one has one of them."""
+        for name in (action.name, *action.aliases):
+            owner = self._owners.setdefault(name.casefold(), action.name)
+            if owner != action.name or (name != action.name and name.casefold() == action.name.casefold()):
+                return f"the name {name} is already that of {owner}"
+        return None

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.pages import cli, configs, game, language, messages, rules, simulator
+from docs.pages import actions, cli, configs, game, language, messages, rules, simulator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +23,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "messages.md": messages.page,
     "text-language.md": language.page,
     "tasks.md": game.tasks,
-    "actions.md": game.actions,
+    "actions.md": actions.actions,
+    "functions.md": actions.functions,
     "units.md": game.units,
     "maps.md": game.maps,
     "task-files.md": configs.task_files,

@@ -27,8 +27,8 @@ def path(name: str) -> Path:
     return _HERE / name
 
 
-def document(name: str) -> Any:
-    """What stands in a YAML file."""
+def document(name: str | Path) -> Any:
+    """What stands in a YAML file, here or somewhere else."""
     return yaml.load(path(name).read_bytes(), Loader=_LOADER)  # noqa: S506  # a safe loader in both cases
 
 

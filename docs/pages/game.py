@@ -1,11 +1,10 @@
-"""The pages of what is played: tasks, actions, units and maps. Out of the data of the bridge and the simulator."""
+"""The pages of what is played: tasks, units and maps. Out of the data of the bridge and the simulator."""
 
 from __future__ import annotations
 
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from bridge.catalog import catalogue
 from bridge.knowledge import RACES, knowledge
 from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
@@ -15,7 +14,6 @@ from simulator.maps import MapError, load_map
 from simulator.tick import new_game
 
 if TYPE_CHECKING:
-    from bridge.action import Action
     from bridge.knowledge import UnitType, Weapon
     from bridge.maps import MapSpec
     from bridge.task import AgentConfig, TaskConfig
@@ -38,27 +36,6 @@ def tasks() -> str:
         "without a task file is played by one commander of all units, with every action that they have.",
         table(("task", "agents", "about"), overview),
         *(_task(task) for task in found if task.name in written),
-    )
-
-
-def actions() -> str:
-    """The catalogue of text actions."""
-    rows = [
-        (code(action.form), action.about, _who(action), _target(action), _needs(action), *_function(action))
-        for action in catalogue().values()
-    ]
-    return join(
-        head("Actions", "`bridge/data/actions`"),
-        "What an agent may say between `<` and `>`. A task lists the ones that each of its unit types has. How calls "
-        "are read: [the text language](text-language.md).",
-        table(
-            ("action", "meaning", "who", "target", "needs", "function", "queued"),
-            rows,
-        ),
-        "* `tag` is a unit's tag as the observation gives it, `screen` a point `[x, y]` of the team's screen, "
-        "`minimap` a point of the whole map.\n"
-        "* *Raw* and *screen function* are PySC2's, for the two executors.\n"
-        "* *Queued* ones wait for the orders that the unit was given earlier in the same reply.",
     )
 
 
@@ -121,24 +98,6 @@ def _teams(agent: AgentConfig) -> list[tuple[str, str, str, str]]:
         )
         for team in agent.teams
     ]
-
-
-def _who(action: Action) -> str:
-    subject = "one unit of the team" if action.subject == "unit" else "the team"
-    return f"{subject}, {', '.join(action.units)} only" if action.units else subject
-
-
-def _target(action: Action) -> str:
-    return {"enemy": "an enemy", "own": "an own unit", None: ""}[action.target]
-
-
-def _needs(action: Action) -> str:
-    weapon = "a weapon" if action.needs.weapon else ""
-    return f"upgrade {action.needs.upgrade}" if action.needs.upgrade else weapon
-
-
-def _function(action: Action) -> tuple[str, str]:
-    return code(action.function) if action.function else "", "yes" if action.queue else ""
 
 
 def _race(race: str) -> str:

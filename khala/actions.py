@@ -1,0 +1,146 @@
+"""The command `khala actions`: what agents can say, who carries it out, and which of PySC2's functions it ends in.
+
+It loads no PySC2. What is wrong on the user's side is raised as a `ConfigError` of one sentence, as in the other
+commands; `khala.cli` prints it.
+"""
+
+import difflib
+import json
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from bridge.catalog import Action, catalogue, example
+from bridge.coverage import coverage
+from bridge.functions import functions
+from bridge.knowledge import knowledge
+from orchestrator.cli import Json
+from protocol.errors import ConfigError
+
+EPILOG = """
+Examples:\n
+    khala actions --unit Stalker\n
+    khala actions --race terran --group macro\n
+    khala actions --name storm\n
+    khala actions --function Effect_Blink_screen\n
+    khala actions --race zerg --json
+"""
+MANY = 9
+"""Unit types that are named one by one; of more, the first ones are."""
+
+
+def actions(
+    *,
+    race: Annotated[
+        Literal["protoss", "terran", "zerg"] | None, typer.Option(help="Only of this race, or of every race.")
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="Only what units of this type can be told.", metavar="TYPE")] = None,
+    group: Annotated[str | None, typer.Option(help="Only of this group: basic, skill, build, …")] = None,
+    name: Annotated[str | None, typer.Option(help="Only with this in the name or an alias.", metavar="TEXT")] = None,
+    function: Annotated[
+        str | None, typer.Option(help="Only what ends in this function of PySC2, by name or number.")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="All, where else only the groups would be listed.")] = False,
+    as_json: Json = False,
+) -> None:
+    """List what agents can say, with arguments, meaning and an example call.
+
+    Without an option: the groups, and how many actions are in them. A task gives an agent single actions or whole
+    groups, as `group:skill` or, for the actions of a side, `group:train/protoss`.
+
+    `generated` are those that follow from PySC2's functions: one for every function that no other action stands for,
+    and `Select_Unit_<name>` for what a whole team can be told, to tell it to one unit.
+    """
+    known = catalogue().values()
+    _check(unit, knowledge(), "unit type")
+    _check(group, {action.group for action in known}, "group")
+    wanted = _function(function)
+    found = [
+        action
+        for action in known
+        if (race is None or action.race in (None, race))
+        and (unit is None or action.fits(unit))
+        and (group is None or action.group == group)
+        and (name is None or any(name.casefold() in each.casefold() for each in (action.name, *action.aliases)))
+        and (wanted is None or action.function == wanted)
+    ]
+    console = Console()
+    if as_json:
+        typer.echo(json.dumps({"actions": [_plain(action) for action in found]}))
+    elif not (everything or race or unit or group or name or function):
+        console.print(_groups(known))
+        console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them", highlight=False)
+    else:
+        console.print(_listed(found) if found else _none(wanted), highlight=False)
+
+
+def _check(given: str | None, known: Iterable[str], what: str) -> None:
+    names = sorted(known)
+    if given is None or given in names:
+        return
+    close = difflib.get_close_matches(given, names, n=1)
+    raise ConfigError(f"there is no {what} '{given}'" + (f", did you mean '{close[0]}'?" if close else ""))
+
+
+def _function(given: str | None) -> str | None:
+    """The name of a function that is given by name or number."""
+    if given is not None and given.isdecimal():
+        given = next((each.name for each in functions().values() if each.id == int(given)), given)
+    _check(given, functions(), "function of PySC2")
+    return given
+
+
+def _none(function: str | None) -> str:
+    reasons = {each.function.name: each.reason for each in coverage()}
+    return f"no action ends in {function}: {reasons[function]}" if function and reasons[function] else "no action fits"
+
+
+def _groups(known: Iterable[Action]) -> Table:
+    table = _table("group", "race", "actions", "such as")
+    table.columns[2].justify = "right"
+    counted: dict[tuple[str, str], list[Action]] = {}
+    for action in known:
+        counted.setdefault((action.group, action.race or "every race"), []).append(action)
+    order = list(dict.fromkeys(group for group, _ in counted))
+    for (group, race), members in sorted(counted.items(), key=lambda item: order.index(item[0][0])):
+        table.add_row(group, race, str(len(members)), example(members[0]))
+    return table
+
+
+def _listed(found: list[Action]) -> Table:
+    table = _table("action, example", "what it does", "who", "PySC2's function")
+    for action in found:
+        table.add_row(
+            f"{action.name}({', '.join(action.args)})\n[dim]{escape(example(action))}[/]",
+            escape(action.about),
+            _who(action),
+            "" if action.pysc2 is None else f"{action.pysc2.name}\n[dim]{action.pysc2.id}[/]",
+        )
+    return table
+
+
+def _who(action: Action) -> str:
+    shown = ", ".join(action.units[:MANY]) + (f" and {more} more" if (more := len(action.units) - MANY) > 0 else "")
+    subject = {"team": "team", "unit": "one unit", "two_units": "two units", "side": "the side's"}[action.subject]
+    return f"[dim]{subject}:[/] {shown or 'any'}"
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _plain(action: Action) -> dict[str, Any]:
+    return dict(_fields(action))
+
+
+def _fields(action: Action) -> Iterator[tuple[str, Any]]:
+    yield from action.model_dump(mode="json", exclude={"needs"}).items()
+    yield "function_id", None if action.pysc2 is None else action.pysc2.id
+    yield "example", example(action)
