@@ -6,6 +6,9 @@
 `observe` is everything from a snapshot to views and text of one agent with its teams, all units in sight of all
 teams, half of them hurt since the turn before. `act` is everything from the text of a reply, with three calls for
 each team, to commands. No game runs; the snapshots are made here.
+
+The last rows are a full game's twelve agents with 15 teams and 100 units, half of them enemies: in one place, where
+every team sees all of them, and at four places, which is what a fight of many fronts looks like. The aim is 8 ms.
 """
 
 from __future__ import annotations
@@ -20,9 +23,12 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act import Actor
+from bridge.functions import general
 from bridge.knowledge import knowledge
+from bridge.names import unit_name
 from bridge.observe import Observer
 from bridge.snapshot import Snapshot
+from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from orchestrator.config import load_task
 from protocol.speech import parse
 
@@ -32,6 +38,26 @@ BATTLES = {  # task: own units, enemy units
     "2c_vs_64zg": ({"Colossus": 2}, {"Zergling": 64}),
 }
 ROUNDS = 200
+
+GROUPS = {  # a full game's combat groups: teams and their types, as in the paper's appendix D
+    "CombatGroup0": {"Zealot-1": "Zealot"},
+    "CombatGroup1": {"Stalker-1": "Stalker"},
+    "CombatGroup2": {"Immortal-1": "Immortal", "Colossus-1": "Colossus", "Archon-1": "Archon"},
+    "CombatGroup3": {"VoidRay-1": "VoidRay", "Carrier-1": "Carrier"},
+    "CombatGroup4": {"Observer": "Observer"},
+    "CombatGroup5": {"HighTemplar-1": "HighTemplar"},
+    "CombatGroup6": {"Sentry-1": "Sentry"},
+    "CombatGroup7": {"Adept-1": "Adept"},
+    "CombatGroup8": {"Phoenix-1": "Phoenix"},
+    "CombatGroup9": {"WarpPrism": "WarpPrism"},
+}
+FULL_GAME = (
+    {
+        "Zealot": 10, "Stalker": 12, "Immortal": 3, "Colossus": 2, "Archon": 2, "VoidRay": 3, "Carrier": 1,
+        "Observer": 1, "HighTemplar": 3, "Sentry": 3, "Adept": 5, "Phoenix": 4, "WarpPrism": 1,
+    },
+    {"Zergling": 24, "Roach": 12, "Hydralisk": 8, "Mutalisk": 6},
+)  # fmt: skip
 
 
 def army(units: dict[str, int], alliance: int, first: int, hurt: float) -> list[raw_pb2.Unit]:
@@ -56,15 +82,66 @@ def army(units: dict[str, int], alliance: int, first: int, hurt: float) -> list[
     return made
 
 
-def snapshot(own: dict[str, int], foes: dict[str, int], loop: int) -> Snapshot:
+def snapshot(own: dict[str, int], foes: dict[str, int], loop: int, size: int = 32) -> Snapshot:
     response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
     observation = response.observation
     observation.game_loop = loop
     hurt = float(loop % 2 * 7)
     observation.raw_data.units.extend(army(own, raw_pb2.Self, 0x400, hurt) + army(foes, raw_pb2.Enemy, 0x800, hurt))
-    for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
-        size.x = size.y = 32
+    for corner in (info.start_raw.map_size, info.start_raw.playable_area.p1):
+        corner.x = corner.y = size
     return Snapshot(response=response, info=info)
+
+
+def full_game() -> TaskConfig:
+    """The agents of a full game with standard control: Commander, Developer and ten combat groups."""
+    leaders = [
+        AgentConfig(name=name, role=name, kind=kind, teams=(TeamConfig(name="Empty", kind="side", actions=actions),))
+        for name, kind, actions in (
+            ("Commander", "commander", ("No_Operation",)),
+            ("Developer", "developer", ("group:train", "group:research")),
+        )
+    ]
+    fighters = [
+        AgentConfig(
+            name=name,
+            role=name,
+            teams=tuple(TeamConfig(name=team, unit_types=(unit,)) for team, unit in teams.items()),
+            actions=dict.fromkeys(teams.values(), ("group:basic", "group:skill")),
+        )
+        for name, teams in GROUPS.items()
+    ]
+    return TaskConfig(name="full_game", map="2s3z", task="Destroy the enemy.", agents=(*leaders, *fighters))
+
+
+def crowd(places: int, loop: int) -> Snapshot:
+    """100 units at some places, those of a type spread over all of them, with the abilities that they would have."""
+    made = snapshot(*FULL_GAME, loop, size=128)
+    for index, unit in enumerate(made.response.observation.raw_data.units):
+        place = index % places
+        unit.pos.x, unit.pos.y = 24 + 64 * (place % 2) + index % 10, 24 + 64 * (place // 2) + index // 10
+    able = {unit.tag: frozenset(knowledge()[unit_name(unit.unit_type)].ability_ids) for unit in made.own}
+    generals = {tag: numbers | frozenset(map(general, numbers)) for tag, numbers in able.items()}
+    return Snapshot(response=made.response, info=made.info, abilities=generals)
+
+
+def measure_full_game(places: int) -> dict[str, Any]:
+    """What one observation of all twelve agents costs."""
+    observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
+    observe_ms = []
+    sight = observer.observe(snapshots[1])
+    for round_ in range(ROUNDS):
+        began = time.perf_counter()
+        sight = observer.observe(snapshots[round_ % 2])
+        observe_ms.append(1000 * (time.perf_counter() - began))
+    return {
+        "units": len(snapshots[0].units),
+        "teams": sum(len(agent.teams) for agent in sight.agents.values()),
+        "text_kB": round(sum(len(agent.text) for agent in sight.agents.values()) / 1000, 1),
+        "observe_ms": round(statistics.median(observe_ms), 2),
+        "observe_p95_ms": round(statistics.quantiles(observe_ms, n=20)[-1], 2),
+        "act_ms": "",
+    }
 
 
 def measure(name: str) -> dict[str, Any]:
@@ -103,13 +180,14 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     results = {name: measure(name) for name in BATTLES}
+    results |= {"12 in one place": measure_full_game(1), "12 at four": measure_full_game(4)}
     if options.parse_args().json:
         print(json.dumps(results))
         return
     columns = list(results["2s3z"])
-    print("  ".join(f"{column:>14}" for column in ("battle", *columns)))
+    print("  ".join(f"{column:>16}" for column in ("battle", *columns)))
     for name, result in results.items():
-        print("  ".join(f"{value:>14}" for value in (name, *(result[column] for column in columns))))
+        print("  ".join(f"{value:>16}" for value in (name, *(result[column] for column in columns))))
 
 
 if __name__ == "__main__":

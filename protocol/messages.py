@@ -62,11 +62,18 @@ class Frozen(BaseModel):
         For inner loops only: it takes 1 µs where `model_copy` takes 6, and a joint step of 128 agents makes 3500.
         """
         copy = object.__new__(type(self))
-        object.__setattr__(copy, "__dict__", self.__dict__ | changes)
-        object.__setattr__(copy, "__pydantic_fields_set__", self.__pydantic_fields_set__)
-        object.__setattr__(copy, "__pydantic_extra__", None)
-        object.__setattr__(copy, "__pydantic_private__", None)
+        _set_fields(copy, {**self.__dict__, **changes})
+        _set_fields_set(copy, self.__pydantic_fields_set__)
+        _set_extra(copy, None)
+        _set_private(copy, None)
         return copy
+
+
+_set_fields, _set_fields_set, _set_extra, _set_private = (
+    vars(BaseModel)[slot].__set__
+    for slot in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
+)
+"""The slots of a model: set through them, a frozen one is made in half of the time that `object.__setattr__` takes."""
 
 
 class Wire(Frozen):
@@ -132,6 +139,22 @@ class OrderView(Frozen):
     """How far it is, 0 to 1, of what is trained, researched or morphed; None while there is nothing to tell."""
 
 
+class UnitDetails(Frozen):
+    """What only some units have."""
+
+    passengers: tuple[str, ...] = ()
+    """Types of the units inside; own units only."""
+    cargo_max: int = 0
+    """Room for passengers; 0 for those that carry none, and for others' units."""
+    burrowed: bool = False
+    unpowered: bool = False
+    """An own structure that does nothing for want of a power field."""
+    contents: int | None = None
+    """Minerals or vespene left in a resource."""
+    harvesters: tuple[int, int] | None = None
+    """Workers that an own base or gas structure has, and how many it has work for."""
+
+
 class UnitView(Frozen):
     """One unit in sight of a team, in the team's screen frame."""
 
@@ -162,17 +185,8 @@ class UnitView(Frozen):
     """Name of the order it follows; own units only."""
     orders: tuple[OrderView, ...] = ()
     """The order that it follows, and those that wait behind it."""
-    passengers: tuple[str, ...] = ()
-    """Types of the units inside; own units only."""
-    cargo_max: int = 0
-    """Room for passengers; 0 for those that carry none, and for others' units."""
-    burrowed: bool = False
-    unpowered: bool = False
-    """An own structure that does nothing for want of a power field."""
-    contents: int | None = None
-    """Minerals or vespene left in a resource."""
-    harvesters: tuple[int, int] | None = None
-    """Workers that an own base or gas structure has, and how many it has work for."""
+    details: UnitDetails | None = None
+    """What only some units have; None for all others."""
 
 
 class Event(Frozen):
@@ -196,7 +210,9 @@ class Offer(Frozen):
     vespene: int = 0
     supply: float = 0.0
     times: int = Field(ge=0)
-    """How often it could be paid for now."""
+    """How often it could be paid for now; what is researched is researched once."""
+    footprint: tuple[int, int] | None = None
+    """Width and height of the ground that it takes, in world units; None for what is not built."""
     first: bool = False
     """Whether it makes a structure of which there is none yet."""
 
@@ -467,6 +483,10 @@ class Usage(Frozen):
     """None if no price is known for the model."""
     unknown_requests: int = 0
     """Requests that were cancelled or failed, whose tokens nobody told us."""
+    images: int = 0
+    """Pictures that were sent along."""
+    image_tokens: int = 0
+    """The part of `prompt_tokens` that they took, as the model file's rule estimates it."""
 
     def __add__(self, other: Usage) -> Usage:
         costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
@@ -478,6 +498,8 @@ class Usage(Frozen):
             reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
             cost_usd=sum(costs) if costs else None,
             unknown_requests=self.unknown_requests + other.unknown_requests,
+            images=self.images + other.images,
+            image_tokens=self.image_tokens + other.image_tokens,
         )
 
 

@@ -7,13 +7,13 @@ screen is the business of `bridge.observe.scene`, which is above; below are name
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import raw_pb2
 
 from bridge.knowledge import is_armed, knowledge
 from bridge.names import buff_name, order_name, unit_name
-from protocol.messages import LOOPS_PER_S, OrderView, UnitView
+from protocol.messages import LOOPS_PER_S, OrderView, UnitDetails, UnitView
 
 if TYPE_CHECKING:
     from bridge.frames import MapFrame
@@ -45,6 +45,7 @@ class Body:
 def body(unit: raw_pb2.Unit, world: MapFrame) -> Body:
     """The body of a unit; orders, passengers and weapons are told of the player's own ones only."""
     name, x, y = unit_name(unit.unit_type), unit.pos.x, unit.pos.y
+    more = _own(unit, name, world) if unit.alliance == raw_pb2.Self else {}
     view = _BLANK.but(
         tag=hex(unit.tag),
         type=name,
@@ -58,31 +59,37 @@ def body(unit: raw_pb2.Unit, world: MapFrame) -> Body:
         build_progress=round(unit.build_progress, 2),
         flying=unit.is_flying,
         cloaked=unit.cloak in _CLOAKED,
-        burrowed=unit.is_burrowed,
         hallucination=unit.is_hallucination,
         buffs=tuple(map(buff_name, unit.buff_ids)),
+        details=_details(unit, name),
+        **more,
     )
-    if unit.alliance == raw_pb2.Self:
-        view = view.but(**_own(unit, name, world))
-    elif contents := unit.mineral_contents or unit.vespene_contents:
-        view = view.but(contents=contents)
     return Body(unit.tag, x, y, name, unit.alliance, view)
 
 
 def _own(unit: raw_pb2.Unit, name: str, world: MapFrame) -> dict[str, object]:
-    """What is known of a player's own unit besides."""
-    orders = tuple(_order(order, world) for order in unit.orders)
-    more: dict[str, object] = {"orders": orders, "order": orders[0].name if orders else None}
-    if is_armed(name):
-        more["weapon_cooldown_s"] = round(unit.weapon_cooldown / LOOPS_PER_S, 2)
-    if unit.cargo_space_max:
-        more["cargo_max"] = unit.cargo_space_max
-        more["passengers"] = tuple(sorted(unit_name(passenger.unit_type) for passenger in unit.passengers))
-    if unit.ideal_harvesters:
-        more["harvesters"] = (unit.assigned_harvesters, unit.ideal_harvesters)
-    if unit.build_progress >= 1 and not unit.is_powered and name in knowledge():
-        more["unpowered"] = knowledge()[name].needs_power
-    return more
+    """What is told of a player's own units besides."""
+    orders = tuple([_order(order, world) for order in unit.orders])
+    cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed(name) else None
+    return {"orders": orders, "order": orders[0].name if orders else None, "weapon_cooldown_s": cooldown_s}
+
+
+def _details(unit: raw_pb2.Unit, name: str) -> UnitDetails | None:
+    """What only some units have."""
+    found: dict[str, Any] = {}
+    if unit.is_burrowed:
+        found["burrowed"] = True
+    if contents := unit.mineral_contents or unit.vespene_contents:
+        found["contents"] = contents
+    if unit.alliance == raw_pb2.Self:
+        if unit.cargo_space_max:
+            found["cargo_max"] = unit.cargo_space_max
+            found["passengers"] = tuple(sorted(unit_name(passenger.unit_type) for passenger in unit.passengers))
+        if unit.ideal_harvesters:
+            found["harvesters"] = (unit.assigned_harvesters, unit.ideal_harvesters)
+        if not unit.is_powered and unit.build_progress >= 1 and name in knowledge() and knowledge()[name].needs_power:
+            found["unpowered"] = True
+    return UnitDetails(**found) if found else None
 
 
 _NO_ORDER = OrderView(name="")

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 from s2clientprotocol import raw_pb2
 
 from bridge.knowledge import knowledge
+from bridge.observe.events import event
 from protocol.messages import EnemyCount, Event
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from bridge.observe.body import Body
-    from bridge.observe.events import EventKind
-    from protocol.messages import Alliance, Point, UnitView
+    from protocol.messages import Point, UnitView
 
 PASSING = frozenset(
     {
@@ -84,8 +84,8 @@ class Chronicle:
         new = self._new_enemies(bodies)
         killed = self._killed(gone)
         if self._count:
-            made = [_event("finished", view) for tag, view in finished.items() if tag not in self._finished]
-            lost = [_event("died", view) for tag, view in self._finished.items() if tag in gone]
+            made = [event("finished", view, "own") for tag, view in finished.items() if tag not in self._finished]
+            lost = [event("died", view, "own") for tag, view in self._finished.items() if tag in gone]
             learnt = [name for name in upgrades if name not in self._upgrades]
             researched = [Event(what="researched", tag="", type=name, alliance="own") for name in learnt]
             self.events = (*made, *researched, *lost, *killed, *new)
@@ -99,7 +99,7 @@ class Chronicle:
             if body.alliance != raw_pb2.Enemy or body.name in PASSING or body.view.hallucination:
                 continue
             if tag not in self._enemies:
-                new.append(_event("appeared", body.view, "enemy"))
+                new.append(event("appeared", body.view, "enemy"))
             self._enemies[tag] = _Known(body.name, body.view.minimap, self._count)
         return new
 
@@ -138,7 +138,3 @@ def is_structure(name: str) -> bool:
     """Whether a type of unit is a structure; a type that is not known is none."""
     known = knowledge().get(name)
     return known is not None and known.structure
-
-
-def _event(what: EventKind, view: UnitView, alliance: Alliance = "own") -> Event:
-    return Event(what=what, tag=view.tag, type=view.type, alliance=alliance)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from protocol.messages import Event
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Container, Iterable, Mapping
 
     from protocol.messages import Alliance, TeamView, UnitView
 
@@ -25,13 +25,14 @@ MIN_CHANGE = 1.0
 class Events:
     """The events of one moment; one that several teams witness is made once."""
 
-    def __init__(self, before: Mapping[str, float], now: Mapping[str, float], dead: frozenset[str]) -> None:
-        """Takes health and shield of all units by tag, at the observation before and now, and who died since."""
+    def __init__(self, before: Mapping[str, float], now: Mapping[str, UnitView], dead: frozenset[str]) -> None:
+        """Takes health and shield by tag at the observation before, every unit now, and the tags of who died since."""
         self.dead = dead
-        changes = {tag: total - before[tag] for tag, total in now.items() if tag in before}
-        self.changes = {tag: change for tag, change in changes.items() if abs(change) >= MIN_CHANGE}
+        self._now = now
+        totals = ((tag, unit.health + unit.shield - before[tag]) for tag, unit in now.items() if tag in before)
+        self.changes = {tag: change for tag, change in totals if abs(change) >= MIN_CHANGE}
         """Health and shield gained or lost, by tag, as far as they make an event."""
-        self._made: dict[tuple[EventKind, str, Alliance], Event] = {}
+        self._changed: dict[Alliance, dict[str, Event]] = {}
 
     def of_team(self, before: TeamView | None, now: TeamView) -> tuple[Event, ...]:
         """Events of a team in the order of its units; () for a team that is seen for the first time.
@@ -43,39 +44,43 @@ class Events:
         if before is None:
             return ()
         old = {unit.tag: unit for unit in _all(before)}
-        return tuple(chain(self._arrivals_and_changes(old, now), self._losses(old, now)))
-
-    def _arrivals_and_changes(self, old: dict[str, UnitView], now: TeamView) -> Iterator[Event]:
-        changes = self.changes
-        for unit in now.units:
-            if unit.tag not in old or old[unit.tag].alliance != "own":
-                yield self.event("joined", unit)
-            elif unit.tag in changes:
-                yield self._change(unit)
-        for unit in chain(now.allies, now.enemies):
-            if unit.tag not in old:
-                yield self.event("appeared", unit)
-            elif unit.tag in changes:
-                yield self._change(unit)
-
-    def _losses(self, old: dict[str, UnitView], now: TeamView) -> Iterator[Event]:
+        mine = {unit.tag for unit in before.units}
+        found = self._of(now.units, mine, "joined", "own")
+        found += self._of(now.allies, old, "appeared", "ally")
+        found += self._of(now.enemies, old, "appeared", "enemy")
         still = {unit.tag for unit in _all(now)}
-        for tag, unit in old.items():
-            if tag not in still:
-                yield self.event("died" if tag in self.dead else "disappeared", unit)
+        gone = (unit for tag, unit in old.items() if tag not in still)
+        found += [event("died" if unit.tag in self.dead else "disappeared", unit, unit.alliance) for unit in gone]
+        return tuple(found)
 
-    def _change(self, unit: UnitView) -> Event:
-        change = self.changes[unit.tag]
-        return self.event("hurt" if change < 0 else "healed", unit, round(abs(change), 1))
-
-    def event(self, what: EventKind, unit: UnitView, amount: float | None = None) -> Event:
-        """What happened to a unit."""
-        key = what, unit.tag, unit.alliance
-        found = self._made.get(key)
-        if found is None:
-            found = Event(what=what, tag=unit.tag, type=unit.type, alliance=unit.alliance, amount=amount)
-            self._made[key] = found
+    def _of(
+        self, units: Iterable[UnitView], old: Container[str], arrival: EventKind, alliance: Alliance
+    ) -> list[Event]:
+        """Who came, and who was hurt or healed, of some units."""
+        changed = self._changed_as(alliance)
+        found = []
+        for unit in units:
+            tag = unit.tag
+            if tag not in old:
+                found.append(event(arrival, unit, alliance))
+            elif tag in changed:
+                found.append(changed[tag])
         return found
+
+    def _changed_as(self, alliance: Alliance) -> dict[str, Event]:
+        """The changes of health as they are told of units of one alliance: made once, for all who witness them."""
+        if alliance not in self._changed:
+            made = {}
+            for tag, change in self.changes.items():
+                what: EventKind = "hurt" if change < 0 else "healed"
+                made[tag] = event(what, self._now[tag], alliance, round(abs(change), 1))
+            self._changed[alliance] = made
+        return self._changed[alliance]
+
+
+def event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
+    """What happened to a unit."""
+    return Event(what=what, tag=unit.tag, type=unit.type, alliance=alliance, amount=amount)
 
 
 def _all(view: TeamView) -> Iterable[UnitView]:

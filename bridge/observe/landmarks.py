@@ -98,8 +98,9 @@ def _busy(body: Body) -> str:
         return f"{100 * view.build_progress:.0f}% built"
     doing = [order.name + (f" {100 * order.progress:.0f}%" if order.progress else "") for order in view.orders]
     parts = [" then ".join(doing)] if doing else []
-    parts += ["no power"] if view.unpowered else []
-    parts += [f"{view.harvesters[0]} of {view.harvesters[1]} workers"] if view.harvesters else []
+    if details := view.details:
+        parts += ["no power"] if details.unpowered else []
+        parts += [f"{details.harvesters[0]} of {details.harvesters[1]} workers"] if details.harvesters else []
     parts += [f"{view.energy:.0f} energy"] if view.energy_max else []
     return ", ".join(parts)
 

@@ -74,7 +74,7 @@ class Possible:
     def _choice(self, judged: Mapping[str, str | None], unit_type: str) -> Choice:
         valid = [catalogue()[name] for name, reason in judged.items() if reason is None]
         offers = (self._offer(action, unit_type or _carrier(action)) for action in valid)
-        barred = tuple(Barred(action=name, reason=reason) for name, reason in judged.items() if reason is not None)
+        barred = tuple(_barred(name, reason) for name, reason in judged.items() if reason is not None)
         return Choice(tuple(a.spec for a in valid), tuple(offer for offer in offers if offer is not None), barred)
 
     def _offer(self, action: Action, unit_type: str) -> Offer | None:
@@ -83,14 +83,10 @@ class Possible:
             return None
         prices = zip(self._purse, (facts.minerals, facts.vespene, facts.supply), strict=True)
         made = facts.produces
-        return Offer(
-            action=action.name,
-            minerals=round(facts.minerals),
-            vespene=round(facts.vespene),
-            supply=facts.supply,
-            times=max(0, min(int(purse // price) for purse, price in prices if price > 0)),
-            first=made in knowledge() and knowledge()[made].structure and not stand_ins(made) & self._own.keys(),
-        )
+        times = max(0, min(int(purse // price) for purse, price in prices if price > 0))
+        known = knowledge().get(made) if made else None
+        first = known is not None and known.structure and not stand_ins(known.name) & self._own.keys()
+        return _offered(action.name, facts, min(times, 1) if facts.researches else times, first=first)
 
     # --- why not ----------------------------------------------------------------------------------------------
 
@@ -125,7 +121,7 @@ class Possible:
             return None if able is None else "nobody can now"
         reason = self._lacking(facts)
         if reason is None and able is not None:
-            unpowered = ready and all(body.view.unpowered for body in ready)
+            unpowered = ready and all(_unpowered(body) for body in ready)
             busy = f"{'no' if unpowered else 'every'} {' or '.join(dict.fromkeys(b.name for b in ready))} "
             reason = busy + ("has power" if unpowered else "is busy or not ready") if ready else "nobody can now"
         return reason
@@ -159,6 +155,24 @@ def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None
     return None
 
 
+@functools.lru_cache(4096)
+def _barred(action: str, reason: str) -> Barred:
+    return Barred(action=action, reason=reason)
+
+
+def _offered(action: str, facts: AbilityFacts, times: int, *, first: bool) -> Offer:
+    known = knowledge().get(facts.produces) if facts.produces else None
+    return Offer(
+        action=action,
+        minerals=round(facts.minerals),
+        vespene=round(facts.vespene),
+        supply=facts.supply,
+        times=times,
+        first=first,
+        footprint=known.footprint if known else None,
+    )
+
+
 def _not_ready(facts: AbilityFacts, units: Sequence[Body]) -> str | None:
     """What the units themselves lack."""
     best = max(body.view.energy for body in units)
@@ -167,6 +181,10 @@ def _not_ready(facts: AbilityFacts, units: Sequence[Body]) -> str | None:
     if facts.addon:
         return f"needs a {facts.addon}"
     return "cooling down" if facts.cooldown_s else None
+
+
+def _unpowered(body: Body) -> bool:
+    return body.view.details is not None and body.view.details.unpowered
 
 
 def _orders(bodies: Iterable[Body]) -> Iterable[OrderView]:

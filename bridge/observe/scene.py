@@ -59,9 +59,10 @@ class Scene:
         """Every unit in sight but the neutral ones, in ascending order of tags."""
         self.fallen = {tag: before.bodies[tag] for tag in snapshot.dead if before and tag in before.bodies}
         """Those who died since the scene before, as they were in it."""
-        self.totals = {b.view.tag: b.view.health + b.view.shield for b in self.bodies.values()}
+        views = {b.view.tag: b.view for b in self.bodies.values()}
+        self.totals = {tag: view.health + view.shield for tag, view in views.items()}
         """Health and shield by tag."""
-        self.events = Events(before.totals if before else {}, self.totals, frozenset(map(hex, snapshot.dead)))
+        self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
         observation = snapshot.response.observation
         self.upgrades = tuple(upgrade_name(number) for number in sorted(observation.raw_data.player.upgrade_ids))
         self.possible = Possible(snapshot, self.bodies, self.upgrades)

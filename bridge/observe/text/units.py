@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bridge.observe.chronicle import is_structure
 from bridge.observe.text.page import section, shorter
-from bridge.observe.text.words import INDENT, listed, n, percent, point, whole
+from bridge.observe.text.words import INDENT, INDENT2, n, percent, point, whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from bridge.observe.text.page import Page
-    from protocol.messages import Event, OrderView, TeamView, UnitView
+    from protocol.messages import Event, OrderView, TeamView, UnitDetails, UnitView
 
 NEAR = 9.0
 """World units from the middle of a team within which enemies are told one by one on a shorter page; beyond the range
@@ -26,66 +27,77 @@ FEW, FEWEST = 8, 3
 
 
 @section("teams", parts=("resources",))
-def teams(page: Page) -> Iterator[str]:
+def teams(page: Page) -> list[str]:
     """One block per team: where it is, who is there, what happened."""
     return _blocks(page, _all_units, _tagged_events)
 
 
 @shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
-def near_units(page: Page) -> Iterator[str]:
+def near_units(page: Page) -> list[str]:
     """Allies and far enemies only by type."""
     return _blocks(page, lambda page, team: _grouped(page, team, _distance_within(team, NEAR)), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
-def few_units(page: Page) -> Iterator[str]:
+def few_units(page: Page) -> list[str]:
     """A few enemies, and events without tags."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEW)), _counted_events)
 
 
 @shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
-def fewest_units(page: Page) -> Iterator[str]:
+def fewest_units(page: Page) -> list[str]:
     """A handful of enemies, no events."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEWEST)), _no_events)
 
 
 def _blocks(
-    page: Page, units: Callable[[Page, TeamView], Iterator[str]], events: Callable[[Sequence[Event]], Iterable[str]]
-) -> Iterator[str]:
+    page: Page, units: Callable[[Page, TeamView], list[str]], events: Callable[[Page, Sequence[Event]], list[str]]
+) -> list[str]:
     size = page.task.frames.screen
-    for index, team in enumerate(page.teams):
-        if index:
-            yield ""
-        yield f"Team {team.name}"
+    lines: list[str] = []  # lists, since a dozen agents have some thousand lines in each step
+    for team in page.teams:
+        lines += ["", f"Team {team.name}"] if lines else [f"Team {team.name}"]
         if team.minimap is None:
-            yield f"{INDENT}Has no units of its own: its actions are carried out by units of your whole side."
+            lines.append(f"{INDENT}Has no units of its own: its actions are carried out by units of your whole side.")
             continue
-        yield f"{INDENT}Minimap position: {point(team.minimap)}"
+        lines.append(f"{INDENT}Minimap position: {point(team.minimap)}")
         if team.bounds != (0.0, 0.0, size, size):
             x0, y0, x1, y1 = map(n, team.bounds)
-            yield f"{INDENT}Screen on the map: x {x0} to {x1}, y {y0} to {y1}"
-        yield from units(page, team)
-        yield from listed("Resources on the screen:", _resource_lines(team.resources))
-        yield from listed("Since the last observation:", events(team.events))
+            lines.append(f"{INDENT}Screen on the map: x {x0} to {x1}, y {y0} to {y1}")
+        lines += units(page, team)
+        lines += _listed("Resources on the screen:", _resource_lines(team.resources))
+        lines += _listed("Since the last observation:", events(page, team.events))
+    return lines
+
+
+def _listed(heading: str, lines: list[str]) -> list[str]:
+    """A heading with lines below it, which are indented already; nothing without lines."""
+    return [f"{INDENT}{heading}", *lines] if lines else lines
 
 
 # --- units ----------------------------------------------------------------------------------------------------
 
 
-def _all_units(page: Page, team: TeamView) -> Iterator[str]:
-    yield from listed("Your units:", _own_lines(page, team))
-    yield from listed("Allied units:", _lines(page, team.allies))
-    yield from listed("Enemy units:", _lines(page, team.enemies))
+def _all_units(page: Page, team: TeamView) -> list[str]:
+    lines = _listed("Your units:", _own_lines(page, team))
+    if page.sight.agent.kind == "builder":
+        standing = [unit for unit in team.allies if is_structure(unit.type)]
+        lines += _listed("Allied structures:", _lines(page, standing))
+        lines += _listed("Allied units by type:", _group_lines([u for u in team.allies if not is_structure(u.type)]))
+    else:
+        lines += _listed("Allied units:", _lines(page, team.allies))
+    return lines + _listed("Enemy units:", _lines(page, team.enemies))
 
 
-def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> Iterator[str]:
+def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
     """Own units and the enemies that are told one by one; everybody else by type."""
-    yield from listed("Your units:", _own_lines(page, team))
-    yield from listed("Allied units by type:", _group_lines(team.allies))
-    yield from listed("Enemy units:", _lines(page, told))
     tags = {unit.tag for unit in told}
-    rest = [unit for unit in team.enemies if unit.tag not in tags]
-    yield from listed("Other enemy units by type:", _group_lines(rest))
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied units by type:", _group_lines(team.allies)),
+        *_listed("Enemy units:", _lines(page, told)),
+        *_listed("Other enemy units by type:", _group_lines([u for u in team.enemies if u.tag not in tags])),
+    ]
 
 
 def _distance_within(team: TeamView, distance: float) -> list[UnitView]:
@@ -99,41 +111,44 @@ def _nearest(team: TeamView, count: int) -> list[UnitView]:
     return [unit for unit in team.enemies if unit.tag in tags]
 
 
-def _group_lines(units: Sequence[UnitView]) -> Iterator[str]:
+def _group_lines(units: Sequence[UnitView]) -> list[str]:
     """How many of each type there are, and about where."""
     by_type: dict[str, list[UnitView]] = {}
     for unit in units:
         by_type.setdefault(unit.type, []).append(unit)
-    for name, group in by_type.items():
-        x, y = (round(sum(unit.screen[axis] for unit in group) / len(group), 1) for axis in (0, 1))
-        where = f"{len(group)} {name} around screen {point((x, y))}"
-        distances = [unit.distance for unit in group if unit.distance is not None]
-        yield where + (f", the nearest {n(min(distances))} away" if distances else "")
+    return [_group_line(name, group) for name, group in by_type.items()]
 
 
-def _own_lines(page: Page, team: TeamView) -> Iterator[str]:
+def _group_line(name: str, group: Sequence[UnitView]) -> str:
+    x, y = (round(sum(unit.screen[axis] for unit in group) / len(group), 1) for axis in (0, 1))
+    line = f"{INDENT2}{len(group)} {name} around screen {point((x, y))}"
+    distances = [unit.distance for unit in group if unit.distance is not None]
+    return line + (f", the nearest {n(min(distances))} away" if distances else "")
+
+
+def _own_lines(page: Page, team: TeamView) -> list[str]:
     size = page.task.frames.screen
-    for unit, line in zip(team.units, _lines(page, team.units), strict=True):
-        x, y = unit.screen
-        if 0 <= x < size and 0 <= y < size:
-            yield line
-        else:
+    lines = _lines(page, team.units)
+    for index, unit in enumerate(team.units):
+        if not (0 <= unit.screen[0] < size and 0 <= unit.screen[1] < size):
             place = point(unit.screen)
-            yield line.replace(place, f"{place} (off screen)", 1)
+            lines[index] = lines[index].replace(place, f"{place} (off screen)", 1)
+    return lines
 
 
-def _lines(page: Page, units: Sequence[UnitView]) -> Iterator[str]:
+def _lines(page: Page, units: Sequence[UnitView]) -> list[str]:
     conditions = page.conditions
+    lines = []
     for unit in units:
         tag = unit.tag
         condition = conditions.get(tag)
         if condition is None:
             condition = conditions[tag] = _condition(unit)
         x, y = unit.screen
-        if unit.distance is None:
-            yield f"{unit.type} | tag {tag} | screen [{n(x)}, {n(y)}]{condition}"
-        else:
-            yield f"{unit.type} | tag {tag} | screen [{n(x)}, {n(y)}] | distance {n(unit.distance)}{condition}"
+        distance = unit.distance
+        far = "" if distance is None else f" | distance {n(distance)}"
+        lines.append(f"{INDENT2}{unit.type} | tag {tag} | screen [{n(x)}, {n(y)}]{far}{condition}")
+    return lines
 
 
 def _condition(unit: UnitView) -> str:
@@ -151,20 +166,23 @@ def _condition(unit: UnitView) -> str:
         fields.append(f"weapon in {n(cooldown_s)} s" if cooldown_s else "weapon ready")
     if unit.orders:
         fields.append(f"order {', then '.join(map(_order, unit.orders))}")
-    if unit.cargo_max:
-        fields.append(f"carries {', '.join(unit.passengers) or 'nobody'}, room for {unit.cargo_max} in all")
-    if unit.harvesters is not None:
-        fields.append(f"workers {unit.harvesters[0]} of {unit.harvesters[1]}")
-    states = (
-        ("cloaked", unit.cloaked),
-        ("burrowed", unit.burrowed),
-        ("hallucination", unit.hallucination),
-        ("without power", unit.unpowered),
-    )
-    fields += [word for word, is_so in states if is_so]
+    fields += [word for word, is_so in (("cloaked", unit.cloaked), ("hallucination", unit.hallucination)) if is_so]
+    if unit.details is not None:
+        fields += _details(unit.details)
     if unit.buffs:
         fields.append(f"effects {', '.join(unit.buffs)}")
     return "".join(f" | {field}" for field in fields)
+
+
+def _details(details: UnitDetails) -> Iterator[str]:
+    if details.cargo_max:
+        yield f"carries {', '.join(details.passengers) or 'nobody'}, room for {details.cargo_max} in all"
+    if details.harvesters is not None:
+        yield f"workers {details.harvesters[0]} of {details.harvesters[1]}"
+    if details.burrowed:
+        yield "burrowed"
+    if details.unpowered:
+        yield "without power"
 
 
 def _order(order: OrderView) -> str:
@@ -173,12 +191,12 @@ def _order(order: OrderView) -> str:
     return f"{order.name}{target}{place}" + (f" {percent(order.progress)}" if order.progress is not None else "")
 
 
-def _resource_lines(resources: Sequence[UnitView]) -> Iterator[str]:
+def _resource_lines(resources: Sequence[UnitView]) -> list[str]:
     by_type: dict[str, list[str]] = {}
     for unit in resources:
-        left = f" with {unit.contents}" if unit.contents else ""
+        left = f" with {unit.details.contents}" if unit.details and unit.details.contents else ""
         by_type.setdefault(unit.type, []).append(f"{unit.tag} {point(unit.screen)}{left}")
-    yield from (f"{name}: {', '.join(found)}" for name, found in by_type.items())
+    return [f"{INDENT2}{name}: {', '.join(found)}" for name, found in by_type.items()]
 
 
 # --- events ---------------------------------------------------------------------------------------------------
@@ -195,26 +213,48 @@ _PLACES = {what: place for place, what in enumerate(_VERBS)}
 _SIGNS = {"hurt": " -", "healed": " +"}
 
 
-def _by_kind(events: Sequence[Event]) -> Iterator[tuple[str, list[Event]]]:
+def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
     """What happened to which type, and the events, in the order of the verbs."""
-    groups: dict[tuple[int, str, str], list[Event]] = {}
+    groups: dict[tuple[str, str, str], list[Event]] = {}
     for event in events:
-        groups.setdefault((_PLACES[event.what], event.alliance, event.type), []).append(event)
-    for (_, alliance, name), members in sorted(groups.items()):
-        yield f"{alliance} {name} {_VERBS[members[0].what]}", members
+        key = event.what, event.alliance, event.type
+        if key in groups:
+            groups[key].append(event)
+        else:
+            groups[key] = [event]
+    order = sorted(groups, key=lambda key: (_PLACES[key[0]], key[1:]))
+    return [(f"{key[1]} {key[2]} {_VERBS[key[0]]}", groups[key]) for key in order if not _passing_by(*key)]
 
 
-def _tagged_events(events: Sequence[Event]) -> Iterator[str]:
+def _passing_by(what: str, alliance: str, name: str) -> bool:
+    """Whether it only says that the team has passed an own structure."""
+    return alliance == "ally" and what in {"appeared", "disappeared"} and is_structure(name)
+
+
+def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
     """One line for all units of a type to which the same happened."""
+    words = page.conditions
+    lines = []
     for what, members in _by_kind(events):
-        sign = _SIGNS.get(members[0].what, "")
-        yield f"{what}: " + ", ".join([e.tag + (f"{sign}{whole(e.amount)}" if e.amount else "") for e in members])
+        sign = _SIGNS.get(members[0].what)
+        if sign is None:
+            said = [event.tag for event in members]
+        else:
+            said = [words.get(sign + event.tag) or _amount(words, sign, event) for event in members]
+        lines.append(f"{INDENT2}{what}: {', '.join(said)}")
+    return lines
 
 
-def _no_events(events: Sequence[Event]) -> Iterable[str]:  # noqa: ARG001  # a form of telling events
-    return ()
+def _amount(words: dict[str, str], sign: str, event: Event) -> str:
+    """A tag and what it lost or regained; several teams tell of it in the same words."""
+    said = words[sign + event.tag] = f"{event.tag}{sign}{whole(event.amount or 0.0)}"
+    return said
 
 
-def _counted_events(events: Sequence[Event]) -> Iterator[str]:
+def _counted_events(page: Page, events: Sequence[Event]) -> list[str]:  # noqa: ARG001  # a form of telling events
     """The same without tags."""
-    yield from (f"{what}: {len(members)}" for what, members in _by_kind(events))
+    return [f"{INDENT2}{what}: {len(members)}" for what, members in _by_kind(events)]
+
+
+def _no_events(page: Page, events: Sequence[Event]) -> list[str]:  # noqa: ARG001  # a form of telling events
+    return []
