@@ -21,6 +21,7 @@ from agents.llm.openai_compatible import OpenAICompatible
 from agents.llm.profiles import PROFILES
 from agents.llm.replay import ReplayClient
 from agents.llm.retry import RetryRule
+from agents.llm.vision import Vision
 from agents.llm_policy import LLMPolicy
 from agents.memory import LastSteps
 from agents.policy import FunctionPolicy, Policy
@@ -62,6 +63,7 @@ def client_for(config: ModelConfig) -> LLMClient:
         temperature=config.temperature,
         seed=config.seed,
         extra=config.extra,
+        detail=config.images.detail if config.images else "auto",
     )
 
 
@@ -96,6 +98,7 @@ class Workshop:
             retry=config.retry,
             limits=limits,
             try_timeout_s=config.try_timeout_s,
+            vision=config.vision,
         )
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
@@ -136,9 +139,17 @@ def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[s
         by_agent.setdefault(exchange.agent, []).append(exchange)
     at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
     return {
-        agent: LLMPolicy(ReplayClient(made), memory=LastSteps(memory) if memory else None, retry=at_once)
+        agent: LLMPolicy(
+            ReplayClient(made), memory=LastSteps(memory) if memory else None, retry=at_once, vision=_vision_of(made)
+        )
         for agent, made in by_agent.items()
     }
+
+
+def _vision_of(exchanges: Iterable[Exchange]) -> Vision | None:
+    """Whether the model of these requests was shown pictures."""
+    shown = [len(message.images) for exchange in exchanges for message in exchange.prompt]
+    return Vision(max_images=max(shown)) if any(shown) else None
 
 
 def load_policy(name: str) -> Policy:

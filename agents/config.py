@@ -18,6 +18,7 @@ from agents.llm.limits import LimitRules
 from agents.llm.pricing import Prices
 from agents.llm.profiles import PROFILES, ProfileName
 from agents.llm.retry import RetryRule
+from agents.llm.vision import ANTHROPIC, Vision
 from protocol.configfile import load
 from protocol.errors import ConfigError, WrongKey
 from protocol.keys import check_name
@@ -54,6 +55,14 @@ class ModelConfig(Frozen):
     retry: RetryRule = RetryRule()
     limits: LimitRules = LimitRules()
     prices: Prices = Prices()
+    images: Vision | None = None
+    """Whether the model sees: `true`, or how finely it looks and how its pictures are counted. A model that does not is
+    sent no pictures."""
+
+    @field_validator("images", mode="before")
+    @classmethod
+    def _sees(cls, value: object) -> object:
+        return {} if value is True else None if value is False else value
 
     @field_validator("base_url")
     @classmethod
@@ -88,6 +97,12 @@ class ModelConfig(Frozen):
         if needs_key and self.api_key_env is None:
             raise ValueError(f"{self.profile} wants a key: name the environment variable that holds it in api_key_env")
         return self
+
+    @property
+    def vision(self) -> Vision | None:
+        """How the model sees, with a rule to count by; None if it does not."""
+        rule = ANTHROPIC if self.profile == "anthropic" else PROFILES[self.profile].image_tokens
+        return self.images.counted_by(rule) if self.images else None
 
 
 class WorkerSpec(Frozen):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from protocol.bus import Delivery
-from protocol.keys import Topic, agent_key, alive_key, run_key
+from protocol.keys import Topic, agent_key, alive_key, images_of, run_key
 
 if TYPE_CHECKING:
     from contextlib import AsyncExitStack
@@ -18,12 +18,20 @@ if TYPE_CHECKING:
     from protocol.bus import Bus, Publisher, Sample, Subscription
 
 
+IMAGES = 64
+"""Pictures that wait to be taken."""
+
+
 @dataclass(frozen=True, slots=True)
 class Links:
-    """The topics of one agent; of what it hears the newest sample waits, of what it says nothing."""
+    """The topics of one agent.
+
+    Of what it hears the newest sample waits, of pictures those of some observations; of what it says nothing.
+    """
 
     briefings: Subscription[Sample]
     observations: Subscription[Sample]
+    images: Subscription[Sample]
     runs: Subscription[Sample]
     results: Subscription[Sample]
     messages: Publisher
@@ -38,8 +46,8 @@ async def join(stack: AsyncExitStack, bus: Bus, run: str, side: str, agent: str)
         BusClosed: the bus is closed.
     """
 
-    async def hear(key: str) -> Subscription[Sample]:
-        subscription = await bus.subscribe(key, Delivery.STATE, depth=1)
+    async def hear(key: str, depth: int = 1) -> Subscription[Sample]:
+        subscription = await bus.subscribe(key, Delivery.STATE, depth=depth)
         stack.push_async_callback(subscription.close)
         return subscription
 
@@ -49,6 +57,7 @@ async def join(stack: AsyncExitStack, bus: Bus, run: str, side: str, agent: str)
         return publisher
 
     links = Links(
+        images=await hear(images_of(run, side, agent), depth=IMAGES),
         briefings=await hear(agent_key(run, side, agent, Topic.BRIEFING)),
         observations=await hear(agent_key(run, side, agent, Topic.OBSERVATION)),
         runs=await hear(run_key(run, Topic.RUN)),

@@ -7,21 +7,34 @@ Above it: the worker, which cancels it at the deadline. Below it: `agents.prompt
 from __future__ import annotations
 
 import asyncio
+import logging
 import random
 from typing import TYPE_CHECKING
 
 from agents.deadline import time_to_decide_s
-from agents.llm.client import Completion, LLMClient, LLMError, Origin, Request, estimated_tokens
+from agents.llm.client import (
+    Completion,
+    LLMClient,
+    LLMError,
+    Origin,
+    Request,
+    estimated_image_tokens,
+    estimated_tokens,
+)
 from agents.llm.limits import Limits
 from agents.llm.retry import RetryRule, retried
 from agents.memory import Memory, NoMemory
+from agents.pictures import PATIENCE_S, Pictures
 from agents.prompt import Prompt
 from protocol.messages import Exchange, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
+    from agents.llm.vision import Vision
     from protocol.messages import Briefing, ChatMessage, Observation
+
+log = logging.getLogger(__name__)
 
 UNKNOWN = Usage(requests=1, unknown_requests=1)
 
@@ -37,10 +50,12 @@ class LLMPolicy:
         retry: how often a failed try is repeated.
         limits: shared with other agents of the process.
         try_timeout_s: time for one try; the time to the deadline if that is shorter.
+        vision: what the model sees; None if it sees nothing, and pictures are left out.
         rng: jitter of the waits between tries.
 
     Attributes:
         trace: called with every request that was made, as soon as it is over.
+        pictures: where the pictures of observations are found; the worker sets it.
     """
 
     def __init__(
@@ -51,12 +66,16 @@ class LLMPolicy:
         retry: RetryRule | None = None,
         limits: Limits | None = None,
         try_timeout_s: float = 45.0,
+        vision: Vision | None = None,
         rng: random.Random | None = None,
     ) -> None:
         self.trace: Callable[[Exchange], None] = _untold
         self.client = client
         self.limits = limits or Limits()
         self.try_timeout_s = try_timeout_s
+        self.vision = vision
+        self.pictures = Pictures()
+        self._told_blind = False
         self._memory = memory or NoMemory()
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
@@ -81,8 +100,16 @@ class LLMPolicy:
         Raises:
             LLMError: there are none; the error of the last try.
         """
-        prompt = self._prompt_for(briefing).messages(observation.text, self._memory.recall())
-        tries = _Tries(self, observation, prompt)
+        arrived = asyncio.get_running_loop().time()
+        pictures = await self._look(observation)
+        wanted = observation.images[: self.vision.max_images] if self.vision else ()
+        prompt = self._prompt_for(briefing).messages(
+            observation.text,
+            self._memory.recall(),
+            images=tuple(image for image in wanted if image.sha256 in pictures),
+            missing=[image for image in wanted if image.sha256 not in pictures],
+        )
+        tries = _Tries(self, observation, prompt, pictures, arrived)
         completion = await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
         self._memory.remember(observation, completion.text)
         return completion.text
@@ -90,6 +117,24 @@ class LLMPolicy:
     async def close(self) -> None:
         """Closes the client."""
         await self.client.close()
+
+    async def _look(self, observation: Observation) -> Mapping[str, bytes]:
+        """The pictures of an observation that are there, or come in a moment; none for a model that does not see."""
+        if not observation.images:
+            return {}
+        if self.vision is None:
+            if not self._told_blind:
+                log.warning(
+                    "agent %s: its observations have pictures, and the model %s is shown none of them: "
+                    "say `images: true` in its model file if it sees",
+                    observation.agent,
+                    self.client.model,
+                )
+            self._told_blind = True
+            return {}
+        time_s = time_to_decide_s(observation.answer_within_s)
+        patience_s = PATIENCE_S if time_s is None else min(PATIENCE_S, time_s / 4)
+        return await self.pictures.get(observation.images[: self.vision.max_images], patience_s)
 
     def _prompt_for(self, briefing: Briefing) -> Prompt:
         if self._prompt is None or self._prompt[0] is not briefing:
@@ -100,15 +145,27 @@ class LLMPolicy:
 class _Tries:
     """The tries of one decision, counted and traced."""
 
-    def __init__(self, policy: LLMPolicy, observation: Observation, prompt: tuple[ChatMessage, ...]) -> None:
+    def __init__(
+        self,
+        policy: LLMPolicy,
+        observation: Observation,
+        prompt: tuple[ChatMessage, ...],
+        pictures: Mapping[str, bytes],
+        arrived: float,
+    ) -> None:
         self._policy = policy
         self._observation = observation
         self._prompt = prompt
         self._origin = Origin(observation.agent, observation.episode, observation.step)
-        self._tokens = estimated_tokens(prompt)
+        self._pictures = pictures
+        self._tokens = estimated_tokens(prompt, policy.vision)
+        self._images = Usage(
+            images=sum(len(message.images) for message in prompt),
+            image_tokens=estimated_image_tokens(prompt, policy.vision) if policy.vision else 0,
+        )
         self._made = 0
         self._clock = asyncio.get_running_loop().time
-        self._arrived = self._clock()
+        self._arrived = arrived
         time_s = time_to_decide_s(observation.answer_within_s)
         self.deadline = None if time_s is None else self._arrived + time_s
 
@@ -117,10 +174,10 @@ class _Tries:
         async with self._policy.limits.admit(tokens=self._tokens, deadline=self.deadline) as ticket:
             self._made += 1
             began = self._clock()
-            status, text, usage = "cancelled", None, UNKNOWN
+            status, text, usage = "cancelled", None, UNKNOWN + self._images
             try:
                 completion = await self._policy.client.complete(self._request(began))
-                status, text, usage = "ok", completion.text, completion.usage
+                status, text, usage = "ok", completion.text, completion.usage + self._images
                 ticket.settle(usage)
             except LLMError as error:
                 status = error.status
@@ -136,7 +193,9 @@ class _Tries:
         timeout_s = self._policy.try_timeout_s
         if self.deadline is not None:
             timeout_s = min(timeout_s, max(self.deadline - now, 0.0))
-        return Request(self._prompt, timeout_s=timeout_s, origin=self._origin, attempt=self._made)
+        return Request(
+            self._prompt, timeout_s=timeout_s, origin=self._origin, attempt=self._made, pictures=self._pictures
+        )
 
     def _tell(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
         seen = self._observation

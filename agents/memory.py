@@ -46,7 +46,7 @@ class NoMemory:
 
 
 class LastSteps:
-    """Remembers observations and replies of the last `count` steps as they were."""
+    """Remembers observations and replies of the last `count` steps as they were, without their pictures."""
 
     def __init__(self, count: int) -> None:
         self._steps: deque[tuple[str, str]] = deque(maxlen=count)

@@ -23,6 +23,7 @@ from protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from agents.pictures import Pictures
     from protocol.messages import Briefing, Exchange, Observation
 
 P = ParamSpec("P")
@@ -93,6 +94,13 @@ class Traced(Protocol):
     """A policy that tells of its requests to a model as it makes them; the worker sets `trace`."""
 
     trace: Callable[[Exchange], None]
+
+
+@runtime_checkable
+class Seeing(Protocol):
+    """A policy that looks at the pictures of its observations; the worker sets `pictures`."""
+
+    pictures: Pictures
 
 
 class FunctionPolicy:

@@ -15,7 +15,7 @@ from protocol.messages import ChatMessage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from protocol.messages import ActionSpec, Briefing, Clock, Correspondent, Frames, TeamSpec
+    from protocol.messages import ActionSpec, Briefing, Clock, Correspondent, Frames, ImageRef, TeamSpec
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
 """Tags of the example; a game's own tags are longer, so that one that was copied is seen at once."""
@@ -32,9 +32,30 @@ class Prompt:
             ChatMessage(role="assistant", content=_example_reply(briefing)),
         )
 
-    def messages(self, observation_text: str, recalled: Sequence[ChatMessage] = ()) -> tuple[ChatMessage, ...]:
-        """System message, example, what the memory recalls, and at the end the observation."""
-        return (*self._head, *recalled, ChatMessage(role="user", content=observation_text))
+    def messages(
+        self,
+        observation_text: str,
+        recalled: Sequence[ChatMessage] = (),
+        images: tuple[ImageRef, ...] = (),
+        missing: Sequence[ImageRef] = (),
+    ) -> tuple[ChatMessage, ...]:
+        """System message, example, what the memory recalls, and at the end the observation behind its pictures.
+
+        Args:
+            observation_text: as the host wrote it.
+            recalled: of earlier steps.
+            images: are shown, each with its title before it.
+            missing: should be there and are not; the model is told.
+        """
+        lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
+        seen = ChatMessage(
+            role="user", content=f"{lost}\n{observation_text}" if lost else observation_text, images=images
+        )
+        return (*self._head, *recalled, seen)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def system_text(briefing: Briefing) -> str:

@@ -8,7 +8,7 @@ agent does when it is cut off depends on the clock.
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from agents.build import replay_policies
 from agents.worker import run_worker
@@ -16,12 +16,12 @@ from protocol.bus import Delivery
 from protocol.bus.memory import MemoryBroker
 from protocol.codec import decode_as, encode
 from protocol.errors import RecordingError
-from protocol.keys import Topic, agent_key, run_key
+from protocol.keys import Topic, agent_key, image_key, run_key
 from protocol.messages import Briefing, Exchange, Message, Observation, Reply
 from protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
     from agents.policy import Policy
     from protocol.bus import Bus, Publisher, Sample, Subscription
@@ -77,13 +77,27 @@ class _Scene:
         self.observation, self.reply, self.messages = observation, reply, messages
 
 
-def _script(recording: Recording, agent: str) -> Iterator[Briefing | _Scene]:
-    """Briefings, and the observations that were answered, in their order."""
+class _Image(NamedTuple):
+    """A picture, and the place that it was published under."""
+
+    place: int
+    data: bytes
+
+
+_Part = Briefing | _Image | _Scene
+
+
+def _script(recording: Recording, agent: str) -> Iterator[_Part]:
+    """Briefings, pictures, and the observations that were answered, in their order."""
     replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
     messages: dict[tuple[int, int], list[Message]] = {}
     for message in recording.of(Message, agent=agent):
         messages.setdefault((message.episode, message.step), []).append(message)
     for sample in recording:
+        address = sample.address
+        if address is not None and address.topic is Topic.IMAGE and address.agent == agent:
+            yield _Image(int(address.instance or 0), sample.payload)
+            continue
         match sample.message:
             case Briefing(agent=name) as briefing if name == agent:
                 yield briefing
@@ -101,7 +115,10 @@ class _Stage:
         observations: Publisher,
         replies: Subscription[Sample],
         messages: Subscription[Sample],
+        frame: Callable[[int], Awaitable[Publisher]],
     ) -> None:
+        self._frame = frame
+        self._frames: dict[int, Publisher] = {}
         self._briefings, self._observations = briefings, observations
         self._replies = replies
         self._said: list[Message] = []
@@ -112,6 +129,9 @@ class _Stage:
         def key(topic: Topic) -> str:
             return agent_key(run.run, side, agent, topic)
 
+        def frame(place: int) -> Awaitable[Publisher]:
+            return bus.publisher(image_key(run.run, side, agent, place), Delivery.STATE)
+
         card = await bus.publisher(run_key(run.run, Topic.RUN), Delivery.STATE)
         await card.put(encode(run))
         return cls(
@@ -119,14 +139,23 @@ class _Stage:
             await bus.publisher(key(Topic.OBSERVATION), Delivery.STATE),
             await bus.subscribe(key(Topic.REPLY), Delivery.SPEECH),
             await bus.subscribe(key(Topic.MESSAGE), Delivery.SPEECH),
+            frame,
         )
+
+    async def _show(self, image: _Image) -> None:
+        if image.place not in self._frames:
+            self._frames[image.place] = await self._frame(image.place)
+        await self._frames[image.place].put(image.data)
 
     async def _hear(self, messages: Subscription[Sample]) -> None:
         async for sample in messages:
             self._said.append(decode_as(Message, sample.payload))
 
-    async def play(self, script: Iterator[Briefing | _Scene]) -> AsyncIterator[Difference]:
+    async def play(self, script: Iterator[_Part]) -> AsyncIterator[Difference]:
         for part in script:
+            if isinstance(part, _Image):
+                await self._show(part)
+                continue
             if isinstance(part, Briefing):
                 await self._briefings.put(encode(part))
                 continue

@@ -23,7 +23,8 @@ from agents.deadline import time_to_decide_s
 from agents.guard import Guard
 from agents.ledger import Ledger
 from agents.links import Links, join
-from agents.policy import Answer, Closing, Decision, Policy, Prepared, Traced
+from agents.pictures import Pictures
+from agents.policy import Answer, Closing, Decision, Policy, Prepared, Seeing, Traced
 from protocol import speech
 from protocol.codec import decode_as, encode
 from protocol.errors import BusClosed, BusError, PeerError
@@ -121,6 +122,7 @@ class Worker:
         self._ended = asyncio.Event()
         self._ledger = Ledger(name)
         self._briefings = Briefings()
+        self._pictures = Pictures()
         self._card: Run | None = None
         self._last_result: int | None = None
         self._newest: tuple[int, int] | None = None
@@ -128,6 +130,8 @@ class Worker:
         self._preparing: asyncio.Task[None] | None = None
         if isinstance(policy, Traced):
             policy.trace = self._ledger.note
+        if isinstance(policy, Seeing):
+            policy.pictures = self._pictures
 
     async def play(self, stop: asyncio.Event) -> Tally:
         """Joins, answers, and leaves; see `run_worker`."""
@@ -145,6 +149,7 @@ class Worker:
     async def _serve(self, links: Links, stop: asyncio.Event) -> None:
         async with asyncio.TaskGroup() as group:
             tasks = [
+                group.create_task(self._hear_images(links), name=f"images {self._name}"),
                 group.create_task(self._hear_briefings(links, group), name=f"briefings {self._name}"),
                 group.create_task(self._hear_run(links)),
                 group.create_task(self._hear_results(links)),
@@ -169,6 +174,10 @@ class Worker:
                 _cancel(self._preparing)
                 preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
                 self._preparing = group.create_task(preparing, name=f"prepare {self._name}")
+
+    async def _hear_images(self, links: Links) -> None:
+        async for sample in links.images:
+            await self._pictures.put(sample.payload)
 
     async def _hear_run(self, links: Links) -> None:
         async for card in self._read(Run, links.runs):

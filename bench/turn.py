@@ -40,7 +40,7 @@ from orchestrator.brief import briefing
 from orchestrator.config import MatchConfig, load_task
 from orchestrator.roster import Roster as Attendance
 from orchestrator.roster import Seat
-from orchestrator.turn import Turn
+from orchestrator.turn import Question, Turn
 from protocol.bus import Delivery
 from protocol.bus.config import BusConfig
 from protocol.bus.zenoh import open_bus
@@ -119,7 +119,7 @@ class Bench:
 
     async def _step(self, turn: Turn, number: int, measured: Measured) -> None:
         began = time.perf_counter()
-        answers = await turn.ask(self._observations(number, measured))
+        answers = await turn.ask(self._questions(number, measured))
         asked = time.perf_counter()
         assert {answer.status for answer in answers.by_seat.values()} == {"ok"}
         speeches = {seat.agent: parse(answer.text or "") for seat, answer in answers.by_seat.items()}
@@ -160,14 +160,14 @@ class Bench:
             "http": request.latency_s - LATENCY_S,
         }
 
-    def _observations(self, number: int, measured: Measured) -> Iterator[Observation]:
+    def _questions(self, number: int, measured: Measured) -> Iterator[Question]:
         for seen in self.observer.each(self.snapshot):
             observation = Observation(
                 run=self.run, agent=seen.agent.name, side=self.task.side, episode=0, step=number,
                 game_loop=8 * number, answer_within_s=30, text=seen.text, view=seen.view,
             )  # fmt: skip
             measured.observation_bytes = measured.observation_bytes or len(observation.model_dump_json())
-            yield observation
+            yield Question(observation)
 
     async def _listen(self, log: Subscription[Sample]) -> None:
         async for sample in log:

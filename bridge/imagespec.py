@@ -110,6 +110,11 @@ class ImageSpec(Frozen):
         return self.what.partition(":")[2]
 
     @property
+    def is_rendered(self) -> bool:
+        """Whether it asks the game to render."""
+        return self.source == "game" and self.what in {"screen", "minimap"}
+
+    @property
     def of_teams(self) -> bool:
         """Whether it shows what a team sees, and not the whole map."""
         return not self.what.startswith("minimap")

@@ -264,6 +264,12 @@ class TaskConfig(Frozen):
             spec = self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
         return spec.model_copy(update={k: v for k, v in changed.items() if v is not None})
 
+    @property
+    def render_px(self) -> int | None:
+        """Size of the pictures that the game itself has to render; None if it need not."""
+        sizes = [image.size_px for agent in self.agents for image in agent.images if image.is_rendered]
+        return max(sizes, default=None)
+
     def agent(self, name: str) -> AgentConfig:
         """The agent of this name."""
         return next(agent for agent in self.agents if agent.name == name)

@@ -115,7 +115,7 @@ async def play_hosted(
 def one_side(config: MatchConfig, sc2path: Path) -> OneSide:
     """The game of a match, not started yet."""
     task = config.task
-    started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed)
+    started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed, render_px=task.render_px)
     return OneSide(GameThread(lambda: PySC2Game(started)), executor_of(task), step_loops=task.clock.step_loops)
 
 

@@ -15,6 +15,7 @@ from bridge.observe import Feedback
 from orchestrator.brief import briefing
 from orchestrator.roster import Seat
 from orchestrator.tally import Tally
+from orchestrator.turn import Question
 from protocol.messages import AgentReport, Observation, Received, Report, Timings
 from protocol.speech import parse
 
@@ -91,7 +92,7 @@ class Match:
         self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]
     ) -> tuple[Report, Snapshot, dict[str, Feedback]]:
         watch = Stopwatch()
-        answers = await self.asking.ask(self._observations(at, snapshot, feedback))
+        answers = await self.asking.ask(self._questions(at, snapshot, feedback))
         ask_s = watch.lap()
         speeches = self._speeches(answers)
         joint = self.actor.joint(self.observer.sight, speeches)
@@ -114,12 +115,12 @@ class Match:
         for agent in self.config.task.agents:
             await self.telling.brief(briefing(self.config.task, agent, self.config.run, episode))
 
-    def _observations(self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> Iterator[Observation]:
+    def _questions(self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> Iterator[Question]:
         """One for each agent, made when it is asked for: the first agent thinks while others are looked for."""
         task = self.config.task
         for seen in self.observer.each(snapshot, feedback):
             heard = feedback.get(seen.agent.name, Feedback())
-            yield Observation(
+            observation = Observation(
                 run=self.config.run,
                 agent=seen.agent.name,
                 side=task.side,
@@ -129,10 +130,12 @@ class Match:
                 answer_within_s=task.clock.max_wait_s,
                 text=seen.text,
                 view=seen.view,
+                images=tuple(picture.ref for picture in seen.pictures),
                 accepted=heard.accepted,
                 rejections=heard.rejections,
                 messages=heard.messages,
             )
+            yield Question(observation, [picture.data for picture in seen.pictures])
 
     def _speeches(self, answers: Answers) -> dict[str, Speech]:
         default = self.config.task.default_reply

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from bridge.game import OneSide
+    from orchestrator.turn import Question
     from protocol.messages import AgentReport, Briefing, Result
     from protocol.recording import Recording, Step
 
@@ -69,9 +70,12 @@ class RecordedTurn:
         for reply in recording.of(Reply):
             self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
 
-    async def ask(self, observations: Iterable[Observation]) -> Answers:
-        """Compares the observations with the recorded ones, and gives the recorded answers."""
-        first, *others = observations
+    async def ask(self, questions: Iterable[Question]) -> Answers:
+        """Compares the observations with the recorded ones, and gives the recorded answers.
+
+        Pictures are compared by the hashes under which observations name them.
+        """
+        first, *others = (question.observation for question in questions)
         step = next(self._steps, None)
         if step is None or not step.of(Report):
             raise _EndOfRecording

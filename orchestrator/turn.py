@@ -1,8 +1,8 @@
 """Asks every agent at once, and waits until all have replied or the deadline has passed.
 
-Below it: publishers of observations, and one inbox of replies and messages. Above it: `orchestrator.match`.
-It knows nothing of games. A reply is taken when it is the first valid one of its agent for the open step;
-all others are counted as ignored and never seen again. A wait for an agent ends early when its liveliness
+Below it: publishers of observations and their pictures, and one inbox of replies and messages. Above it:
+`orchestrator.match`. It knows nothing of games. A reply is taken when it is the first valid one of its agent for the
+open step; all others are counted as ignored and never seen again. A wait for an agent ends early when its liveliness
 token goes, or when what it sent is no reply: it may still answer while the step is open.
 """
 
@@ -12,17 +12,17 @@ import asyncio
 import logging
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 from orchestrator.roster import Seat
 from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
 from protocol.errors import PeerError, WrongKey
-from protocol.keys import Topic, agent_key, every_agent, parse
+from protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from protocol.messages import AgentStatus, Message, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
     from types import TracebackType
 
     from orchestrator.roster import Roster
@@ -68,10 +68,17 @@ class Answers:
     wait_s: float = 0.0
 
 
+class Question(NamedTuple):
+    """What one agent is asked: its observation, and the pictures that the observation names, in their order."""
+
+    observation: Observation
+    pictures: Sequence[bytes] = ()
+
+
 class Asking(Protocol):
     """What a match needs of a turn; a recording can stand in for live agents."""
 
-    async def ask(self, observations: Iterable[Observation]) -> Answers:
+    async def ask(self, questions: Iterable[Question]) -> Answers:
         """Puts one observation before each agent and returns what they answered."""
         ...
 
@@ -119,6 +126,7 @@ class Turn:
         self._run = run
         self._roster = roster
         self._publishers: dict[Seat, Publisher] = {}
+        self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inboxes: list[Subscription[Sample]] = []
         self._pumps: list[asyncio.Task[None]] = []
         self._messages: list[Message] = []
@@ -142,21 +150,22 @@ class Turn:
         for inbox in self._inboxes:
             await inbox.close()
         await asyncio.gather(*self._pumps)
-        for publisher in self._publishers.values():
+        for publisher in (*self._publishers.values(), *self._frames.values()):
             await publisher.close()
 
-    async def ask(self, observations: Iterable[Observation]) -> Answers:
-        """Publishes the observations and waits for the replies, no longer than the observations allow.
+    async def ask(self, questions: Iterable[Question]) -> Answers:
+        """Publishes the observations, each after its pictures, and waits no longer for replies than they allow.
 
         Args:
-            observations: one a seat, all of the same episode and step and with the same `answer_within_s`. They may
-                be made while they are taken: each is published before the next is asked for.
+            questions: one a seat, all of the same episode and step and with the same `answer_within_s`. They may be
+                made while they are taken: each is published before the next is asked for.
         """
         loop = asyncio.get_running_loop()
         step, within_s, publish_s = _Step(), None, 0.0
-        for observation in observations:
+        for observation, pictures in questions:
             began = loop.time()
             seat, within_s = Seat(observation.side, observation.agent), observation.answer_within_s
+            await self._show(seat, pictures)
             self._step = step.open(seat, observation, began)
             await self._publishers[seat].put(encode(observation))
             if not self._roster.present(seat):
@@ -170,6 +179,14 @@ class Turn:
         except TimeoutError:
             log.info("step %d: no reply in time from %s", step.number, ", ".join(map(str, sorted(step.waiting))))
         return self._close(step, publish_s=publish_s, wait_s=loop.time() - began)
+
+    async def _show(self, seat: Seat, pictures: Sequence[bytes]) -> None:
+        """Publishes pictures, each under the key of its place, so that late joiners find all of the newest ones."""
+        for place, picture in enumerate(pictures):
+            if (seat, place) not in self._frames:
+                key = image_key(self._run, seat.side, seat.agent, place)
+                self._frames[seat, place] = await self._bus.publisher(key, Delivery.STATE)
+            await self._frames[seat, place].put(picture)
 
     def _close(self, step: _Step, *, publish_s: float, wait_s: float) -> Answers:
         self._step = None

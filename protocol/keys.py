@@ -2,6 +2,7 @@
 
     khala/<run>/<topic>                          topic: run, report, result
     khala/<run>/<side>/<agent>/<topic>           topic: briefing, observation, reply, message, exchange
+    khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
     khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
 
 An agent may write only below its own name, which is what the access rules of a router enforce. Names of
@@ -18,6 +19,7 @@ from protocol.errors import WrongKey
 
 ROOT = "khala"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_PLACE = re.compile(r"0|[1-9][0-9]{0,3}")
 _LONGEST_SHOWN = 200
 
 
@@ -29,6 +31,7 @@ class Topic(StrEnum):
     RESULT = "result"
     BRIEFING = "briefing"
     OBSERVATION = "observation"
+    IMAGE = "image"
     REPLY = "reply"
     MESSAGE = "message"
     EXCHANGE = "exchange"
@@ -37,11 +40,17 @@ class Topic(StrEnum):
 
 RUN_TOPICS = frozenset({Topic.RUN, Topic.REPORT, Topic.RESULT})
 AGENT_TOPICS = frozenset(Topic) - RUN_TOPICS
+NUMBERED_TOPICS = frozenset({Topic.ALIVE, Topic.IMAGE})
+"""Those of an agent that have one more part in their keys."""
 
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A parsed key. `side` and `agent` are None on topics of the run, `instance` is set on `alive` only."""
+    """A parsed key.
+
+    `side` and `agent` are None on topics of the run; `instance` is the last part of a key of `alive` or `image`, and
+    None on others.
+    """
 
     run: str
     topic: Topic
@@ -73,7 +82,7 @@ def run_key(run: str, topic: Topic) -> str:
 
 def agent_key(run: str, side: str, agent: str, topic: Topic) -> str:
     """Key of one agent's topic."""
-    if topic not in AGENT_TOPICS or topic is Topic.ALIVE:
+    if topic not in AGENT_TOPICS - NUMBERED_TOPICS:
         raise WrongKey(f"{topic} is no topic of an agent")
     return f"{_agent_root(run, side, agent)}/{topic}"
 
@@ -83,11 +92,21 @@ def alive_key(run: str, side: str, agent: str, instance: str) -> str:
     return f"{_agent_root(run, side, agent)}/{Topic.ALIVE}/{check_name(instance, 'instance')}"
 
 
+def image_key(run: str, side: str, agent: str, place: int) -> str:
+    """Key of the picture that stands at this place, from 0, in each of an agent's observations."""
+    return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/{place}"
+
+
+def images_of(run: str, side: str, agent: str) -> str:
+    """Expression that matches all pictures of an agent."""
+    return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/*"
+
+
 def every_agent(run: str, topic: Topic) -> str:
     """Expression that matches this topic of every agent of a run, on every side."""
     if topic not in AGENT_TOPICS:
         raise WrongKey(f"{topic} belongs to the run, not to an agent")
-    tail = f"{Topic.ALIVE}/*" if topic is Topic.ALIVE else str(topic)
+    tail = f"{topic}/*" if topic in NUMBERED_TOPICS else str(topic)
     return f"{ROOT}/{check_name(run, 'run')}/*/*/{tail}"
 
 
@@ -109,7 +128,9 @@ def parse(key: str) -> Address:
                 return Address(run, Topic(topic))
             case [root, run, side, agent, Topic.ALIVE, instance] if root == ROOT:
                 return Address(run, Topic.ALIVE, side, agent, instance)
-            case [root, run, side, agent, topic] if root == ROOT and topic in AGENT_TOPICS - {Topic.ALIVE}:
+            case [root, run, side, agent, Topic.IMAGE, place] if root == ROOT and _PLACE.fullmatch(place):
+                return Address(run, Topic.IMAGE, side, agent, place)
+            case [root, run, side, agent, topic] if root == ROOT and topic in AGENT_TOPICS - NUMBERED_TOPICS:
                 return Address(run, Topic(topic), side, agent)
     raise WrongKey(f"{key[:_LONGEST_SHOWN]!r} is no key of this protocol")
 

@@ -153,6 +153,10 @@ class UnitDetails(Frozen):
     """Minerals or vespene left in a resource."""
     harvesters: tuple[int, int] | None = None
     """Workers that an own base or gas structure has, and how many it has work for."""
+    ready: tuple[str, ...] = ()
+    """Of the skills that the agent may use, those that a unit of its team could use now."""
+    unready: tuple[str, ...] = ()
+    """The others."""
 
 
 class UnitView(Frozen):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from base64 import b64encode
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import to_json
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pydantic import JsonValue, SecretStr
 
     from agents.llm.pricing import Prices
+    from protocol.messages import ChatMessage
 
 API_VERSION = "2023-06-01"
 DEFAULT_BASE_URL = "https://api.anthropic.com/v1"
@@ -63,7 +65,7 @@ class Anthropic:
     async def complete(self, request: Request) -> Completion:
         """Makes one try; see `LLMClient`."""
         system = "\n\n".join(m.content for m in request.messages if m.role == "system")
-        turns = [{"role": m.role, "content": m.content} for m in request.messages if m.role != "system"]
+        turns = [_turn(message, request.pictures) for message in request.messages if message.role != "system"]
         body = {**self._fixed, "messages": turns}
         if system:
             body["system"] = system
@@ -93,6 +95,17 @@ class Anthropic:
             usage=body.usage.priced(self._prices) if body.usage else Usage(requests=1, unknown_requests=1),
             finish=body.stop_reason or "end_turn",
         )
+
+
+def _turn(message: ChatMessage, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+    if not message.images:
+        return {"role": message.role, "content": message.content}
+    blocks: list[dict[str, Any]] = []
+    for image in message.images:
+        data = b64encode(pictures[image.sha256]).decode()
+        blocks.append({"type": "text", "text": image.title})
+        blocks.append({"type": "image", "source": {"type": "base64", "media_type": image.media_type, "data": data}})
+    return {"role": message.role, "content": [*blocks, {"type": "text", "text": message.content}]}
 
 
 class _Block(BaseModel):

@@ -26,7 +26,9 @@ from protocol.errors import KhalaError
 from protocol.messages import ChatMessage, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from agents.llm.vision import Vision
 
 Scalar = str | int | float | bool | None
 
@@ -49,12 +51,14 @@ class Request:
         timeout_s: time this try may take, from the start of sending to the last byte of the answer.
         origin: the decision it belongs to, if any.
         attempt: number of this try for this decision, from 1.
+        pictures: bytes of the images that the messages name, by their hashes; all of them.
     """
 
     messages: tuple[ChatMessage, ...]
     timeout_s: float | None = None
     origin: Origin | None = None
     attempt: int = 1
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,15 +190,24 @@ class MalformedCompletion(LLMError):
 
 
 def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
-    """Hash of a prompt: of roles and contents, with their boundaries."""
+    """Hash of a prompt: of roles, contents and hashes of pictures, with their boundaries."""
     digest = hashlib.sha256()
     for message in messages:
         content = message.content.encode("utf-8", "surrogatepass")
         digest.update(f"{message.role} {len(content)}\n".encode())
         digest.update(content)
+        for image in message.images:
+            digest.update(f"\n{image.sha256} {image.title}\n".encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
 
 
-def estimated_tokens(messages: Iterable[ChatMessage]) -> int:
-    """Tokens of a prompt by the rule of thumb of four characters a token, rounded up a message."""
-    return sum(-(-len(message.content) // 4) for message in messages)
+def estimated_tokens(messages: Sequence[ChatMessage], vision: Vision | None = None) -> int:
+    """Tokens of a prompt: of texts by the rule of thumb of four characters a token, of pictures by the model's rule."""
+    texts = (text for message in messages for text in (message.content, *(image.title for image in message.images)))
+    words = sum(-(-len(text) // 4) for text in texts)
+    return words + (estimated_image_tokens(messages, vision) if vision else 0)
+
+
+def estimated_image_tokens(messages: Iterable[ChatMessage], vision: Vision) -> int:
+    """Tokens of the pictures of a prompt."""
+    return sum(vision.image_tokens(image) for message in messages for image in message.images)

@@ -5,6 +5,7 @@ What differs between the endpoints is a row of `agents.llm.profiles`.
 
 from __future__ import annotations
 
+from base64 import b64encode
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field, ValidationError
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
     from agents.llm.pricing import Prices
     from agents.llm.profiles import Profile
+    from agents.llm.vision import Detail
+    from protocol.messages import ChatMessage
 
 _PATH = "/chat/completions"
 
@@ -38,6 +41,7 @@ class OpenAICompatible:
         max_tokens: limit of generated tokens.
         temperature, seed: sent if given and if the endpoint takes them.
         extra: fields of the request body, as they are.
+        detail: how finely the model shall look at pictures.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class OpenAICompatible:
         temperature: float | None = None,
         seed: int | None = None,
         extra: Mapping[str, JsonValue] | None = None,
+        detail: Detail = "auto",
     ) -> None:
         asked = {
             profile.length_field: max_tokens,
@@ -66,11 +71,13 @@ class OpenAICompatible:
         self.endpoint = self._http.address
         self._profile = profile
         self._prices = prices
+        self._detail = detail
         self._fixed = {"model": model, **fields}
 
     async def complete(self, request: Request) -> Completion:
         """Makes one try; see `LLMClient`."""
-        body = to_json({**self._fixed, "messages": [self._message(m.role, m.content) for m in request.messages]})
+        messages = [self._message(message, request.pictures) for message in request.messages]
+        body = to_json({**self._fixed, "messages": messages})
         answer = await self._http.post(_PATH, body, request.timeout_s)
         return self._read(answer)
 
@@ -86,8 +93,16 @@ class OpenAICompatible:
         """Closes the connections."""
         await self._http.close()
 
-    def _message(self, role: str, content: str) -> dict[str, str]:
-        return {"role": self._profile.system_role if role == "system" else role, "content": content}
+    def _message(self, message: ChatMessage, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+        role = self._profile.system_role if message.role == "system" else message.role
+        if not message.images:
+            return {"role": role, "content": message.content}
+        parts: list[dict[str, Any]] = []
+        for image in message.images:
+            url = f"data:{image.media_type};base64,{b64encode(pictures[image.sha256]).decode()}"
+            parts.append({"type": "text", "text": image.title})
+            parts.append({"type": "image_url", "image_url": {"url": url, "detail": self._detail}})
+        return {"role": role, "content": [*parts, {"type": "text", "text": message.content}]}
 
     def _read(self, answer: bytes) -> Completion:
         try:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
+from agents.llm.vision import OPENAI, OPENAI_REASONING, QWEN, TokenRule
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -40,6 +42,7 @@ class Profile:
         cached_path: where in `usage` the number of cached prompt tokens stands.
         reasoning_path: where in `usage` the number of tokens stands that were thought and not said.
         needs_key: whether it makes no sense without a key.
+        image_tokens: how it counts pictures, for models that see.
     """
 
     length_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
@@ -49,14 +52,19 @@ class Profile:
     cached_path: tuple[str, ...] = ("prompt_tokens_details", "cached_tokens")
     reasoning_path: tuple[str, ...] = ("completion_tokens_details", "reasoning_tokens")
     needs_key: bool = False
+    image_tokens: TokenRule = QWEN
 
 
 PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
     {
-        "openai": Profile(length_field="max_completion_tokens", needs_key=True),
+        "openai": Profile(length_field="max_completion_tokens", needs_key=True, image_tokens=OPENAI),
         # `max_tokens` and a temperature are refused with 400; the system role is called `developer`
         "openai-reasoning": Profile(
-            length_field="max_completion_tokens", system_role="developer", temperature=False, needs_key=True
+            length_field="max_completion_tokens",
+            system_role="developer",
+            temperature=False,
+            needs_key=True,
+            image_tokens=OPENAI_REASONING,
         ),
         "deepseek": Profile(cached_path=("prompt_cache_hit_tokens",), seed=False, needs_key=True),
         "glm": Profile(seed=False, needs_key=True),
@@ -65,7 +73,7 @@ PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
         "ollama": Profile(),
         "llamacpp": Profile(),
         "litellm": Profile(),
-        "scripted": Profile(),
+        "scripted": Profile(image_tokens=OPENAI),
         "compatible": Profile(),
     }
 )

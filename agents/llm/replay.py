@@ -123,8 +123,15 @@ def _difference(recorded: tuple[ChatMessage, ...], asked: tuple[ChatMessage, ...
     for index, (old, new) in enumerate(zip(recorded, asked, strict=True)):
         if old.role != new.role:
             return f"message {index} was of role {old.role}, and is of role {new.role}"
+        if old.images != new.images:
+            return f"message {index} was sent with {_names(old)}, and is with {_names(new)}"
         lines = zip(f"{old.content}\n".splitlines(), f"{new.content}\n".splitlines(), strict=False)
         for number, (before, after) in enumerate(lines, 1):
             if before != after:
                 return f"message {index}, line {number} was {before!r}, and is {after!r}"
     return "its end differs"
+
+
+def _names(message: ChatMessage) -> str:
+    """The pictures of a message."""
+    return ", ".join(f"{image.name} {image.sha256[:8]}" for image in message.images) or "no pictures"

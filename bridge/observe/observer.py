@@ -24,7 +24,8 @@ from bridge.observe.text import Feedback, Page, render, sections_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from bridge.frames import Camera
+    from bridge.frames import Camera, MapFrame
+    from bridge.observe.image.album import Album
     from bridge.observe.text.page import Part, Section
     from bridge.snapshot import Snapshot
     from bridge.task import AgentConfig, TaskConfig
@@ -70,13 +71,14 @@ class Observer:
         episode.roster.update(snapshot.own, snapshot.response.observation.player_common)
         scene = Scene(snapshot, self._task.frames, episode.scene)
         episode.chronicle.note(scene.bodies, scene.upgrades, snapshot.dead)
+        album = self._album(snapshot, scene.world)
         agents: dict[str, AgentSight] = {}
         conditions: dict[str, str] = {}
         for config in self._task.agents:
             seen = self._agent(scene, config)
             page = Page(seen, self._task, told.get(config.name, Feedback()), conditions)
             text = render(page, self._sections[config.name], config.text_tokens)
-            agents[config.name] = replace(seen, text=text)
+            agents[config.name] = replace(seen, text=text, pictures=album.pictures(seen) if album else ())
             yield agents[config.name]
         episode.scene, episode.sight = scene, Sight(snapshot, scene.world, agents)
 
@@ -85,6 +87,14 @@ class Observer:
         """What was seen last."""
         assert self._episode.sight is not None, "nothing has been observed in this episode"
         return self._episode.sight
+
+    def _album(self, snapshot: Snapshot, world: MapFrame) -> Album | None:
+        """Who draws pictures; None if no agent is shown any, so that OpenCV is loaded only for those who are."""
+        if not any(agent.images for agent in self._task.agents):
+            return None
+        from bridge.observe.image.album import Album  # noqa: PLC0415  # see above
+
+        return Album(snapshot, world)
 
     def _agent(self, scene: Scene, agent: AgentConfig) -> AgentSight:
         episode, parts = self._episode, self._parts[agent.name]
@@ -138,6 +148,6 @@ def _landmarks(scene: Scene, parts: frozenset[Part], camera: Camera | None) -> I
     if "structures" in parts:
         yield from landmarks.structures(scene)
     if "power" in parts:
-        yield from landmarks.power_fields(scene)
+        yield from landmarks.power_fields(scene, camera)
     if "places" in parts:
         yield from landmarks.free_places(scene, camera)

@@ -8,8 +8,8 @@ another thread, or after a fork.
     ┌──────────┬─────────────────────────────────────┬──────────────────────┬──────────────────────────────┐
     │ Delivery │ used for                            │ a slow receiver      │ a receiver that joins later  │
     ├──────────┼─────────────────────────────────────┼──────────────────────┼──────────────────────────────┤
-    │ STATE    │ briefing, observation, run, result  │ loses old ones, is   │ gets the newest at once, and │
-    │          │                                     │ told how many; never │ after a lost link the newest │
+    │ STATE    │ briefing, observation, image, run,  │ loses old ones, is   │ gets the newest at once, and │
+    │          │ result                              │ told how many; never │ after a lost link the newest │
     │          │                                     │ slows anybody down   │ it missed                    │
     │ SPEECH   │ reply, message                      │ the sender waits,    │ gets nothing from before     │
     │          │                                     │ half a second at most│                              │

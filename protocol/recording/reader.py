@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import os
 import struct
@@ -62,7 +63,9 @@ class Recorded:
 
     @cached_property
     def message(self) -> Wire | None:
-        """The message; None if the bytes are none of this protocol."""
+        """The message; None if the bytes are none of this protocol, or a picture."""
+        if self.address is not None and self.address.topic is Topic.IMAGE:
+            return None
         try:
             return decode(self.payload)
         except PeerError:
@@ -146,6 +149,17 @@ class Recording:
                 continue
             if isinstance(sample.message, kind):
                 yield sample.message
+
+    def images(self) -> Iterator[tuple[str, bytes]]:
+        """Every picture once, by the hash under which observations name it."""
+        seen: set[str] = set()
+        for sample in self:
+            if sample.address is None or sample.address.topic is not Topic.IMAGE:
+                continue
+            digest = hashlib.sha256(sample.payload).hexdigest()
+            if digest not in seen:
+                seen.add(digest)
+                yield digest, sample.payload
 
     def observations(self, agent: str) -> Iterator[Observation]:
         """What one agent was shown."""

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from orchestrator.roster import Seat
+from orchestrator.turn import Question
 from protocol.bus.memory import MemoryBroker
 from protocol.messages import Observation, View
 
@@ -21,19 +22,21 @@ def broker() -> MemoryBroker:
 
 
 @pytest.fixture
-def observe() -> Callable[..., list[Observation]]:
-    def make(*seats: Seat, step: int = 0, within_s: float | None = None) -> list[Observation]:
+def observe() -> Callable[..., list[Question]]:
+    def make(*seats: Seat, step: int = 0, within_s: float | None = None) -> list[Question]:
         return [
-            Observation(
-                run=RUN,
-                side=seat.side,
-                agent=seat.agent,
-                episode=0,
-                step=step,
-                game_loop=8 * step,
-                answer_within_s=within_s,
-                text="",
-                view=View(time_s=0.0),
+            Question(
+                Observation(
+                    run=RUN,
+                    side=seat.side,
+                    agent=seat.agent,
+                    episode=0,
+                    step=step,
+                    game_loop=8 * step,
+                    answer_within_s=within_s,
+                    text="",
+                    view=View(time_s=0.0),
+                )
             )
             for seat in seats
         ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from orchestrator.roster import MissingAgents, Roster, Seat
-from orchestrator.turn import Turn
+from orchestrator.turn import Question, Turn
 from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
 from protocol.keys import Topic, agent_key, alive_key
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from protocol.bus.memory import MemoryBroker, MemoryBus
 
-    Observe = Callable[..., list[Observation]]
+    Observe = Callable[..., list[Question]]
 
 RUN = "test"
 ZEALOTS, STALKERS = Seat("p1", "Zealots"), Seat("p1", "Stalkers")

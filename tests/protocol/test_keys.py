@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from protocol.errors import WrongKey
 from protocol.keys import (
     AGENT_TOPICS,
+    NUMBERED_TOPICS,
     RUN_TOPICS,
     Address,
     Topic,
@@ -18,12 +19,14 @@ from protocol.keys import (
     check_name,
     every_agent,
     everything,
+    image_key,
+    images_of,
     parse,
     run_key,
 )
 
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", fullmatch=True)
-SAID = sorted(AGENT_TOPICS - {Topic.ALIVE})
+SAID = sorted(AGENT_TOPICS - NUMBERED_TOPICS)
 
 BAD_NAMES = [
     *("", "*", "**", "a*", "$*", "a$*b", "a/b", "/", "a/", "?", "#", "@", "a b", " a", "a\n", "\n", "é", "a\x00"),
@@ -32,13 +35,14 @@ BAD_NAMES = [
 
 
 @settings(deadline=None)
-@given(NAMES, NAMES, NAMES, NAMES)
-def test_what_is_built_is_parsed_back(run: str, side: str, agent: str, instance: str) -> None:
+@given(NAMES, NAMES, NAMES, NAMES, st.integers(0, 9999))
+def test_what_is_built_is_parsed_back(run: str, side: str, agent: str, instance: str, place: int) -> None:
     for topic in RUN_TOPICS:
         assert parse(run_key(run, topic)) == Address(run, topic)
     for topic in SAID:
         assert parse(agent_key(run, side, agent, topic)) == Address(run, topic, side, agent)
     assert parse(alive_key(run, side, agent, instance)) == Address(run, Topic.ALIVE, side, agent, instance)
+    assert parse(image_key(run, side, agent, place)) == Address(run, Topic.IMAGE, side, agent, str(place))
 
 
 @settings(deadline=None)
@@ -51,7 +55,10 @@ def test_what_is_parsed_is_built_back_and_all_else_is_refused(key: str) -> None:
     if address.instance is not None:
         assert address.side is not None
         assert address.agent is not None
-        built = alive_key(address.run, address.side, address.agent, address.instance)
+        if address.topic is Topic.IMAGE:
+            built = image_key(address.run, address.side, address.agent, int(address.instance))
+        else:
+            built = alive_key(address.run, address.side, address.agent, address.instance)
     elif address.agent is not None:
         assert address.side is not None
         built = agent_key(address.run, address.side, address.agent, address.topic)
@@ -70,6 +77,9 @@ def test_what_is_parsed_is_built_back_and_all_else_is_refused(key: str) -> None:
         (alive_key("r1", "p1", "A", "7f.2"), "khala/r1/p1/A/alive/7f.2"),
         (every_agent("r1", Topic.REPLY), "khala/r1/*/*/reply"),
         (every_agent("r1", Topic.ALIVE), "khala/r1/*/*/alive/*"),
+        (image_key("r1", "p1", "A", 2), "khala/r1/p1/A/image/2"),
+        (images_of("r1", "p1", "A"), "khala/r1/p1/A/image/*"),
+        (every_agent("r1", Topic.IMAGE), "khala/r1/*/*/image/*"),
         (everything("r1"), "khala/r1/**"),
     ],
 )
@@ -86,6 +96,7 @@ def test_no_name_can_widen_an_expression(name: str) -> None:
         lambda: agent_key("r", name, "A", Topic.REPLY),
         lambda: agent_key("r", "p1", name, Topic.REPLY),
         lambda: alive_key("r", "p1", "A", name),
+        lambda: images_of("r", "p1", name),
         lambda: every_agent(name, Topic.REPLY),
         lambda: everything(name),
         lambda: parse(f"khala/{name}/run"),
@@ -123,6 +134,9 @@ def test_expressions_match_what_they_say_and_nothing_else(run: str, other: str, 
         "khala/r1/p1/A/run",
         "khala/r1/p1/A/alive",
         "khala/r1/p1/A/alive/i/j",
+        "khala/r1/p1/A/image",
+        "khala/r1/p1/A/image/x",
+        "khala/r1/p1/A/image/07",
         "khala/r1/p1/A/reply/x",
         "khala/r1/p1/A/shout",
         "other/r1/run",
@@ -145,7 +159,7 @@ def test_topics_are_not_put_where_they_do_not_belong() -> None:
     for topic in RUN_TOPICS:
         with pytest.raises(WrongKey, match=f"^{topic} belongs to the run, not to an agent$"):
             every_agent("r", topic)
-    for topic in {*RUN_TOPICS, Topic.ALIVE}:
+    for topic in {*RUN_TOPICS, *NUMBERED_TOPICS}:
         with pytest.raises(WrongKey, match=f"^{topic} is no topic of an agent$"):
             agent_key("r", "p1", "A", topic)
 

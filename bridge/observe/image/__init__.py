@@ -2,7 +2,9 @@
 
     palette, lettering     colours; letters and stamps             canvas      margins, axes, grid
     painting, moment       the ground; what there is to be drawn   bodies, effects, marks     what stands on it
-    screen, minimap, layers                                        pictures of one kind each
+    screen, minimap, layers, features, own                         pictures of one kind each
+    album, titles, picture                                         those that an agent is shown, in words and as bytes
 
-A picture is a function of a snapshot, a sight and a specification. Above it: `bridge.observe.observer`.
+A picture is a function of a snapshot, a sight and a specification (`bridge.imagespec`). Above it:
+`bridge.observe.observer`.
 """

@@ -1,7 +1,7 @@
 """The pictures of an agent's observation, as its configuration asks for them.
 
-    moment = Moment(snapshot)                   once a step
-    pictures_of(moment, world, seen)            for each agent
+    album = Album(snapshot, world)      once a step
+    album.pictures(seen)                for each agent
 
 A specification may give no picture (the game's own pixels are wanted and its camera is elsewhere), one, or one for each
 of the first teams. What is shown is a function of moment, frames and sight alone.
@@ -15,6 +15,7 @@ from bridge.observe.image import features, minimap, own, screen, titles
 from bridge.observe.image.canvas import Canvas, inner_px
 from bridge.observe.image.layers import LAYERS, coloured, explain
 from bridge.observe.image.minimap import Site
+from bridge.observe.image.moment import Moment
 from bridge.observe.image.picture import encoded
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
     from bridge.imagespec import ImageSpec
     from bridge.observe.image.layers import Cells, Layer
     from bridge.observe.image.lettering import Image
-    from bridge.observe.image.moment import Moment
     from bridge.observe.image.picture import Picture
     from bridge.observe.sight import AgentSight
+    from bridge.snapshot import Snapshot
 
 
 class Drawing(NamedTuple):
@@ -45,13 +46,21 @@ class _Looker(NamedTuple):
     tags: frozenset[int]
 
 
-def pictures_of(moment: Moment, world: MapFrame, seen: AgentSight) -> tuple[Picture, ...]:
-    """All pictures of an agent, in the order of its configuration."""
-    return tuple(
-        encoded(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
-        for spec in seen.agent.images
-        for drawing in drawn(spec, moment, world, seen)
-    )
+class Album:
+    """The pictures of one step; what all agents see alike is made once."""
+
+    def __init__(self, snapshot: Snapshot, world: MapFrame) -> None:
+        """Takes a snapshot, and the frame of its map."""
+        self._moment = Moment(snapshot)
+        self._world = world
+
+    def pictures(self, seen: AgentSight) -> tuple[Picture, ...]:
+        """All pictures of an agent, in the order of its configuration."""
+        return tuple(
+            encoded(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
+            for spec in seen.agent.images
+            for drawing in drawn(spec, self._moment, self._world, seen)
+        )
 
 
 def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentSight) -> Iterator[Drawing]:

@@ -34,6 +34,8 @@ Cells: TypeAlias = "NDArray[np.integer[Any]]"
 Values: TypeAlias = Callable[[Moment, "Camera", int], Cells]
 """A moment, a camera and a size in pixels → (size, size), 0 to 255."""
 _SIDE_NUMBERS = {"own": 1, "ally": 2, "neutral": 3, "enemy": 4}
+_CLIFF = 16
+"""Height of a cliff level in the game's numbers."""
 _GREY, _DARK, _WHITE = (150, 150, 150), (28, 26, 24), (235, 235, 235)
 
 
@@ -115,7 +117,7 @@ def _effects(moment: Moment, camera: Camera, size_px: int) -> Mask:
 
 
 def _percent(share: float) -> int:
-    return round(255 * share) if share >= 0 else 0
+    return max(1, round(255 * share)) if share >= 0 else 0
 
 
 # --- the table ----------------------------------------------------------------------------------------------
@@ -187,8 +189,7 @@ def coloured(layer: Layer, values: Cells) -> Image:
     """The picture of a layer's values."""
     table = np.zeros((256, 3), np.uint8)
     if layer.kind == "scalar":
-        most = max(int(values.max()), 1) if layer.name in _MOST else 255
-        return np.asarray(_viridis()[np.clip(values * (255 / most), 0, 255).astype(np.uint8)], np.uint8)
+        return _graded(layer, values)
     if layer.kind == "types":
         table[:] = _hues()
         return np.asarray(table[np.where(values, 1 + values % 255, 0)], np.uint8)
@@ -196,6 +197,19 @@ def coloured(layer: Layer, values: Cells) -> Image:
     for value, _, colour in layer.colours:
         table[value] = colour
     return np.asarray(table[np.clip(values, 0, 255)], np.uint8)
+
+
+def _graded(layer: Layer, values: Cells) -> Image:
+    """From dark to light; heights over the range that is there, units' values over all there could be."""
+    low, high = 0, 255
+    if layer.name in _MOST:
+        high = max(int(values.max()), 1)
+    elif layer.name == "height_map" and int(values.max()) - int(values.min()) >= _CLIFF // 2:
+        low, high = int(values.min()), int(values.max())
+    image = np.asarray(_viridis()[np.clip((values - float(low)) * (255 / (high - low)), 0, 255).astype(np.uint8)])
+    if layer.name != "height_map":
+        image[values == 0] = _DARK  # nothing is there
+    return image
 
 
 @functools.cache
