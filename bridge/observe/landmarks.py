@@ -30,22 +30,21 @@ MAX_PLACES = 5
 """Free places for a base that are told, the nearest ones."""
 BASE_TAKEN = 6.0
 """World units from the middle of a base's place within which a town hall takes it."""
+POWERS = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing"})
+"""What structures and units can be warped in at; a Nexus or a Gateway only makes it faster."""
 GAS_OF_BASE = 10.0
 """World units from a town hall within which a geyser is its own; as workers are counted."""
 ON_TOP = 1.0
 """World units between the middles of a geyser and of the structure on it."""
 
 
-def power_fields(scene: Scene) -> Iterator[Landmark]:
-    """What one can warp in at and build by, in the order of tags."""
+def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+    """What one can warp in at and build by, in the order of tags; with its place on the screen of a camera."""
     sources = scene.snapshot.response.observation.raw_data.player.power_sources
     for source in sorted(sources, key=lambda source: source.tag):
         body = scene.bodies.get(source.tag)
-        minimap = rounded(scene.world.minimap(source.pos.x, source.pos.y), scene.world.minimap_size)
-        name = body.name if body else "power field"
-        yield Landmark(
-            what="power field", tag=hex(source.tag), type=name, minimap=minimap, about=f"radius {source.radius:g}"
-        )
+        if body is not None and body.name in POWERS:
+            yield _landmark("power field", body, camera, f"radius {source.radius:g}")
 
 
 def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
@@ -56,19 +55,19 @@ def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
     free = [base.place for base in land.bases if _nearest(base.place, halls) > BASE_TAKEN]
     fields = [body for body in scene.resources if "Mineral" in body.name]
     for place in sorted(free, key=lambda place: (_nearest(place, own), place))[:MAX_PLACES]:
-        yield from _base(scene, camera, place, fields, own)
+        yield from _base(scene, place, fields, own)
     yield from _geysers(scene, camera, land)
 
 
 def _base(
-    scene: Scene, camera: Camera | None, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
+    scene: Scene, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
 ) -> Iterator[Landmark]:
     nearest = min(fields, key=lambda body: (math.dist((body.x, body.y), place), body.tag), default=None)
     if nearest is not None:
         far = _nearest(place, own)
         about = f"{far:.0f} from your nearest base" if math.isfinite(far) else ""
         middle = rounded(scene.world.minimap(*place), scene.world.minimap_size)
-        yield _landmark("base place", nearest, camera, about).but(minimap=middle)
+        yield _landmark("base place", nearest, None, about).but(minimap=middle)
 
 
 def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landmark]:

@@ -61,6 +61,15 @@ class Possible:
                     found[name] = self._why_not(catalogue()[name], units, able)
         return self._choice(found, next(iter(by_type), ""))
 
+    def skills(self, agent: AgentConfig, body: Body) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Skills that the agent may use and this very unit could use now, and those that it could not."""
+        skills = _skills(agent.actions.get(body.name, ()))
+        if self._abilities is None or not skills:
+            return (), ()
+        able = self._abilities.get(body.tag, frozenset())
+        ready = tuple([name for name, ability in skills.items() if ability in able])
+        return ready, tuple([name for name in skills if name not in ready])
+
     def for_side(self, names: Iterable[str]) -> Choice:
         """Those of the actions of a side team that somebody of the side can carry out."""
         return self._choice({name: self._why_nobody(catalogue()[name]) for name in names}, "")
@@ -153,6 +162,14 @@ def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None
     if action.needs.upgrade is not None and action.needs.upgrade not in upgrades:
         return f"{action.needs.upgrade} is not researched"
     return None
+
+
+@functools.lru_cache(1024)
+def _skills(names: tuple[str, ...]) -> dict[str, int]:
+    """Abilities of those actions that are skills, by the names of their functions without what they begin with."""
+    actions = (catalogue()[name] for name in names)
+    functions = (action.pysc2 for action in actions if action.group == "skill")
+    return {f.stem.partition("_")[2] or f.stem: f.ability_id for f in functions if f is not None}
 
 
 @functools.lru_cache(4096)

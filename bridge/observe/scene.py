@@ -26,7 +26,7 @@ from bridge.observe.body import body, rounded
 from bridge.observe.events import Events
 from bridge.observe.possible import Possible
 from bridge.observe.sight import TeamSight
-from protocol.messages import LOOPS_PER_S, Resources, TeamView, View
+from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
 _HALF = CAMERA_WIDTH / 2
+_NO_DETAILS = UnitDetails()
 
 
 class Scene:
@@ -124,7 +125,7 @@ class Scene:
         foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
         bodies = [self._order[index] for index in members.tolist()]
         view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies)).but(
-            units=self._units(looked, members, "own"),
+            units=tuple(map(functools.partial(self._skilled, agent), bodies, self._units(looked, members, "own"))),
             allies=self._units(looked, friends, "ally"),
             enemies=self._units(looked, foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
@@ -140,6 +141,14 @@ class Scene:
         far = looked.distance[rows].tolist()
         seen = zip(views, points, far, strict=True)
         return tuple([view.but(alliance=alliance, screen=at, distance=d) for view, at, d in seen])
+
+    def _skilled(self, agent: AgentConfig, seen: Body, view: UnitView) -> UnitView:
+        """A unit of an agent's team, with the skills that it could use."""
+        ready, unready = self.possible.skills(agent, seen)
+        if not ready and not unready:
+            return view
+        details = view.details or _NO_DETAILS
+        return view.but(details=details.but(ready=ready, unready=unready))
 
     def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
         """The resources on a camera's screen, by type and tag."""

@@ -53,8 +53,10 @@ def _price(offer: Offer) -> str:
     parts = [f"{offer.minerals} minerals"] if offer.minerals else []
     parts += [f"{offer.vespene} vespene"] if offer.vespene else []
     parts += [f"{n(offer.supply)} supply"] if offer.supply else []
-    first = "; you have none yet" if offer.first else ""
-    return f"Costs {', '.join(parts)}; enough for {offer.times}{first}."
+    more = [f"enough for {offer.times}"] if offer.times > 1 else []
+    more += [f"takes {offer.footprint[0]} x {offer.footprint[1]} cells of ground"] if offer.footprint else []
+    more += ["you have none yet"] if offer.first else []
+    return f"Costs {'; '.join((', '.join(parts), *more))}."
 
 
 @section("impossible")

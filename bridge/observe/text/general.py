@@ -38,11 +38,7 @@ def task(page: Page) -> Iterator[str]:
         yield f"{INDENT}{one_line(page.sight.agent.task)}"
     always = {team.team.config.name: team.team.config.task for team in page.sight.teams}
     yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
-    now: dict[str, list[str]] = {}
-    for team in page.teams:
-        if team.task:
-            now.setdefault(one_line(team.task), []).append(team.name)
-    yield from (f"{INDENT}Team {', '.join(names)}, now: {words}" for words, names in now.items())
+    yield from (f"{INDENT}Team {team.name}: {one_line(team.task)}" for team in page.teams if team.task)
 
 
 @section("answer")

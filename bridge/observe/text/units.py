@@ -130,6 +130,8 @@ def _own_lines(page: Page, team: TeamView) -> list[str]:
     size = page.task.frames.screen
     lines = _lines(page, team.units)
     for index, unit in enumerate(team.units):
+        if unit.details is not None:
+            lines[index] += _skills(unit.details)
         if not (0 <= unit.screen[0] < size and 0 <= unit.screen[1] < size):
             place = point(unit.screen)
             lines[index] = lines[index].replace(place, f"{place} (off screen)", 1)
@@ -183,6 +185,12 @@ def _details(details: UnitDetails) -> Iterator[str]:
         yield "burrowed"
     if details.unpowered:
         yield "without power"
+
+
+def _skills(details: UnitDetails) -> str:
+    """What a unit may be told to use now: part of no condition, since agents differ in it."""
+    ready = f" | ready {', '.join(details.ready)}" if details.ready else ""
+    return ready + (f" | not ready {', '.join(details.unready)}" if details.unready else "")
 
 
 def _order(order: OrderView) -> str:

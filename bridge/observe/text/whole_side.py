@@ -38,7 +38,8 @@ def _ready(count: TypeCount) -> str:
     if count.idle is None:
         return f"{count.ready} {count.type}"
     busy = count.ready - count.idle
-    return f"{count.ready} {count.type} ({busy} working, {count.idle} idle)"
+    state = f"{busy} working, {count.idle} idle" if busy and count.idle else "idle" if count.idle else "working"
+    return f"{count.ready} {count.type} ({state})"
 
 
 def _under_way(count: TypeCount) -> str:
@@ -154,14 +155,15 @@ def warp(page: Page) -> Iterator[str]:
     yield from listed("Power fields:", (f"{mark.type} {mark.tag} at minimap {point(mark.minimap)}" for mark in fields))
 
 
-@section("places", parts=("places",))
+@section("places", parts=("places", "power"))
 def places(page: Page) -> Iterator[str]:
-    """Free places for a base and free geysers, by the tags that name them."""
-    bases, geysers = _marks(page, "base place"), _marks(page, "geyser")
-    if bases or geysers:
+    """Free places for a base and free geysers, by the tags that name them, and where there is power."""
+    bases, geysers, fields = (_marks(page, what) for what in ("base place", "geyser", "power field"))
+    if bases or geysers or fields:
         yield "Places to build at"
     yield from listed("Free places for a base, each named by a resource beside it:", map(_place, bases))
     yield from listed("Free geysers:", map(_place, geysers))
+    yield from listed("Power fields, which most structures need:", map(_place, fields))
 
 
 def _place(mark: Landmark) -> str:
