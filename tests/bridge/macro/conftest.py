@@ -8,8 +8,8 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.action import Action
 from bridge.available import available, question
+from bridge.catalog import catalogue
 from bridge.functions import functions
 from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger
@@ -85,16 +85,16 @@ class Game:
 
     # --- rules ------------------------------------------------------------------------------------------------
 
-    def ask(self, rule: str, function: str, **fields: Any) -> list[Order]:
-        """What a rule answers for an action that ends in a function."""
-        given = {name: fields.pop(name) for name in ("units", "tag", "point") if name in fields}
-        action = Action(name=fields.pop("name", "Try_It"), about="", function=function, rule=rule, **fields)
-        return RULES[rule](Ask(action, self.snapshot, self.ledger, **given))
+    def say(self, action: str, **given: Any) -> list[Order]:
+        """What the rule of an action answers; given are `units`, `tag` and `point`, as far as the words name them."""
+        found = catalogue()[action]
+        assert found.rule is not None
+        return RULES[found.rule](Ask(found, self.snapshot, self.ledger, **given))
 
-    def refusal(self, rule: str, function: str, **fields: Any) -> Impossible:
-        """What a rule says that finds nothing."""
+    def refusal(self, action: str, **given: Any) -> Impossible:
+        """What the rule of an action says that finds nothing."""
         with pytest.raises(Impossible) as raised:
-            self.ask(rule, function, **fields)
+            self.say(action, **given)
         return raised.value
 
     def do(self, orders: Sequence[Order]) -> list[str]:
