@@ -27,6 +27,8 @@ WALK_COST = 3.0
 MELEE_WALK_COST = 1.0
 """The same for those who stand in each other's way."""
 COOLING_S = 0.3
+CLINGING = 230.0
+"""Worth of a runner at one's heels during a raid; a worker is worth 200."""
 
 
 def targets(team: Team) -> list[Unit]:
@@ -90,8 +92,11 @@ def best_target(plan: Plan, prey: str = "") -> Unit | None:
         able = [unit for unit in shooters if kind_of(unit).hits(kind_of(enemy))]
         ways = sorted(max(0.0, distance(unit, enemy) - _range(unit, enemy) - 1.0) for unit in able)
         way = ways[len(ways) // 2]
+        value = worth(enemy, prey)
+        if prey == "worker" and kind_of(enemy).melee and any(_gap(enemy, unit) < 1.0 for unit in team.own):
+            value = max(value, CLINGING)  # who is caught by runners cannot raid
         shared = 0.5 + plan.support.get(enemy.tag, 0.0) / most
-        return -shared * worth(enemy, prey) / (enemy.hit_points + 30.0) / 2 ** (way / patience), enemy.tag
+        return -shared * value / (enemy.hit_points + 30.0) / 2 ** (way / patience), enemy.tag
 
     return min(targets(team), key=value, default=None)
 

@@ -134,13 +134,14 @@ def graviton_beam(plan: Plan) -> None:
     free = [unit for unit in team.own if unit.energy >= 50 and "Graviton" not in unit.order]
     if len(team.own) < 2 or any("GravitonBeam" in unit.effects for unit in team.enemies) or len(free) < 1:
         return
+    guarded = any(kind_of(foe).structure and kind_of(foe).air > 0 for foe in team.enemies)
     prey = [u for u in _bodies(plan) if not kind_of(u).flying and not {"Ultralisk", "Larva"} & {u.type}]
-    workers = dict.fromkeys(("Drone", "Probe", "SCV"), -1 if plan.prey == "worker" else 2)
+    workers = dict.fromkeys(("Drone", "Probe", "SCV"), -1 if plan.prey == "worker" and not guarded else 2)
     order = {"Queen": 0, "Hydralisk": 1, "Infestor": 1, **workers}
     caster = max(free, key=lambda unit: unit.energy)
     target = min(
         (unit for unit in prey if unit.type in order),
-        key=lambda unit: (order[unit.type], distance(unit, caster), unit.tag),
+        key=lambda unit: (order[unit.type], unit.hit_points // 60, distance(unit, caster), unit.tag),
         default=None,
     )
     if target is not None and distance(target, caster) < 9:
