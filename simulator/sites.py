@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 CAPS: Final = "Footprint3x3CappedGeyser"
+VISIBLE: Final = 2  # in sight, 1 is explored; most structures may be placed where nobody has looked yet
 ON_GEYSER: Final = 0.5  # how far from a geyser's middle a gas structure may be asked for
 
 
@@ -69,8 +70,7 @@ def _of_ground(world: World, player: int, footprint: Footprint, cells: Ints) -> 
     buildable = terrain.build if "NoBuild" in footprint.forbids else terrain.walk
     if not buildable[y, x].all():
         return Refusal.CANT_BUILD_LOCATION_INVALID
-    least = 2 if "Fogged" in footprint.forbids else 1
-    if (world.visibility[player, y, x] < least).any():
+    if "Fogged" in footprint.forbids and (world.visibility[player, y, x] < VISIBLE).any():
         return Refusal.CANT_SEE_BUILD_LOCATION
     if taken(world)[y, x].any() or _enemies_on(world, player, cells):
         return Refusal.CANT_BUILD_ON_THAT

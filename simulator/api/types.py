@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simulator.catalog import load_catalog
+from simulator.power import SUPPLIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -45,7 +46,7 @@ class Types:
         self.cargo: Ints = self._column(lambda unit: unit.cargo_space, np.int64)
         self.subgroup: Ints = self._column(lambda unit: unit.subgroup, np.int64)
         self.resource: Ints = self._column(lambda unit: unit.resource_amount, np.int64)
-        self.power: Floats = self._column(lambda unit: max((radius for radius, _ in unit.power), default=0.0))
+        self.power: Floats = self._column(_field_of_power)
         self.flying: Bools = self._column(lambda unit: unit.flying, np.bool_)
         self.structure: Bools = self._column(lambda unit: unit.structure, np.bool_)
         self.army: Bools = self._column(lambda unit: unit.army, np.bool_)
@@ -85,3 +86,8 @@ def _count(upgrades: Iterable[Upgrade], catalog: str, entries: set[str], field: 
 def types_of(version: str) -> Types:
     """The arrays of a shipped catalog."""
     return Types(load_catalog(version))
+
+
+def _field_of_power(unit: UnitType) -> float:
+    """Radius in which it powers structures; those that only hasten warping in have none."""
+    return max(radius for radius, _ in unit.power) if unit.name in SUPPLIES else 0.0

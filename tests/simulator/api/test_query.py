@@ -4,10 +4,12 @@ import math
 
 import pytest
 from s2clientprotocol import common_pb2, error_pb2, query_pb2, raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.client import Client, interface
 
 PYLON, GATEWAY, NEXUS, WARP_ZEALOT, REFINERY, SPAWNING_POOL = 881, 883, 880, 1413, 320, 1155
+SPINE_CRAWLER = 1166
 
 
 @pytest.fixture
@@ -83,6 +85,20 @@ def test_places_to_build(ability: int, point: tuple[float, float], result: str) 
     client = Client()
     client.play("2s3z", interface(screen=0))
     assert place(client, ability, *point) == result
+
+
+def test_a_base_may_be_placed_where_nobody_has_looked_yet() -> None:
+    client = Client()
+    client.play("Simple64", interface(screen=0))
+    observation = client.observe().observation.raw_data
+    sight = observation.map_state.visibility
+    (foe,) = client.ask(game_info=sc.RequestGameInfo()).game_info.start_raw.start_locations
+    assert sight.data[int(foe.y) * sight.size.x + int(foe.x)] == 0
+    fields = [unit.pos for unit in observation.units if unit.mineral_contents]
+    unseen = (foe.x - 12.5, foe.y - 0.5) if foe.x > sight.size.x / 2 else (foe.x + 11.5, foe.y - 0.5)
+    assert all(math.dist(unseen, (field.x, field.y)) > 6 for field in fields)
+    assert place(client, PYLON, *unseen) != "CantSeeBuildLocation"
+    assert place(client, SPINE_CRAWLER, *unseen) == "CantSeeBuildLocation"
 
 
 def test_abilities_are_told_of_own_units_only(client: Client) -> None:

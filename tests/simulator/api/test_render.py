@@ -464,6 +464,7 @@ def test_a_replay_reports_clicks_in_the_pixels_of_its_viewer() -> None:
 def test_effects_and_power_are_told_in_raw_data(make_table: Any) -> None:
     table = make_table(sc.InterfaceOptions(raw=True))
     pylon = table.put("Pylon", 1, 10, 12)
+    table.put("Nexus", 1, 24, 12)  # hastens warping in, and powers nothing
     table.world.fields.append(Field("bile", 2, [(16.0, 18.0)], 0.5, 0, 100, effect=11))
     raw = table.observe().raw_data
     (effect,) = raw.effects
