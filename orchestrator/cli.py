@@ -37,7 +37,8 @@ Examples:\n
 REPLAY_EPILOG = """
 Examples:\n
     khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
-    khala replay recording.mcap --agent Stalkers --steps 10-20 --text
+    khala replay recording.mcap --agent Stalkers --steps 10-20 --text\n
+    khala replay recording.mcap --steps 7 --images pictures
 """
 
 
@@ -87,12 +88,20 @@ def replay(
     agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
     text: Annotated[bool, typer.Option("--text", help="Observations and replies word for word.")] = False,
+    images: Annotated[
+        Path | None, typer.Option(help="Write the pictures that agents were shown into this directory.", metavar="DIR")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Tell what was said and done in a recorded run."""
-    from orchestrator.tell import Selection, summary, tell  # noqa: PLC0415  # zstd and mcap are not needed for --help
+    from orchestrator.tell import Selection, save_pictures, summary, tell  # noqa: PLC0415  # zstd is not for --help
 
     selection = Selection.of(agent, steps)
+    if images is not None:
+        saved = save_pictures(file, selection, images)
+        data = {"pictures": [str(path) for path in saved]}
+        _out(data, f"{len(saved)} pictures are in {images}", as_json=as_json)
+        return
     if as_json:
         typer.echo(json.dumps(summary(file, selection)))
         return

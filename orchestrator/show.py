@@ -139,7 +139,10 @@ def table(result: Result) -> Panel:
 
 def _tokens(usages: Iterable[Usage]) -> str:
     total = sum(usages, start=Usage())
-    text = f"{total.prompt_tokens:,} in, {total.completion_tokens:,} out, {total.requests} request(s)"
+    text = f"{total.prompt_tokens:,} in"
+    if total.images:
+        text += f" (about {total.image_tokens:,} of them for {total.images} pictures)"
+    text += f", {total.completion_tokens:,} out, {total.requests} request(s)"
     if total.unknown_requests:
         text += f", {total.unknown_requests} of unknown size"
     return text + (", no price known" if total.cost_usd is None else f", {total.cost_usd:.4f} USD")

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Self
 from rich.text import Text
 
 from orchestrator.show import STATUS, card, clock, table
-from protocol.errors import ConfigError
-from protocol.messages import AgentReport, Message, Observation, Reply, Report, Result, Run
-from protocol.recording import read
+from protocol.errors import ConfigError, RecordingError
+from protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
+from protocol.recording import Recording, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,6 +75,7 @@ def tell(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[R
                 yield table(result)
             case Observation() as seen if whole and selection.holds(seen.step, seen.agent):
                 yield _words(f"step {seen.step}, {seen.agent} sees", seen.text, "cyan")
+                yield from (_picture(image) for image in seen.images)
             case Reply() as reply if whole and selection.holds(reply.step, reply.agent):
                 yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
             case Message() as said if selection.holds(said.step, said.agent):
@@ -116,6 +117,42 @@ def _agent(agent: AgentReport) -> Iterator[Text]:
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
         yield Text.assemble((f"    {fault.text}", "red"), f"  {fault.reason}: {fault.message}")
+
+
+def save_pictures(path: Path, selection: Selection, directory: Path) -> list[Path]:
+    """Writes the pictures that agents were shown into a directory, and returns their files.
+
+    Args:
+        path: the recording.
+        selection: which part.
+        directory: is made if it is not there; files are named after step, agent and picture.
+
+    Raises:
+        RecordingError: the file is no recording, or the directory cannot be written.
+    """
+    recording = Recording.open(path)
+    pictures = dict(recording.images())
+    saved = []
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for seen in recording.of(Observation):
+            if not selection.holds(seen.step, seen.agent):
+                continue
+            for image in seen.images:
+                if image.sha256 in pictures:
+                    kind = image.media_type.partition("/")[2]
+                    name = f"{seen.episode}-{seen.step:04}-{seen.agent}-{image.name}.{kind}"
+                    saved.append(directory / name)
+                    saved[-1].write_bytes(pictures[image.sha256])
+    except OSError as error:
+        raise RecordingError(f"{directory} cannot be written: {error.strerror}") from None
+    return saved
+
+
+def _picture(image: ImageRef) -> Text:
+    kind = image.media_type.partition("/")[2].upper()
+    size = f"{image.width} x {image.height} {kind}, {image.bytes / 1000:.0f} kB"
+    return Text.assemble(("  picture ", "bold cyan"), f"{image.name} ({size}): ", (image.title, "dim"))
 
 
 def _words(title: str, text: str, style: str) -> Text:

@@ -91,6 +91,8 @@ def draw(
         cv2.circle(image, canvas.pixel(*alert), 9, palette.INK, 4, cv2.LINE_AA)
         cv2.circle(image, canvas.pixel(*alert), 9, ALERT, 2, cv2.LINE_AA)
     _name_teams(canvas, teams, world, scale)
+    if pixels is not None:
+        return canvas.image, Legend(("team",) if own else (), rendered=True)
     return canvas.image, Legend(tuple(sorted(sides, key=RANK.__getitem__)))
 
 

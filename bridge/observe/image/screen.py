@@ -6,7 +6,7 @@ It is drawn from what the raw interface tells, so that each team has a screen of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.frames import CAMERA_WIDTH
@@ -41,6 +41,8 @@ class Legend:
     """A mark, and the tag that it is of."""
     unmarked: int = 0
     """Units for whose mark there was no room."""
+    rendered: bool = False
+    """Whether the game drew it, in colours of its own; what was added has ours."""
 
 
 class _Drawn(NamedTuple):
@@ -98,7 +100,8 @@ def draw_over(
     if grid:
         canvas.rule()
     seen = _seen(canvas, moment, camera, team)
-    return canvas.image, _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=False)
+    legend = _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=False)
+    return canvas.image, replace(legend, sides=legend.sides if marks else (), rendered=True)
 
 
 def _placing(canvas: Canvas, camera: Camera) -> Callable[[float, float], tuple[int, int]]:

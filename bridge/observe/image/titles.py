@@ -24,7 +24,11 @@ _ON_MINIMAP = {**_ON_SCREEN, "team": "your units"}
 
 def of_screen(team: str, extent: float, legend: Legend) -> str:
     """Of a team's screen."""
-    parts = [f"Screen of team {team}, from [0, 0] at the top left to {_corner(extent)}", _colours(legend, _ON_SCREEN)]
+    parts = [
+        f"Screen of team {team}, from [0, 0] at the top left to {_corner(extent)}",
+        "rendered by the game" if legend.rendered else "",
+        ("marks: " if legend.rendered and legend.sides else "") + _colours(legend, _ON_SCREEN),
+    ]
     if legend.codes:
         parts.append("letters: " + ", ".join(f"{code} {name}" for code, name in legend.codes.items()))
     if legend.example:
@@ -37,10 +41,14 @@ def of_screen(team: str, extent: float, legend: Legend) -> str:
 
 def of_minimap(extent: float, legend: Legend) -> str:
     """Of the minimap."""
-    return (
-        f"Minimap, from [0, 0] at the top left to {_corner(extent)}; {_colours(legend, _ON_MINIMAP)}; squares are "
-        "structures and resources, white frames what your teams see, yellow rings where your side was hurt."
-    )
+    parts = [
+        f"Minimap, from [0, 0] at the top left to {_corner(extent)}",
+        "rendered by the game" if legend.rendered else "",
+        _colours(legend, _ON_MINIMAP),
+        "" if legend.rendered else "squares are structures and resources",
+        "white frames are what your teams see, yellow rings where your side was hurt",
+    ]
+    return "; ".join(part for part in parts if part) + "."
 
 
 def of_layer(team: str, extent: float, layer: Layer) -> str:
