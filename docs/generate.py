@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.pages import actions, cli, configs, game, language, messages, rules, simulator
+from docs.pages import actions, cli, configs, game, knowledge, language, messages, rules, simulator
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,7 +25,9 @@ PAGES: dict[str, Callable[[], str]] = {
     "tasks.md": game.tasks,
     "actions.md": actions.actions,
     "functions.md": actions.functions,
-    "units.md": game.units,
+    "units.md": knowledge.units,
+    "abilities.md": knowledge.abilities_page,
+    "upgrades.md": knowledge.upgrades_page,
     "maps.md": game.maps,
     "task-files.md": configs.task_files,
     "model-files.md": configs.model_files_page,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from bridge.knowledge import RACES, knowledge
 from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
 from orchestrator.config import all_tasks, task_files
@@ -14,7 +13,6 @@ from simulator.maps import MapError, load_map
 from simulator.tick import new_game
 
 if TYPE_CHECKING:
-    from bridge.knowledge import UnitType, Weapon
     from bridge.maps import MapSpec
     from bridge.task import AgentConfig, TaskConfig
     from simulator.world import World
@@ -36,16 +34,6 @@ def tasks() -> str:
         "without a task file is played by one commander of all units, with every action that they have.",
         table(("task", "agents", "about"), overview),
         *(_task(task) for task in found if task.name in written),
-    )
-
-
-def units() -> str:
-    """What agents are told of unit types."""
-    return join(
-        head("Units", "`bridge/data/knowledge`"),
-        "What an observation tells of unit types, in the version 4.10 of the game and without upgrades. Speed in world "
-        "units a second, weapon range in world units from edge to edge, costs in minerals / vespene.",
-        *(_race(race) for race in RACES),
     )
 
 
@@ -98,52 +86,6 @@ def _teams(agent: AgentConfig) -> list[tuple[str, str, str, str]]:
         )
         for team in agent.teams
     ]
-
-
-def _race(race: str) -> str:
-    known = {name: unit for name, unit in knowledge().items() if unit.race == race and unit.about}
-    numbers = [_numbers(name, unit) for name, unit in known.items()]
-    words = [
-        (name, unit.about, "; ".join(f"{a}: {b}" for a, b in unit.abilities.items())) for name, unit in known.items()
-    ]
-    header = (
-        "type",
-        "id",
-        "health",
-        "shield",
-        "energy",
-        "armor",
-        "speed",
-        "sight",
-        "supply",
-        "cost",
-        "attributes",
-        "weapons",
-    )
-    return join(f"## {race.capitalize()}", table(header, numbers), table(("type", "about", "abilities"), words))
-
-
-def _numbers(name: str, unit: UnitType) -> tuple[object, ...]:
-    attributes = [*unit.attributes, *(["flying"] if unit.flying else [])]
-    return (
-        name,
-        unit.id,
-        *(_number(value) for value in (unit.health, unit.shield, unit.energy, unit.armor, unit.speed, unit.sight)),
-        _number(unit.supply),
-        f"{unit.minerals:g} / {unit.vespene:g}" if unit.value else "",
-        ", ".join(attributes),
-        "; ".join(_weapon(weapon) for weapon in unit.weapons),
-    )
-
-
-def _number(value: float) -> str:
-    return f"{value:g}" if value else ""
-
-
-def _weapon(weapon: Weapon) -> str:
-    attacks = f" x {weapon.attacks}" if weapon.attacks > 1 else ""
-    bonus = "".join(f", +{amount:g} against {attribute}" for attribute, amount in weapon.bonus.items())
-    return f"{weapon.targets}, range {weapon.range:g}: {weapon.damage:g}{attacks} every {weapon.period_s:g} s{bonus}"
 
 
 def _map_row(spec: MapSpec) -> tuple[object, ...]:
