@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bridge.catalog import catalogue
-from bridge.knowledge import is_armed
+from bridge.knowledge import is_armed, knowledge
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.messages import Clock
 
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from bridge.maps import MapSpec
 
 AGENT = "Commander"
+BASE = "Base"
+GROUPS = ("basic", "orders", "skill", "macro", "build")
+"""Groups of actions that units have; what the catalogue makes by rule would fill a prompt and say nothing more."""
+SIDE_GROUPS = ("easy-build", "train", "research", "easy-warp", "chrono", "macro", "easy-control")
 STEP_LOOPS = 11
 """Half a second of the game between two decisions, as in the other tasks."""
 
@@ -39,16 +43,27 @@ def _commander(spec: MapSpec) -> AgentConfig:
         name=AGENT,
         role="You command the units of your side.",
         admits="any",
-        teams=tuple(TeamConfig(name=unit, unit_types=(unit,)) for unit in spec.units),
+        teams=(*(TeamConfig(name=unit, unit_types=(unit,)) for unit in spec.units), *_base(spec)),
         actions={unit: tuple(a.name for a in catalogue().values() if _usable(a, unit, spec)) for unit in spec.units},
     )
 
 
+def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
+    """Where there are workers, the team of no units that trains and builds."""
+    if not any(knowledge()[unit].worker for unit in spec.units):
+        return ()
+    known = {action.group for action in catalogue().values() if action.race in (spec.race, None)}
+    groups = tuple(f"group:{name}/{spec.race}" for name in SIDE_GROUPS if name in known)
+    return (TeamConfig(name=BASE, kind="side", actions=groups),)
+
+
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
-    """Whether units of a type have the action on this map."""
+    """Whether units of a type are told the action on this map."""
     needs = action.needs
     return (
-        action.fits(unit)
+        action.group in GROUPS
+        and action.subject != "side"
+        and action.fits(unit)
         and (not needs.weapon or is_armed(unit))
         and (needs.upgrade is None or needs.upgrade in spec.upgrades)
     )

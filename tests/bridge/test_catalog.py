@@ -12,7 +12,7 @@ from bridge import macro
 from bridge.action import Action
 from bridge.catalog import catalogue, catalogue_sha256, chosen, curated, example, read
 from bridge.errors import CatalogueError
-from bridge.knowledge import knowledge
+from bridge.knowledge import abilities, ability_of, knowledge
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -172,3 +172,38 @@ def test_the_hash_changes_with_nothing_but_the_catalogue() -> None:
 def test_the_catalogue_needs_no_pysc2() -> None:
     script = "import sys, bridge.catalog as c; c.catalogue(); sys.exit('pysc2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+WIDER = {
+    "Morph_ObserverMode": {"Observer"},  # as in the paper: a unit is listed in both of its forms
+    "Morph_WarpPrismTransportMode": {"WarpPrism"},
+    "BurrowDown": {"InfestedTerran"},  # made by a spell, not by a player's orders
+    "BurrowUp": {"InfestedTerranBurrowed"},
+}
+
+
+def test_the_units_of_a_written_action_are_those_that_the_game_lets_do_it() -> None:
+    found: dict[str, set[str]] = {}
+    for name, action in curated().items():
+        if action.pysc2 and action.units:
+            users = abilities()[action.pysc2.ability_id].users
+            found |= {name: extra} if (extra := {unit for unit in action.units if unit not in users}) else {}
+    assert found == {name: types for name, types in WIDER.items() if name in found}
+
+
+def test_what_a_written_action_produces_is_what_the_game_makes_of_it() -> None:
+    def made(action: Action) -> str | None:
+        facts = abilities()[action.pysc2.ability_id] if action.pysc2 else None
+        return (facts.produces or facts.researches) if facts else None
+
+    wrong = [
+        name for name, action in curated().items() if action.produces and made(action) not in (None, action.produces)
+    ]
+    assert wrong == []
+
+
+def test_how_far_a_jump_reaches_is_what_the_game_says() -> None:
+    jump = curated()["Ability_Blink_Screen"]
+    facts = ability_of(jump.pysc2.ability_id, "Stalker") if jump.pysc2 else None
+    assert facts
+    assert f"at most {facts.figures['distance']:g} away" in jump.about

@@ -47,7 +47,9 @@ def test_a_task_can_be_made_for_every_map(name: str) -> None:
     task = standard_task(spec)
     (agent,) = task.agents
     assert (task.name, task.map, task.task) == (name, name, spec.goal)
-    assert [team.unit_types for team in agent.teams] == [(unit,) for unit in spec.units]
+    assert [team.unit_types for team in agent.teams if team.kind != "side"] == [(unit,) for unit in spec.units]
+    builds = any(knowledge()[unit].worker for unit in spec.units)
+    assert [team.name for team in agent.teams if team.kind == "side"] == (["Base"] if builds else [])
     assert all("Move_Screen" in listed for listed in agent.actions.values())
     assert all(upgrade in upgrades.Upgrades.__members__ for upgrade in spec.upgrades)
     blinks = "Ability_Blink_Screen" in agent.actions.get("Stalker", ())

@@ -109,7 +109,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
         ("MoveToBeacon", {"Marine": 1}),
         ("smac_MMM", {"Marine": 7, "Marauder": 2, "Medivac": 1}),
         ("pvz_task4_level1", {"Stalker": 12}),
-        ("Simple64", {"Probe": 12}),
+        ("Simple64", {"Probe": 12, "Base": 0}),
     ],
 )
 def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name: str, units: dict[str, int]) -> None:
