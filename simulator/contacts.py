@@ -76,6 +76,8 @@ class Bodies:
 
     def _neighbours(self, at: Floats) -> Pairs | None:
         """As ``near``, without a table."""
+        if not len(self.rows):
+            return None
         one, other, squared = within(at.take(self.rows, 0), 2.0 * self.widest + SKIN)
         one, other = self.rows.take(one), self.rows.take(other)
         apart = self.separation.take(one) + self.separation.take(other)

@@ -30,6 +30,12 @@ def test_all_pairs_within_reach_are_found_once(points: list[tuple[float, float]]
     assert squared.tolist() == pytest.approx([math.dist(at[i], at[j]) ** 2 for i, j in zip(one, other, strict=True)])
 
 
+def test_many_units_of_which_none_has_a_body_do_not_touch(field: Any) -> None:
+    for i in range(contacts.TABLE_LIMIT + 1):
+        field.put("SupplyDepot", 1, 4 + i % 10 * 2, 4 + i // 10 * 2)
+    assert Bodies.of(field.world).near(field.world.pos.take(field.world.live, 0)) is None
+
+
 def test_neighbours_are_the_same_with_and_without_a_table(field: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(1)
     world = field.world
