@@ -156,7 +156,7 @@ class UnitDetails(Frozen):
     ready: tuple[str, ...] = ()
     """Of the skills that the agent may use, those that a unit of its team could use now."""
     unready: tuple[str, ...] = ()
-    """The others."""
+    """Of these, the ones that only others of its team could use now."""
 
 
 class UnitView(Frozen):

@@ -61,14 +61,13 @@ class Possible:
                     found[name] = self._why_not(catalogue()[name], units, able)
         return self._choice(found, next(iter(by_type), ""))
 
-    def skills(self, agent: AgentConfig, body: Body) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Skills that the agent may use and this very unit could use now, and those that it could not."""
+    def skills(self, agent: AgentConfig, body: Body) -> tuple[str, ...]:
+        """Skills that the agent may use and this very unit could use now; none if the game was not asked."""
         skills = _skills(agent.actions.get(body.name, ()))
         if self._abilities is None or not skills:
-            return (), ()
+            return ()
         able = self._abilities.get(body.tag, frozenset())
-        ready = tuple([name for name, ability in skills.items() if ability in able])
-        return ready, tuple([name for name in skills if name not in ready])
+        return tuple([name for name, ability in skills.items() if ability in able])
 
     def for_side(self, names: Iterable[str]) -> Choice:
         """Those of the actions of a side team that somebody of the side can carry out."""

@@ -29,6 +29,7 @@ from bridge.observe.sight import TeamSight
 from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from typing import TypeAlias
 
     from numpy.typing import NDArray
@@ -125,7 +126,7 @@ class Scene:
         foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
         bodies = [self._order[index] for index in members.tolist()]
         view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies)).but(
-            units=tuple(map(functools.partial(self._skilled, agent), bodies, self._units(looked, members, "own"))),
+            units=self._skilled(agent, bodies, self._units(looked, members, "own")),
             allies=self._units(looked, friends, "ally"),
             enemies=self._units(looked, foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
@@ -142,13 +143,13 @@ class Scene:
         seen = zip(views, points, far, strict=True)
         return tuple([view.but(alliance=alliance, screen=at, distance=d) for view, at, d in seen])
 
-    def _skilled(self, agent: AgentConfig, seen: Body, view: UnitView) -> UnitView:
-        """A unit of an agent's team, with the skills that it could use."""
-        ready, unready = self.possible.skills(agent, seen)
-        if not ready and not unready:
-            return view
-        details = view.details or _NO_DETAILS
-        return view.but(details=details.but(ready=ready, unready=unready))
+    def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
+        """The units of a team with the skills that they could use: what one of them could, the others could not."""
+        skills = [self.possible.skills(agent, body) for body in bodies]
+        ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
+        if not ready_somewhere:
+            return views
+        return tuple([_with_skills(view, ready, ready_somewhere) for view, ready in zip(views, skills, strict=True)])
 
     def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
         """The resources on a camera's screen, by type and tag."""
@@ -178,6 +179,11 @@ def _tenths(values: Floats, size: float) -> Floats:
     near = np.round(values, 1) + 0.0  # no negative zero
     near[(values < size) & (near >= size)] = round(size - 0.1, 1)
     return near
+
+
+def _with_skills(view: UnitView, ready: tuple[str, ...], ready_somewhere: Iterable[str]) -> UnitView:
+    unready = tuple([name for name in ready_somewhere if name not in ready])
+    return view.but(details=(view.details or _NO_DETAILS).but(ready=ready, unready=unready))
 
 
 def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:

@@ -44,12 +44,24 @@ def task(page: Page) -> Iterator[str]:
 @section("answer")
 def answer(page: Page) -> Iterator[str]:
     """The limit, one piece of advice, and the signal to begin."""
-    limit = page.task.max_actions
-    talks = bool(page.correspondents or page.channels)
-    parts = '"Analysis:", "Actions:" and "Communications:"' if talks else '"Analysis:" and "Actions:"'
+    parts = ['"Analysis:"']
     yield "Answer"
-    actions = f"{limit} action{'s' if limit > 1 else ''}"
-    fights = any(team.minimap is not None for team in page.teams) and page.sight.agent.kind == "combat_group"
-    yield f"{INDENT}At most {actions} per team" + ("; use abilities before moving or attacking." if fights else ".")
-    yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'
-    yield f"{INDENT}Now answer in the parts {parts}."
+    if page.teams:
+        limit = page.task.max_actions
+        fights = page.sight.agent.kind == "combat_group"
+        advice = "; use abilities before moving or attacking." if fights else "."
+        yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team{advice}"
+        yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'
+        parts.append('"Actions:"')
+    else:
+        yield f"{INDENT}You have no team to order now" + (
+            ": write messages to those who have." if _talks(page) else "."
+        )
+    if _talks(page):
+        parts.append('"Communications:"')
+    words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
+    yield f"{INDENT}Now answer in the part{'s' if len(parts) > 1 else ''} {words}."
+
+
+def _talks(page: Page) -> bool:
+    return bool(page.correspondents or page.channels)

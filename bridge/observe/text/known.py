@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.knowledge import advice, knowledge, short
 from bridge.observe.chronicle import is_structure
@@ -10,7 +10,7 @@ from bridge.observe.text.page import section, shorter
 from bridge.observe.text.words import INDENT, INDENT2
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from bridge.observe.text.page import Page
 
@@ -18,26 +18,25 @@ if TYPE_CHECKING:
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterator[str]:
     """What is known of every type in sight; uses and abilities only of those under control."""
-    mine, others = _types(page)
-    among = frozenset(mine | others)
-    if among:
+    types = _types(page)
+    friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
+    if any(types):
         yield "Unit knowledge"
-    for name in mine | others:
-        heading, *lines = short(name, among)
+    for name in _all(types):
+        heading, *lines = short(name, _opponents(name, friends, foes))
         yield f"{INDENT}{heading}"
         yield from (f"{INDENT2}{line}" for line in lines)
-        if name in mine:
+        if name in types.mine:
             yield from (f"{INDENT2}{line}" for line in advice(name))
 
 
 @shorter("unit_knowledge", rank=20, says="weapons and abilities of the types in sight")
 def unit_knowledge_in_short(page: Page) -> Iterator[str]:
     """One line a type."""
-    mine, others = _types(page)
-    among = frozenset(mine | others)
-    if among:
+    types = _types(page)
+    if any(types):
         yield "Unit knowledge"
-    yield from (f"{INDENT}{short(name, among)[0]}" for name in mine | others)
+    yield from (f"{INDENT}{short(name, frozenset())[0]}" for name in _all(types))
 
 
 @shorter("unit_knowledge", rank=30, says="what is known of the types in sight")
@@ -46,16 +45,36 @@ def no_unit_knowledge(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section
     yield from ()
 
 
-def _types(page: Page) -> tuple[dict[str, None], dict[str, None]]:
-    """Types under control, and the others that are in sight or heard of, in the order of the page.
+class _Types(NamedTuple):
+    """Names of known types, each once and in the order of the page."""
 
-    Of allied structures nothing needs to be known.
-    """
-    mine = dict.fromkeys(unit.type for team in page.teams for unit in team.units)
-    allies = dict.fromkeys(unit.type for team in page.teams for unit in team.allies)
-    others = dict.fromkeys(name for name in allies if not is_structure(name))
-    others |= dict.fromkeys(unit.type for team in page.teams for unit in team.enemies)
-    others |= dict.fromkeys(name for team in page.view.others for name in team.units)
-    if page.view.others and page.view.counts:
-        others |= dict.fromkeys(enemy.type for enemy in page.view.counts.enemies)
-    return {name: None for name in mine if name in knowledge()}, {n: None for n in others if n in knowledge()}
+    mine: tuple[str, ...]
+    """Under control."""
+    allies: tuple[str, ...]
+    """Others of the own side; of its structures nothing needs to be known."""
+    enemies: tuple[str, ...]
+
+
+def _types(page: Page) -> _Types:
+    """Types that are in sight or heard of."""
+    view = page.view
+    mine = [unit.type for team in page.teams for unit in team.units]
+    allies = [unit.type for team in page.teams for unit in team.allies]
+    enemies = [unit.type for team in page.teams for unit in team.enemies]
+    allies += [name for team in view.others for name in team.units]
+    if view.others and view.counts:
+        enemies += [enemy.type for enemy in view.counts.enemies]
+    return _Types(_known(mine), _known(name for name in allies if not is_structure(name)), _known(enemies))
+
+
+def _known(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(name for name in dict.fromkeys(names) if name in knowledge())
+
+
+def _all(types: _Types) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*types.mine, *types.allies, *types.enemies)))
+
+
+def _opponents(name: str, friends: frozenset[str], foes: frozenset[str]) -> frozenset[str]:
+    """Types that it is worth comparing one with: those of the other side, of both for one that both sides have."""
+    return (foes if name in friends else frozenset()) | (friends if name in foes else frozenset())

@@ -26,7 +26,10 @@ def counts(page: Page) -> Iterator[str]:
     yield from _line("Under construction", [_under_way(count) for count in found.structures if count.under_way])
     yield from _line("Coming in", [_under_way(count) for count in found.units if count.under_way])
     yield from _line("In production", [_production(made) for made in found.production])
-    yield f"{INDENT}Enemies spotted so far: {', '.join(map(_enemy, found.enemies)) or 'none'}"
+    if found.enemies:
+        yield from listed("Enemies spotted so far:", map(_enemy, found.enemies))
+    else:
+        yield f"{INDENT}Enemies spotted so far: none"
 
 
 def _line(what: str, entries: Sequence[str]) -> Iterator[str]:
@@ -53,11 +56,17 @@ def _production(made: Production) -> str:
 
 
 def _enemy(enemy: EnemyCount) -> str:
-    parts = [f"{enemy.in_sight} in sight"]
-    parts += [f"{enemy.dead} dead"] if enemy.dead else []
-    parts += [f"last seen at minimap {point(enemy.minimap)}"] if enemy.minimap and not enemy.in_sight else []
-    parts += [f"one at minimap {point(enemy.minimap)}"] if enemy.minimap and enemy.in_sight else []
-    return f"{enemy.seen} {enemy.type} ({', '.join(parts)})"
+    alive = enemy.seen - enemy.dead
+    where = f" at minimap {point(enemy.minimap)}" if enemy.minimap else ""
+    if not alive:
+        return f"{enemy.seen} {enemy.type}, dead"
+    if enemy.in_sight == alive:
+        line = f"{alive} {enemy.type} in sight{where}"
+    elif enemy.in_sight:
+        line = f"{alive} {enemy.type}, {enemy.in_sight} of them in sight{where}"
+    else:
+        line = f"{alive} {enemy.type} out of sight, last seen{where}"
+    return line + (f"; {enemy.dead} more dead" if enemy.dead else "")
 
 
 @section("alerts", parts=("alerts",))
