@@ -20,15 +20,44 @@ from bridge import data
 from bridge.action import GROUP_SELECTOR, Action, ArgKind
 from bridge.actionfault import fault
 from bridge.errors import CatalogueError
+from bridge.generated import GROUP as GENERATED
 from bridge.generated import generated
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-__all__ = ["Action", "ArgKind", "alias_of", "catalogue", "catalogue_sha256", "chosen", "curated", "example", "read"]
+__all__ = [
+    "GROUPS",
+    "Action",
+    "ArgKind",
+    "alias_of",
+    "catalogue",
+    "catalogue_sha256",
+    "chosen",
+    "curated",
+    "example",
+    "read",
+]
 
 DIRECTORY = "actions"
+GROUPS = {
+    "basic": "What every unit has.",
+    "orders": "Orders of every race that the paper leaves out.",
+    "skill": "What units can do besides moving and fighting.",
+    "build": "Standard build: a worker of the team builds where it is told.",
+    "easy-build": "Easy build: the host finds the place, and for names without an argument the worker too. "
+    "Structures that grow are here as well.",
+    "train": "The host chooses a free producer.",
+    "research": "The host chooses a free structure.",
+    "warp": "Warping in near something; the host chooses the WarpGate and the place.",
+    "easy-warp": "Warping in wherever there is room.",
+    "chrono": "Chrono Boost.",
+    "macro": "Economy: gathering, rally points, larvae, creep, MULEs, scans, supply.",
+    "easy-control": "The whole army, and scouts.",
+    GENERATED: "Made by rule: for functions of PySC2 that no other action stands for, and for one unit alone.",
+}
+"""The groups of actions that a task can ask for, in the order in which they are shown, and what is in them."""
 _KEY = re.compile(r"  (\w+):")
 """Begins an action in a file."""
 
@@ -138,9 +167,8 @@ def _of_group(selector: str, unit_type: str | None) -> Iterator[str]:
     group, _, race = selector.partition("/")
     members = [action for action in catalogue().values() if action.group == group and race in ("", action.race or race)]
     if not members:
-        known = dict.fromkeys(action.group for action in catalogue().values())
         raise ValueError(
-            f"there is no group of actions '{selector}'{_close(group, known)}, there are {', '.join(known)}"
+            f"there is no group of actions '{selector}'{_close(group, GROUPS)}, there are {', '.join(GROUPS)}"
         )
     if unit_type is not None:
         return (action.name for action in members if action.subject != "side" and action.fits(unit_type))

@@ -129,12 +129,13 @@ def _for_one_unit(action: Action) -> Action | None:
     producing = action.subject == "side" and action.rule in _PRODUCING
     if action.function is None or not (action.subject == "team" or producing):
         return None
-    which = "first tag" if "tag" in action.args else "this tag"
+    which = "the first tag" if "tag" in action.args else "this tag"
+    known = abilities()[action.pysc2.ability_id].about if producing and action.pysc2 else ""
     return action.model_copy(
         update={
             "name": f"Select_Unit_{action.name}",
             "args": ("tag", *action.args),
-            "about": f"Only the own unit with {'the ' if 'first' in which else ''}{which}: {action.about}",
+            "about": f"Only the own unit with {which}: {known or action.about}",
             "group": GROUP,
             "aliases": (),
             "subject": "unit",

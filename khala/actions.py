@@ -5,16 +5,18 @@ commands; `khala.cli` prints it.
 """
 
 import difflib
+import itertools
 import json
+import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
-from bridge.catalog import Action, catalogue, example
+from bridge.catalog import GROUPS, Action, catalogue, example
 from bridge.coverage import coverage
 from bridge.functions import functions
 from bridge.knowledge import knowledge
@@ -29,6 +31,7 @@ Examples:\n
     khala actions --function Effect_Blink_screen\n
     khala actions --race zerg --json
 """
+INDENT = " " * 4
 MANY = 9
 """Unit types that are named one by one; of more, the first ones are."""
 
@@ -55,15 +58,15 @@ def actions(
     `generated` are those that follow from PySC2's functions: one for every function that no other action stands for,
     and `Select_Unit_<name>` for what a whole team can be told, to tell it to one unit.
     """
-    known = catalogue().values()
+    known = sorted(catalogue().values(), key=_place)
     _check(unit, knowledge(), "unit type")
-    _check(group, {action.group for action in known}, "group")
+    _check(group, GROUPS, "group")
     wanted = _function(function)
     found = [
         action
         for action in known
         if (race is None or action.race in (None, race))
-        and (unit is None or action.fits(unit))
+        and (unit is None or _is_for(action, unit))
         and (group is None or action.group == group)
         and (name is None or any(name.casefold() in each.casefold() for each in (action.name, *action.aliases)))
         and (wanted is None or action.function == wanted)
@@ -75,7 +78,13 @@ def actions(
         console.print(_groups(known))
         console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them", highlight=False)
     else:
-        console.print(_listed(found) if found else _none(wanted), highlight=False)
+        for line in _listed(found, console.width) if found else [_none(wanted)]:
+            console.print(line, highlight=False, soft_wrap=True)
+
+
+def _place(action: Action) -> tuple[int, str]:
+    """Where it is shown: by group, and in a group what every race has before what is of one."""
+    return list(GROUPS).index(action.group), action.race or ""
 
 
 def _check(given: str | None, known: Iterable[str], what: str) -> None:
@@ -100,40 +109,56 @@ def _none(function: str | None) -> str:
 
 
 def _groups(known: Iterable[Action]) -> Table:
-    table = _table("group", "race", "actions", "such as")
-    table.columns[2].justify = "right"
+    table = Table(box=None, pad_edge=False)
+    for column in ("group", "race", "actions", "such as"):
+        table.add_column(column, justify="right" if column == "actions" else "left", no_wrap=True)
     counted: dict[tuple[str, str], list[Action]] = {}
     for action in known:
         counted.setdefault((action.group, action.race or "every race"), []).append(action)
-    order = list(dict.fromkeys(group for group, _ in counted))
-    for (group, race), members in sorted(counted.items(), key=lambda item: order.index(item[0][0])):
+    for (group, race), members in counted.items():
         table.add_row(group, race, str(len(members)), example(members[0]))
     return table
 
 
-def _listed(found: list[Action]) -> Table:
-    table = _table("action, example", "what it does", "who", "PySC2's function")
-    for action in found:
-        table.add_row(
-            f"{action.name}({', '.join(action.args)})\n[dim]{escape(example(action))}[/]",
-            escape(action.about),
-            _who(action),
-            "" if action.pysc2 is None else f"{action.pysc2.name}\n[dim]{action.pysc2.id}[/]",
-        )
-    return table
+def _is_for(action: Action, unit: str) -> bool:
+    """Whether units of a type carry it out; what the side is told without saying who is for none in particular."""
+    return action.fits(unit) and (action.subject != "side" or bool(action.units))
+
+
+def _listed(found: list[Action], width: int) -> Iterator[Text]:
+    """Lines for each action, under headings of group and race; names and calls are never broken."""
+    for (group, race), members in itertools.groupby(found, key=lambda action: (action.group, action.race)):
+        yield Text(f"\n{group}, {race or 'every race'}", style="bold underline")
+        for action in members:
+            yield from _block(action, width)
+
+
+def _block(action: Action, width: int) -> Iterator[Text]:
+    function = f"{action.pysc2.id} {action.pysc2.name}" if action.pysc2 else ""
+    beside = len(action.form) + len(function) + 2 <= width
+    yield Text.assemble((action.form, "bold"), (f"  {function}" if beside else "", "cyan"))
+    if not beside:
+        yield Text(INDENT + function, style="cyan")
+    if action.args:
+        yield Text(INDENT + example(action))
+    yield from map(Text, _folded(action.about, width))
+    aliases = f"; also {', '.join(action.aliases)}" if action.aliases else ""
+    yield from (Text(line, style="dim") for line in _folded(_who(action) + aliases, width))
+
+
+def _folded(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, initial_indent=INDENT, subsequent_indent=INDENT, break_long_words=False)
 
 
 def _who(action: Action) -> str:
     shown = ", ".join(action.units[:MANY]) + (f" and {more} more" if (more := len(action.units) - MANY) > 0 else "")
-    subject = {"team": "team", "unit": "one unit", "two_units": "two units", "side": "the side's"}[action.subject]
-    return f"[dim]{subject}:[/] {shown or 'any'}"
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table
+    subject = {
+        "team": "a whole team",
+        "unit": "one unit",
+        "two_units": "two units",
+        "side": "the side, by",
+    }
+    return f"{subject[action.subject]}: {shown}" if shown else subject[action.subject]
 
 
 def _plain(action: Action) -> dict[str, Any]:

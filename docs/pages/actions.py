@@ -6,7 +6,7 @@ import re
 from itertools import groupby, takewhile
 from typing import TYPE_CHECKING
 
-from bridge.catalog import catalogue, example
+from bridge.catalog import GROUPS, catalogue, example
 from bridge.coverage import coverage
 from bridge.generated import GROUP
 from docs.pages.markdown import code, codes, head, join, table
@@ -17,21 +17,6 @@ if TYPE_CHECKING:
     from bridge.catalog import Action
     from bridge.coverage import Coverage
 
-GROUPS = {
-    "basic": "What every unit has.",
-    "orders": "Orders of every race that the paper leaves out.",
-    "skill": "What units can do besides moving and fighting.",
-    "build": "Standard build: a worker of the team builds where it is told.",
-    "easy-build": "Easy build: the host finds the place, and for names without an argument the worker too. "
-    "Structures that grow are here as well.",
-    "train": "The host chooses a free producer.",
-    "research": "The host chooses a free structure.",
-    "warp": "Warping in near something; the host chooses the WarpGate and the place.",
-    "easy-warp": "Warping in wherever there is room.",
-    "chrono": "Chrono Boost.",
-    "macro": "Economy: gathering, rally points, larvae, creep, MULEs, scans, supply.",
-    "easy-control": "The whole army, and scouts.",
-}
 RACES = {None: "Every race", "protoss": "Protoss", "terran": "Terran", "zerg": "Zerg"}
 SHOWN = 6
 """Unit types that are listed one by one."""
@@ -51,7 +36,7 @@ def actions() -> str:
         "what: [functions](functions.md).",
         _legend(),
         _overview(),
-        *(_group(name, about, written) for name, about in GROUPS.items()),
+        *(_group(name, about, written) for name, about in GROUPS.items() if name != GROUP),
         _generated(made),
     )
 
@@ -95,14 +80,13 @@ def _legend() -> str:
 
 
 def _overview() -> str:
-    names = [*GROUPS, GROUP]
     rows = [
         (
             f"[{code(name)}](#{name})",
             *(sum(a.group == name and a.race == race for a in catalogue().values()) for race in RACES),
             sum(a.group == name for a in catalogue().values()),
         )
-        for name in names
+        for name in GROUPS
     ]
     return table(("group", *RACES.values(), "all"), rows)
 

@@ -10,7 +10,7 @@ import pytest
 
 from bridge import macro
 from bridge.action import Action
-from bridge.catalog import catalogue, catalogue_sha256, chosen, curated, example, read
+from bridge.catalog import GROUPS, catalogue, catalogue_sha256, chosen, curated, example, read
 from bridge.errors import CatalogueError
 from bridge.knowledge import abilities, ability_of, knowledge
 
@@ -131,6 +131,10 @@ def test_a_structure_can_be_built_at_a_point_near_something_and_anywhere() -> No
     assert names <= set(catalogue())
     structures = {name for name, kind in knowledge().items() if kind.structure and kind.melee}
     assert made <= structures
+
+
+def test_every_action_is_of_a_group_that_is_told_of() -> None:
+    assert {action.group for action in catalogue().values()} == set(GROUPS)
 
 
 def test_a_group_of_a_type_holds_what_its_units_have() -> None:
