@@ -146,6 +146,7 @@ def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> Unit
     words, filler = unit_words()[kind.name], _filler(version)
     traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
     told = {
+        "allows": _allowed_by(version).get(kind.name, ()),
         "about": filler.fill(words.about, kind),
         "uses": filler.fill(words.uses, kind),
         "counters": words.beats,
@@ -153,6 +154,19 @@ def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> Unit
         "abilities": {**traits, **dict(_titled(kind, version))},
     }
     return kind.model_copy(update=told)
+
+
+@functools.cache
+def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
+    """Types and upgrades of melee games that require a structure, by its name."""
+    kinds, better = unit_facts(version).values(), upgrade_facts(version).values()
+    required = [(kind.name, kind.requires) for kind in kinds if kind.melee]
+    required += [(upgrade.name, upgrade.requires) for upgrade in better if upgrade.melee]
+    found: dict[str, list[str]] = {}
+    for name, needs in required:
+        for needed in needs:
+            found.setdefault(needed, []).append(name)
+    return {name: tuple(allowed) for name, allowed in found.items()}
 
 
 def _titled(kind: UnitType, version: str) -> Iterator[tuple[str, str]]:

@@ -112,6 +112,7 @@ def _making(kind: UnitType) -> Iterator[str]:
 def _related(kind: UnitType) -> tuple[tuple[str, tuple[str, ...]], ...]:
     return (
         ("Counts also as", kind.counts_as),
+        ("Allows", kind.allows),
         ("Good against", kind.counters),
         ("Beaten by", kind.countered_by),
     )

@@ -40,6 +40,10 @@ class Weapon(Frozen):
         """Damage per second against a target without armor and without the attribute of a bonus."""
         return self.damage * self.attacks / self.period_s
 
+    def per_second_against(self, attribute: str) -> float:
+        """Damage per second against a target without armor and with this attribute."""
+        return (self.damage + self.bonus.get(attribute, 0)) * self.attacks / self.period_s
+
 
 class UnitType(Frozen):
     """What is known of one type."""
@@ -102,6 +106,8 @@ class UnitType(Frozen):
     """Structures that have to stand; all of them. What may stand in for one is told by `stand_ins`."""
     addon: str = ""
     """What has to be attached to the producer: `TechLab`."""
+    allows: tuple[str, ...] = ()
+    """Types and upgrades that require it: what a structure opens."""
     footprint: tuple[int, int] | None = None
     """Width and height of the cells that it blocks."""
     power_radius: float = 0

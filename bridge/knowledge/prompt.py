@@ -61,15 +61,20 @@ def body(kind: UnitType) -> str:
 
 
 def weapon(own: Weapon) -> str:
-    """`hits ground, range 6, damage 13 (+5 against armored) every 1.34 s, 9.7 damage per second`."""
+    """`hits ground, range 6, damage 13 (+5 against armored) every 1.34 s, …`."""
     times = f" x {own.attacks}" if own.attacks > 1 else ""
     bonus = "".join(f" (+{n(more)} against {what})" for what, more in own.bonus.items())
     nearest = f" but not nearer than {n(own.min_range)}" if own.min_range else ""
+    better = "".join(f" ({_tenths(own.per_second_against(what))} against {what})" for what in own.bonus)
     splash = f", splash within {n(own.splash)}" if own.splash else ""
     return (
         f"hits {HITS[own.targets]}, range {n(own.range)}{nearest}, damage {n(own.damage)}{bonus}{times} "
-        f"every {n(own.period_s)} s, {n(round(own.per_second, 1))} damage per second{splash}"
+        f"every {n(own.period_s)} s, {_tenths(own.per_second)} damage per second{better}{splash}"
     )
+
+
+def _tenths(value: float) -> str:
+    return n(round(value, 1))
 
 
 def _matchups(kind: UnitType, among: frozenset[str] | None) -> Iterator[str]:

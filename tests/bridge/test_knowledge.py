@@ -92,3 +92,28 @@ def test_a_type_without_a_weapon_is_unarmed_and_an_unknown_one_is_not() -> None:
 def test_damage_per_second_counts_hits_and_period() -> None:
     (blades,) = knowledge()["Zealot"].weapons
     assert blades.per_second == pytest.approx(8 * 2 / 0.86)
+
+
+def test_damage_per_second_counts_the_bonus_against_an_attribute() -> None:
+    (beam,) = knowledge()["Stalker"].weapons
+    assert beam.per_second_against("armored") == pytest.approx((13 + 5) / 1.34)
+    assert beam.per_second_against("light") == beam.per_second
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed"),
+    [
+        (
+            "CyberneticsCore",
+            {"Stalker", "Sentry", "Adept", "TwilightCouncil", "Stargate", "RoboticsFacility", "ShieldBattery"},
+        ),
+        ("BanelingNest", {"Baneling"}),
+        ("GreaterSpire", {"BroodLord"}),
+        ("Stalker", set()),
+    ],
+)
+def test_a_structure_allows_what_requires_it(name: str, allowed: set[str]) -> None:
+    assert set(knowledge()[name].allows) >= allowed
+    types = {other: kind.requires for other, kind in knowledge().items()}
+    better = {other: upgrade.requires for other, upgrade in known_upgrades().items()}
+    assert all(name in (types | better)[other] for other in knowledge()[name].allows)

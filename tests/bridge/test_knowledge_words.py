@@ -152,7 +152,7 @@ def test_the_lines_of_a_prompt_say_what_a_type_is_and_what_it_does() -> None:
     assert body == "armored, mechanical, on the ground; health 175, armor 1, does not move"
     assert weapon == (
         "hits ground, range 13 but not nearer than 2, damage 40 (+30 against armored) every 2.14 s, "
-        "18.7 damage per second, splash within 1.25"
+        "18.7 damage per second (32.7 against armored), splash within 1.25"
     )
     assert counters == "good against Marine; beaten by Immortal, Carrier"
     assert short("Observer", frozenset())[1:] == (
