@@ -27,9 +27,14 @@ def code_of(unit_type: str) -> str:
 
 @functools.cache
 def _codes() -> dict[str, str]:
-    """By type: the most natural code that no type before it has; short names choose first."""
+    """By type: the most natural code that no type before it has; those that are played, and short names, choose first."""
     taken: dict[str, str] = {}
-    for name in sorted(knowledge(), key=lambda name: (len(_WORDS.findall(name)), name)):
+
+    def order(name: str) -> tuple[bool, int, str]:
+        known = knowledge()[name]
+        return known.race == "neutral" or not known.melee, len(_WORDS.findall(name)), name
+
+    for name in sorted(knowledge(), key=order):
         code = next((code for code in _wishes(name) if code not in taken), None)
         if code is not None:
             taken[code] = name
