@@ -64,6 +64,8 @@ class Unit(NamedTuple):
     effects: tuple[str, ...] = ()
     built: float = 100.0
     """How much of it is built, in percent."""
+    not_ready: tuple[str, ...] = ()
+    """Skills that it cannot use now."""
 
     @property
     def share(self) -> float:
@@ -211,6 +213,7 @@ def _unit(line: str) -> Unit | None:
         hallucination="hallucination" in fields,
         effects=tuple(fields["effects"].split(", ")) if "effects" in fields else (),
         built=_first(fields.get("built", ""), 100.0),
+        not_ready=tuple(fields.get("not", "").removeprefix("ready ").split(", ")) if "not" in fields else (),
     )
 
 

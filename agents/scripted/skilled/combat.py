@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from agents.scripted.reading import Team, Unit
     from agents.scripted.skilled.plan import Plan
 
-HURT = 0.35
+HURT = 0.5
 """Share of hit points below which a unit is pulled back."""
 IN_DANGER = 7.0
-STEP_BACK = 3.5
+STEP_BACK = 4.5
 BLINK = 7.5
-WALK_COST = 3.0
+WALK_COST = 1.5
 """World units of walking that halve what a target is worth."""
 MELEE_WALK_COST = 1.0
 """The same for those who stand in each other's way."""

@@ -47,7 +47,7 @@ class Plan:
     def cast(self, skill: str, caster: Unit, *values: str | Point) -> bool:
         """Gives one unit's skill by its own action, or by the team's if the unit is all of the team."""
         tag = caster.tag
-        if tag in self.busy:
+        if tag in self.busy or any(name in skill for name in caster.not_ready):
             return False
         alone = len(self.team.own) == 1
         names = [action.name for action in self.team.actions if skill in action.name]
