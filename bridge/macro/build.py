@@ -18,7 +18,7 @@ from bridge.macro.places import for_structure, free_base, free_geyser
 from bridge.macro.price import charge, check, require
 from bridge.macro.rule import Impossible, Order, never
 from bridge.macro.side import finished, name, place
-from bridge.macro.sites import best, footprint_need, good, legal, near, promised
+from bridge.macro.sites import best, footprint_need, good, legal, near, on_corner, promised
 
 if TYPE_CHECKING:
     from bridge.ground import Base, Land
@@ -68,13 +68,11 @@ def build_near(ask: Ask) -> list[Order]:
         return _on_geyser(ask, found)
     if sites()[structure].clear:
         return _at(ask, _base_of(ask, unit).place)
-    cost = near(land, [place(unit)], reach=NEAR)
+    cost = near(land, [place(unit)], reach=NEAR, corner=on_corner(structure))
     cell = best(good(land, ask.ledger, structure), cost) or best(legal(land, ask.ledger, structure), cost)
     if cell is None:
-        lack = _lack(structure)
-        raise Impossible(
-            "invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {name(unit)}{lack}."
-        )
+        what = f"{name(unit)} {hex(unit.tag)}{_lack(structure)}"
+        raise Impossible("invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {what}.")
     return _at(ask, footprint_need(structure).middle(cell))
 
 
@@ -126,7 +124,7 @@ def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
     land, structure = land_of(ask.snapshot), _structure(ask)
     _check_site(ask, land, middle)
     worker, queued = builder(ask, middle)
-    orders = _go(ask, land, worker, middle, middle, queued=queued)
+    orders = _go(ask, worker, middle, queued=queued)
     width, height = footprint_need(structure).size
     ask.ledger.promise(middle, width, height)
     if sites()[structure].addon:
@@ -136,28 +134,19 @@ def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
 
 def _on_geyser(ask: Ask, geyser: Unit) -> list[Order]:
     worker, queued = builder(ask, place(geyser))
-    orders = _go(ask, land_of(ask.snapshot), worker, place(geyser), geyser.tag, queued=queued)
+    orders = _go(ask, worker, geyser.tag, queued=queued)
     ask.ledger.promise(place(geyser), 3, 3)
     return orders
 
 
-def _go(
-    ask: Ask, land: Land, worker: Unit, where: WorldPoint, target: WorldPoint | int, *, queued: bool
-) -> list[Order]:
-    """A worker's orders, with the way there before them if the place was never seen: unseen ground may be refused."""
+def _go(ask: Ask, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[Order]:
     if not ask.has(worker.tag):
         raise never(ask, f"the game does not take it from your {name(worker)} at this moment; try again later.")
     facts = _facts(ask)
     if facts is not None:
         charge(ask, facts, name(worker))
     ask.ledger.take(worker.tag)
-    build = Order(ask.function, (worker.tag,), target, queued)
-    if land.sight[int(where.x), int(where.y)]:
-        return [build]
-    return [
-        Order(functions()["Move_screen"], (worker.tag,), where, queued),
-        Order(ask.function, (worker.tag,), target, queued=True),
-    ]
+    return [Order(ask.function, (worker.tag,), target, queued)]
 
 
 def _back_to_work(ask: Ask, build: Order) -> list[Order]:
@@ -185,7 +174,7 @@ def _check_site(ask: Ask, land: Land, middle: WorldPoint) -> None:
     cell = footprint.cell(*middle)
     if land.ground.holds(*cell) and allowed[cell]:
         return
-    other = best(allowed, near(land, [middle]))
+    other = best(allowed, near(land, [middle], corner=on_corner(structure)))
     raise Impossible(
         "invalid_target",
         f"{structure} cannot stand there: {_why_not(ask, land, cell)}",

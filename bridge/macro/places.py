@@ -12,7 +12,7 @@ from bridge.frames import WorldPoint
 from bridge.ground import land_of
 from bridge.macro.rule import never
 from bridge.macro.side import finished, place
-from bridge.macro.sites import BASE_REACH, best, footprint_need, good, legal, near, new_power
+from bridge.macro.sites import BASE_REACH, best, footprint_need, good, legal, near, new_power, on_corner
 
 if TYPE_CHECKING:
     from bridge.ground import Land
@@ -37,17 +37,18 @@ AMONG_WORKERS: Final = frozenset({"MissileTurret", "SporeCrawler"})
 
 def for_structure(land: Land, ledger: Ledger, structure: str) -> tuple[int, int] | None:
     """The cell of the best place at the own bases for a structure that is no town hall and on no geyser, if any."""
-    grid = good(land, ledger, structure)
+    grid, corner = good(land, ledger, structure), on_corner(structure)
     halls = [place(unit) for unit in land.own_halls]
     if structure == "Pylon":
         found = best(grid, _for_pylon(land, ledger, halls))
-    elif structure in FRONT:
-        found = best(grid, near(land, [front(land, hall) for hall in halls], reach=BASE_REACH))
-    elif structure in AMONG_WORKERS:
-        found = best(grid, near(land, [workplace(land, hall) for hall in halls], reach=BASE_REACH))
     else:
-        found = best(grid, near(land, halls, reach=BASE_REACH))
-    return found or best(grid, near(land, _anchors(land)))
+        wanted = halls
+        if structure in FRONT:
+            wanted = [front(land, hall) for hall in halls]
+        elif structure in AMONG_WORKERS:
+            wanted = [workplace(land, hall) for hall in halls]
+        found = best(grid, near(land, wanted, reach=BASE_REACH, corner=corner))
+    return found or best(grid, near(land, _anchors(land), corner=corner))
 
 
 def _anchors(land: Land) -> list[WorldPoint]:
@@ -61,7 +62,7 @@ def _own(units: list[Unit]) -> list[Unit]:
 
 def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Floats:
     """(w, h) cost of a place for a Pylon: few new places in its field, and far from where it stands best."""
-    away = near(land, halls, reach=BASE_REACH)
+    away = near(land, halls, reach=BASE_REACH, corner=True)
     power = np.minimum(new_power(land, ledger), PYLON_WISH)
     cost: Floats = np.abs(away - PYLON_AWAY) + (PYLON_WISH - power) / 2
     return cost

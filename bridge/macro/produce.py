@@ -127,7 +127,7 @@ def _with_addon(ask: Ask, units: list[Unit], addon: str) -> list[Unit]:
     wanted = stand_ins(addon)
     found = [unit for unit in units if _addon(ask, unit) in wanted]
     if not found:
-        raise never(ask, f"no {name(units[0])} has a {addon}; build one with Build_{addon} first.")
+        raise never(ask, f"no {name(units[0])} has a {addon}; Build_{addon}_{name(units[0])} makes one.")
     return found
 
 

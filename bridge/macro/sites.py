@@ -38,7 +38,7 @@ def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
     if site.clear:
         result &= everywhere(land.clear, footprint.cells)
     if site.ground == "powered":
-        result &= land.powered(corner=footprint.size[0] % 2 == 0)
+        result &= land.powered(corner=on_corner(structure))
     return result
 
 
@@ -97,6 +97,11 @@ def footprint_need(structure: str) -> Footprint:
     return found
 
 
+def on_corner(structure: str) -> bool:
+    """Whether the middle of a structure is on the corner of its cell."""
+    return footprint_need(structure).size[0] % 2 == 0
+
+
 def _with_addon(structure: str) -> Cells:
     cells = footprint_need(structure).cells
     return (*cells, *ADDON) if sites()[structure].addon else cells
@@ -143,13 +148,17 @@ def _ring(cells: Cells) -> list[tuple[int, int]]:
 # what makes a place good ----------------------------------------------------------------------------------------------
 
 
-def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf) -> Floats:
-    """(w, h) straight distance of each cell's middle to the nearest of some points; infinite beyond a reach."""
+def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, corner: bool = False) -> Floats:
+    """(w, h) straight distance of each cell to the nearest of some points; infinite beyond a reach.
+
+    Measured from the cell's middle, or its lower left corner, which is the middle of structures of 2 x 2.
+    """
     width, height = land.ground.size
     x, y = np.ogrid[:width, :height]
+    shift = 0.0 if corner else 0.5
     least = np.full((width, height), np.inf, np.float32)
     for point in points:
-        np.minimum(least, np.hypot(x + 0.5 - point.x, y + 0.5 - point.y), out=least)
+        np.minimum(least, np.hypot(x + shift - point.x, y + shift - point.y), out=least)
     least[least > reach] = np.inf
     return least
 

@@ -32,6 +32,7 @@ class Game:
 
     def __init__(self, map_name: str, race: str, enemy: str, seed: int) -> None:
         self.client = Client()
+        self.fed = False
         self.client.ask(
             create_game=sc.RequestCreateGame(
                 local_map=sc.LocalMap(map_path=map_name),
@@ -53,6 +54,8 @@ class Game:
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = Snapshot(response=response, info=self.info, abilities=available(answer))
         self.ledger = Ledger.of(self.snapshot)
+        if self.fed:  # the game's cheat does not show in the supply that it tells
+            self.ledger.supply = 100.0
         return self.snapshot
 
     def play(self, loops: int) -> Snapshot:
@@ -60,9 +63,10 @@ class Game:
         self.client.step(loops)
         return self.see()
 
-    def cheat(self, *states: debug_pb2.DebugGameState) -> Snapshot:
+    def cheat(self, *states: debug_pb2.DebugGameState.ValueType) -> Snapshot:
         """Has the game's own cheats on: resources, tech, supply, fast building."""
         self.client.debug(*(debug_pb2.DebugCommand(game_state=state) for state in states or FREE))
+        self.fed = self.fed or debug_pb2.food in (states or FREE)
         return self.play(1)
 
     def put(self, name: str, x: float, y: float, *, owner: int = 1, count: int = 1) -> int:
@@ -74,6 +78,15 @@ class Game:
         self.client.debug(create)
         self.play(2)
         return max((u.tag for u in self.units(name) if u.tag not in before), default=0)
+
+    def energize(self, name: str) -> Snapshot:
+        """Fills the energy of every own unit of a type."""
+        for unit in self.own(name):
+            value = debug_pb2.DebugSetUnitValue(
+                unit_value=debug_pb2.DebugSetUnitValue.Energy, value=unit.energy_max, unit_tag=unit.tag
+            )
+            self.client.debug(debug_pb2.DebugCommand(unit_value=value))
+        return self.play(1)
 
     def units(self, name: str) -> list[raw_pb2.Unit]:
         """Units of a type that are there, everybody's."""

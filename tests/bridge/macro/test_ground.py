@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from s2clientprotocol import common_pb2
+from s2clientprotocol import common_pb2, debug_pb2
 
 from bridge.frames import WorldPoint
 from bridge.ground import Ground, footprint_of, grid, land_of, sites
 from bridge.ground.land import built_by
+from bridge.ground.resources import base_places
 from bridge.knowledge import knowledge
 from simulator.catalog import load_catalog
 from simulator.maps import find_map, load_map
@@ -19,6 +20,8 @@ from simulator.maps import find_map, load_map
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from bridge.snapshot import Snapshot
+    from simulator.records import UnitType
     from tests.bridge.macro.conftest import Game
 
 MELEE = ("Simple64", "Simple96", "Simple128", "Flat32", "Flat48", "Flat64", "Flat96", "Flat128")
@@ -84,16 +87,16 @@ def test_ways_go_round_cliffs_and_are_almost_as_long_as_the_games(make_game: Cal
 @pytest.mark.parametrize(
     "unit", [u for u in CATALOG.units if CATALOG.footprints.get(u.footprint)], ids=lambda u: u.name
 )
-def test_every_footprint_is_the_games(unit: object) -> None:
-    mask = CATALOG.footprints[unit.footprint]  # type: ignore[attr-defined]  # a row of the catalogue
-    name = next((n for n, known in knowledge().items() if known.id == unit.id), f"Unit{unit.id}")  # type: ignore[attr-defined]
+def test_every_footprint_is_the_games(unit: UnitType) -> None:
+    mask = CATALOG.footprints[unit.footprint]
+    name = next((n for n, known in knowledge().items() if known.id == unit.id), f"Unit{unit.id}")
     footprint = footprint_of(name)
     if not mask.cells:
         assert footprint is None
         return
     assert footprint is not None
     assert sorted(footprint.cells) == sorted(mask.cells)
-    if unit.resource:  # type: ignore[attr-defined]
+    if unit.resource:
         assert sorted(footprint.near) == sorted({*mask.cells, *mask.around})
 
 
@@ -152,11 +155,10 @@ def test_players_begin_at_the_places_that_are_computed(make_game: Callable[..., 
     land = land_of(game.snapshot)
     starts = load_map(find_map(name)).scenario.start_locations
     assert {tuple(base.place) for base in land.bases} >= {*starts}
-    # and they are computed, not only taken from where players begin
-    from bridge.ground.resources import base_places
-
-    fields, geysers = land._places("mineral_field"), land._places("geyser")
-    assert base_places(land.ground, fields, geysers) == land.bases
+    fields, geysers = (
+        tuple(sorted((u.pos.x, u.pos.y) for u in land.standing(kind))) for kind in ("mineral_field", "geyser")
+    )
+    assert base_places(land.ground, fields, geysers) == land.bases  # found without knowing where players begin
 
 
 def test_the_four_bases_of_simple64_have_all_resources_between_them(make_game: Callable[..., Game]) -> None:
@@ -170,7 +172,7 @@ def test_a_town_hall_may_stand_on_every_base_place_and_no_step_nearer(
     make_game: Callable[..., Game], name: str
 ) -> None:
     game = make_game(name)
-    game.client.debug(show_map())
+    game.client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.show_map))
     game.play(2)
     land = land_of(game.snapshot)
     free = [
@@ -243,14 +245,8 @@ def test_the_land_of_a_moment_is_made_once(make_game: Callable[..., Game]) -> No
     assert land_of(game.snapshot) is land_of(game.snapshot)
 
 
-def test_without_grids_nothing_can_be_built_and_nothing_fails(snapshot: Callable[..., object]) -> None:
-    land = land_of(snapshot([]))  # type: ignore[arg-type]  # a snapshot made by hand
+def test_without_grids_nothing_can_be_built_and_nothing_fails(snapshot: Callable[..., Snapshot]) -> None:
+    land = land_of(snapshot([]))
     assert not land.free.any()
     assert not land.creep.any()
     assert land.bases == ()
-
-
-def show_map() -> object:
-    from s2clientprotocol import debug_pb2
-
-    return debug_pb2.DebugCommand(game_state=debug_pb2.show_map)
