@@ -1,7 +1,8 @@
 """The documentation, executed: its Python runs, its commands parse, its files are valid, its links lead somewhere.
 
 The first word behind a fence is the language, the second says what a block is: `python compile` is not run, since it
-needs a network; `yaml task`, `yaml model` and `yaml agents` are files that are read as such, `yaml scenario` is played.
+needs a network; `yaml task`, `yaml model`, `yaml agents` and `yaml actions` are files that are read as such, `yaml
+scenario` is played.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ import typer
 
 from agents.config import AgentsFile, ModelConfig
 from agents.policy import FunctionPolicy
+from bridge import catalog
+from bridge.errors import CatalogueError
 from bridge.task import TaskConfig
 from docs.generate import PAGES, REFERENCE, main, outdated, write
 from docs.pages.markdown import anchor, cell, table
@@ -48,7 +51,7 @@ GOLDEN = ROOT / "tests" / "khala" / "golden.mcap"
 FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
-LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", *MODELS}
+LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", "yaml actions", *MODELS}
 OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "source", "ssh"}
 
 
@@ -213,6 +216,25 @@ def test_a_wrong_command_would_be_found(words: str, fault: str) -> None:
 @pytest.mark.parametrize("block", blocks(*MODELS))
 def test_a_file_on_a_page_is_valid(block: Block) -> None:
     loads(block.text, MODELS[block.info], source=block.name)
+
+
+@pytest.mark.parametrize("block", blocks("yaml actions"))
+def test_actions_on_a_page_could_stand_in_the_catalogue(block: Block, tmp_path: Path) -> None:
+    (tmp_path / "page.yaml").write_text(block.text, encoding="utf-8")
+    found = catalog.read(tmp_path / "page.yaml")
+    assert found
+    assert {action.group for action in found.values()} <= set(catalog.GROUPS)
+    assert not {name.casefold() for name in found} & {name.casefold() for name in catalog.catalogue()}
+
+
+def test_the_fault_of_an_action_is_told_as_the_page_says(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "how-to" / "add-an-action.md"
+    (block,) = (block for block in BLOCKS if block.page == page and block.info == "yaml actions")
+    file = tmp_path / "zerg_raid.yaml"
+    file.write_text(block.text.replace("Move_minimap", "Move_minmap"), encoding="utf-8")
+    with pytest.raises(CatalogueError) as raised:
+        catalog.read(file)
+    assert f"khala: {raised.value}\n" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("block", blocks("yaml scenario"))
