@@ -114,12 +114,17 @@ def _needs(ability: AbilityFacts) -> str:
 
 
 def _makes(ability: AbilityFacts) -> str:
-    return f"{ability.count} {ability.produces}s" if ability.count > 1 else f"{ability.produces}"
+    product = str(ability.produces)
+    return f"{ability.count} {product}s" if ability.count > 1 else _one(product)
+
+
+def _one(name: str) -> str:
+    return f"{'an' if name[0] in 'AEIOU' or name == 'SCV' else 'a'} {name}"
 
 
 def _illusion(ability: AbilityFacts) -> str:
-    many = f"{ability.count} illusions" if ability.count > 1 else "an illusion"
-    return f"{many} of a {ability.name.rpartition('_')[2]}"
+    kind = ability.name.rpartition("_")[2]
+    return f"{ability.count} {kind} illusions" if ability.count > 1 else f"one {kind} illusion"
 
 
 _IN_WORDS: Final[dict[str, Callable[[AbilityFacts], str]]] = {

@@ -16,6 +16,7 @@ from simulator.abilities import AIMS
 if TYPE_CHECKING:
     from simulator.abilities import Ability, Filter, Need
     from simulator.catalog import Catalog
+    from simulator.records import Upgrade
 
 TARGETS: Final = {aim: name for name, aim in AIMS.items()}
 EVERYWHERE: Final = 500
@@ -62,6 +63,17 @@ def needs_of(need: Need | None) -> Needs:
     return Needs(tuple(names), "TechLab" if any(name.endswith("TechLab") for name in here) else "")
 
 
+def research_of(upgrade: Upgrade, catalog: Catalog) -> Ability | None:
+    """The ability that researches an upgrade; of several the one that the structures of today have.
+
+    Of such pairs (an upgrade has moved to another structure) the tables keep both, and say only of some where it is.
+    """
+    found = [a for a in catalog.abilities if a.does == "research" and a.upgrade == upgrade.name]
+    here = [a for a in found if set(a.users) & set(upgrade.at)]
+    fits = [a for a in found if (a.minerals, a.vespene) == upgrade.cost]
+    return next(iter(here or fits or found), None)
+
+
 def _leaves(need: Need | None) -> list[tuple[str, str]]:
     if need is None or need.kind in ("not", "const", "op", "behavior"):
         return []
@@ -94,6 +106,7 @@ def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, 
     in_melee = ability.does and any(_is_melee(name, catalog) for name in users)
     if ability.does == "research":
         in_melee = in_melee and upgrade is not None and upgrade.researchable
+        in_melee = in_melee and upgrade is not None and research_of(upgrade, catalog) == ability
     elif product is not None and catalog.units[product].not_in_melee:
         in_melee = False
     return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from khala.knowledge.abilities import needs_of
+from khala.knowledge.abilities import needs_of, research_of
 from khala.knowledge.measures import per_second, plain, seconds, sparse
 from khala.knowledge.naming import unit_name, unit_names, upgrade_name, upgrade_names
 
@@ -36,23 +36,23 @@ def _name(upgrade: Upgrade) -> str:
 
 
 def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:
-    minerals, vespene = upgrade.cost
-    research = catalog.ability_of_id.get(upgrade.ability)
-    needs = needs_of(research.requires) if research else needs_of(None)
+    """One record; price, time and place are those of its research, where there is one."""
+    research = research_of(upgrade, catalog)
+    minerals, vespene = (research.minerals, research.vespene) if research else upgrade.cost
     changes = _changes(upgrade, catalog)
     enabled = [a for a in catalog.abilities if upgrade_name(upgrade.name) in needs_of(a.requires).names]
     users = {unit_name(u) for a in enabled if a.does != "research" for u in a.users if u in unit_names()}
-    places = [catalog.unit(place) for place in upgrade.at]
+    places = [catalog.unit(place) for place in (research.users if research else upgrade.at)]
     return {
         "id": upgrade.id,
         "race": places[0].race if places else "",
         "melee": upgrade.researchable,
         "minerals": minerals,
         "vespene": vespene,
-        "time_s": seconds(upgrade.loops),
+        "time_s": seconds(research.loops if research else upgrade.loops),
         "at": [unit_name(place.name) for place in places],
-        "ability": upgrade.ability,
-        "requires": list(needs.names),
+        "ability": research.id if research else upgrade.ability,
+        "requires": list(needs_of(research.requires).names) if research else [],
         "affects": sorted(users | changes.keys()),
         "enables": [a.id for a in enabled if a.does != "research"],
         "changes": changes,
