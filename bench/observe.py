@@ -99,7 +99,7 @@ def full_game() -> TaskConfig:
         AgentConfig(name=name, role=name, kind=kind, teams=(TeamConfig(name="Empty", kind="side", actions=actions),))
         for name, kind, actions in (
             ("Commander", "commander", ("No_Operation",)),
-            ("Developer", "developer", ("group:train", "group:research")),
+            ("Developer", "developer", ("group:train/protoss", "group:research/protoss")),
         )
     ]
     fighters = [

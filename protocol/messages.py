@@ -61,12 +61,16 @@ class Frozen(BaseModel):
 
         For inner loops only: it takes 1 µs where `model_copy` takes 6, and a joint step of 128 agents makes 3500.
         """
-        copy = object.__new__(type(self))
-        _set_fields(copy, {**self.__dict__, **changes})
-        _set_fields_set(copy, self.__pydantic_fields_set__)
-        _set_extra(copy, None)
-        _set_private(copy, None)
-        return copy
+        return self.having({**self.__dict__, **changes})
+
+    def having(self, fields: dict[str, object]) -> Self:
+        """A model of the same class with all of these fields, unchecked and not copied."""
+        made = object.__new__(type(self))
+        _set_fields(made, fields)
+        _set_fields_set(made, self.__pydantic_fields_set__)
+        _set_extra(made, None)
+        _set_private(made, None)
+        return made
 
 
 _set_fields, _set_fields_set, _set_extra, _set_private = (
@@ -216,7 +220,7 @@ class Offer(Frozen):
     times: int = Field(ge=0)
     """How often it could be paid for now; what is researched is researched once."""
     footprint: tuple[int, int] | None = None
-    """Width and height of the ground that it takes, in world units; None for what is not built."""
+    """Width and height of the ground that it takes, in world units; None for what is not put on a point."""
     first: bool = False
     """Whether it makes a structure of which there is none yet."""
 

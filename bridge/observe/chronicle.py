@@ -7,6 +7,7 @@ makes views of it; below are bodies.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -134,6 +135,7 @@ def _units_first(name: str) -> tuple[bool, str]:
     return is_structure(name), name
 
 
+@functools.cache
 def is_structure(name: str) -> bool:
     """Whether a type of unit is a structure; a type that is not known is none."""
     known = knowledge().get(name)

@@ -94,7 +94,15 @@ class Possible:
         times = max(0, min(int(purse // price) for purse, price in prices if price > 0))
         known = knowledge().get(made) if made else None
         first = known is not None and known.structure and not stand_ins(known.name) & self._own.keys()
-        return _offered(action.name, facts, min(times, 1) if facts.researches else times, first=first)
+        return Offer(
+            action=action.name,
+            minerals=round(facts.minerals),
+            vespene=round(facts.vespene),
+            supply=facts.supply,
+            times=min(times, 1) if facts.researches else times,
+            first=first,
+            footprint=known.footprint if known is not None and "screen" in action.args else None,
+        )
 
     # --- why not ----------------------------------------------------------------------------------------------
 
@@ -174,19 +182,6 @@ def _skills(names: tuple[str, ...]) -> dict[str, int]:
 @functools.lru_cache(4096)
 def _barred(action: str, reason: str) -> Barred:
     return Barred(action=action, reason=reason)
-
-
-def _offered(action: str, facts: AbilityFacts, times: int, *, first: bool) -> Offer:
-    known = knowledge().get(facts.produces) if facts.produces else None
-    return Offer(
-        action=action,
-        minerals=round(facts.minerals),
-        vespene=round(facts.vespene),
-        supply=facts.supply,
-        times=times,
-        first=first,
-        footprint=known.footprint if known else None,
-    )
 
 
 def _not_ready(facts: AbilityFacts, units: Sequence[Body]) -> str | None:

@@ -136,12 +136,14 @@ class Scene:
 
     def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Alliance) -> tuple[UnitView, ...]:
         points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)
-        views = [self._order[row].view for row in rows.tolist()]
-        if alliance != "enemy":
-            return tuple([v.but(alliance=alliance, screen=at) for v, at in zip(views, points, strict=True)])
-        far = looked.distance[rows].tolist()
-        seen = zip(views, points, far, strict=True)
-        return tuple([view.but(alliance=alliance, screen=at, distance=d) for view, at, d in seen])
+        distances = looked.distance[rows].tolist() if alliance == "enemy" else [None] * len(rows)
+        units = []
+        for row, at, distance in zip(rows.tolist(), points, distances, strict=True):
+            view = self._order[row].view
+            fields = view.__dict__.copy()
+            fields["alliance"], fields["screen"], fields["distance"] = alliance, at, distance
+            units.append(view.having(fields))
+        return tuple(units)
 
     def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
         """The units of a team with the skills that they could use: what one of them could, the others could not."""

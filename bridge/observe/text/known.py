@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.knowledge import advice, knowledge, short
@@ -16,18 +17,23 @@ if TYPE_CHECKING:
 
 
 @section("unit_knowledge")
-def unit_knowledge(page: Page) -> Iterator[str]:
+def unit_knowledge(page: Page) -> Iterable[str]:
     """What is known of every type in sight; uses and abilities only of those under control."""
-    types = _types(page)
+    return _written(_types(page))
+
+
+@functools.lru_cache(1024)
+def _written(types: _Types) -> tuple[str, ...]:
+    """The lines about some types, which are seldom others than at the step before."""
     friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
-    if any(types):
-        yield "Unit knowledge"
+    lines = ["Unit knowledge"] if any(types) else []
     for name in _all(types):
-        heading, *lines = short(name, _opponents(name, friends, foes))
-        yield f"{INDENT}{heading}"
-        yield from (f"{INDENT2}{line}" for line in lines)
+        heading, *more = short(name, _opponents(name, friends, foes))
+        lines.append(f"{INDENT}{heading}")
+        lines += [f"{INDENT2}{line}" for line in more]
         if name in types.mine:
-            yield from (f"{INDENT2}{line}" for line in advice(name))
+            lines += [f"{INDENT2}{line}" for line in advice(name)]
+    return tuple(lines)
 
 
 @shorter("unit_knowledge", rank=20, says="weapons and abilities of the types in sight")

@@ -1,0 +1,61 @@
+"""Whole pages, one for each kind of agent: what stands in a golden file is what a model reads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bridge.observe import Feedback, Observer
+from bridge.observe.text import SECTIONS_OF
+from protocol.messages import Received, Rejection
+
+FEEDBACK = {
+    "Developer": Feedback(
+        accepted=("Empty <Train_Stalker()>",),
+        rejections=(
+            Rejection(reason="not_available", message="There is no Stargate.", text="<Train_Phoenix()>", start=9),
+        ),
+    ),
+    "Commander": Feedback(
+        messages=(Received(sender="CombatGroup1", recipient="Commander", text="We are under fire."),)
+    ),
+}
+
+
+@pytest.mark.parametrize("agent", ["Commander", "Developer", "Builder", "CombatGroup1"])
+def test_a_page_of_each_kind_of_agent(agent: str, pages: Any, golden: Any) -> None:
+    golden(f"{agent.lower()}.txt", pages(FEEDBACK)[agent])
+
+
+def test_every_kind_of_agent_has_a_page(base_task: Any) -> None:
+    assert {agent.kind for agent in base_task.agents} == SECTIONS_OF.keys()
+
+
+def test_the_same_game_gives_the_same_pages(pages: Any) -> None:
+    assert pages(FEEDBACK) == pages(FEEDBACK)
+
+
+def test_the_order_in_which_the_game_lists_units_does_not_matter(base: Any, look: Any, base_task: Any) -> None:
+    units = base()
+    texts = []
+    for listed in (units, units[::-1]):
+        sight = Observer(base_task).observe(look(listed))
+        texts.append({name: agent.text for name, agent in sight.agents.items()})
+    assert texts[0] == texts[1]
+
+
+def test_a_side_that_has_lost_everything_has_pages_still(base_task: Any, look: Any) -> None:
+    sight = Observer(base_task).observe(look([], abilities={}))
+    texts = {name: agent.text for name, agent in sight.agents.items()}
+    assert "Teams without units: Stalker-1, Sentry-1" in texts["CombatGroup1"]
+    assert "You have no team to order now" in texts["CombatGroup1"]
+    assert "no Nexus: Train_Probe" in texts["Developer"]
+    assert "Enemies spotted so far: none" in texts["Commander"]
+
+
+def test_a_team_without_units_of_its_own_has_no_place(base: Any, look: Any, base_task: Any) -> None:
+    agent = Observer(base_task).observe(look(base())).agents["Developer"]
+    (team,) = agent.teams
+    assert (team.camera, team.view.minimap, team.view.units) == (None, None, ())
+    assert "Team Empty\n    Has no units of its own" in agent.text
