@@ -131,17 +131,16 @@ def _for_one_unit(action: Action) -> Action | None:
         return None
     which = "the first tag" if "tag" in action.args else "this tag"
     known = abilities()[action.pysc2.ability_id].about if producing and action.pysc2 else ""
-    return action.model_copy(
-        update={
-            "name": f"Select_Unit_{action.name}",
-            "args": ("tag", *action.args),
-            "about": f"Only the own unit with {which}: {known or action.about}",
-            "group": GROUP,
-            "aliases": (),
-            "subject": "unit",
-            "rule": None if producing else action.rule,
-        }
-    )
+    own = {
+        "name": f"Select_Unit_{action.name}",
+        "args": ("tag", *action.args),
+        "about": f"Only the own unit with {which}: {known or action.about}",
+        "group": GROUP,
+        "aliases": (),
+        "subject": "unit",
+        "rule": None if producing else action.rule,
+    }
+    return Action(**({field: getattr(action, field) for field in Action.model_fields} | own))
 
 
 def _sense(action: Action) -> tuple[str | None, ArgKind | None, str]:

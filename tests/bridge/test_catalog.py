@@ -168,6 +168,11 @@ def test_an_example_is_a_call_as_an_agent_writes_it(name: str, call: str) -> Non
     assert example(catalogue()[name]) == call
 
 
+def test_an_agent_is_told_of_an_action_what_it_is() -> None:
+    told = {name: (action.spec.name, action.spec.args, action.spec.description) for name, action in catalogue().items()}
+    assert told == {name: (name, action.args, action.about) for name, action in catalogue().items()}
+
+
 def test_the_hash_changes_with_nothing_but_the_catalogue() -> None:
     assert catalogue_sha256() == catalogue_sha256()
     assert len(catalogue_sha256()) == 64
