@@ -37,6 +37,8 @@ from bridge.functions import raw_forms
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
+    from s2clientprotocol import raw_pb2
+
     from bridge.act.aim import Pixel
     from bridge.act.plan import GameAction
     from bridge.act.translate import Command
@@ -153,10 +155,17 @@ class _Tour:
         assert command.target is not None  # the catalogue gives functions with a target to actions with a target
         if not isinstance(command.target, int):
             return command.target
-        unit = self.now.units.get(command.target)
-        if unit is None:
-            raise Missed("the target is gone")
+        unit = self._unit(command.target)
         return WorldPoint(unit.pos.x, unit.pos.y)
+
+    def _unit(self, tag: int) -> raw_pb2.Unit:
+        """A target that is a unit, even one that is only remembered, as a geyser under the fog of war."""
+        if unit := self.now.units.get(tag):
+            return unit
+        for known in self.now.response.observation.raw_data.units:
+            if known.tag == tag:
+                return known
+        raise Missed("the target is gone")
 
     def _pixel(self, command: Command) -> Generator[Step, Snapshot, Pixel]:
         """Where to click for the target, with the camera moved if that is needed."""
@@ -170,7 +179,7 @@ class _Tour:
     def _hit(self, command: Command) -> Pixel:
         screen, place = RealScreen(self.now), self._place(command)
         if isinstance(command.target, int):
-            pixel = screen.hit(self.now.units[command.target])
+            pixel = screen.hit(self._unit(command.target))
         elif "unit" in raw_forms(command.function.ability_id):
             pixel = screen.bare(place)  # a click on somebody would mean him and not the place
         else:

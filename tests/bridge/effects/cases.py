@@ -1,0 +1,203 @@
+"""One case for each text action: on which stage, and which words a model could say there."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from s2clientprotocol import raw_pb2
+
+from bridge.catalog import catalogue
+from bridge.frames import WorldPoint
+from bridge.knowledge import knowledge
+from bridge.names import order_name
+from bridge.task import AgentConfig, TaskConfig, TeamConfig
+from simulator.api.abilities import Command, judge
+from simulator.casting import is_modelled
+from simulator.catalog import load_catalog
+
+from .preparations import BY_RULE, prepare_for
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bridge.action import Action
+    from bridge.observe.sight import Sight, TeamSight
+    from bridge.snapshot import Snapshot
+    from simulator.abilities import Ability
+
+    from .preparations import Preparation
+    from .stage import Stage
+
+AGENT = "Agent"
+ANYBODY = ("Stalker",)
+"""Who is told what every type can be told."""
+SUCCESS = 1
+CASTERS = {
+    "Cancel": "VoidRay",
+    "Cancel_Last": "Nexus",
+    "Rally_Units": "Barracks",
+    "Scan_Move": "Medivac",
+}
+"""Who is told what too many could be told for the first of them to be the right one; by the stem of the function."""
+BASE_PLACE = (46.0, 46.0)
+"""Beside resources where nobody has a base."""
+TOWN_HALLS = frozenset({"Nexus", "CommandCenter", "Hatchery"})
+
+
+class Case(NamedTuple):
+    """A text action, and who is told it where and after what."""
+
+    action: Action
+    caster: str
+    prepare: Preparation | None
+    race: str
+    place: tuple[float, float] | None = None
+
+    @property
+    def stage(self) -> tuple[object, ...]:
+        """What the stage is made of: cases with the same can share it."""
+        return self.caster, self.prepare, self.race, self.place
+
+
+@functools.cache
+def cases() -> dict[str, Case]:
+    """By name of the action, those of one stage side by side."""
+    found = [case_of(action) for action in catalogue().values()]
+    found.sort(key=lambda case: (case.caster, case.race, case.place or (), getattr(case.prepare, "__qualname__", "")))
+    return {case.action.name: case for case in found}
+
+
+def case_of(action: Action) -> Case:
+    """Who is told it: the first of its types that has the ability on the simulator."""
+    race = action.race or "protoss"
+    place = BASE_PLACE if action.rule in {"build_near", "lock_base"} and action.produces in TOWN_HALLS else None
+    place = BASE_PLACE if action.rule == "lock_base" else place
+    usual = CASTERS.get(action.pysc2.stem) if action.pysc2 else None
+    units = action.units or (*ANYBODY, *knowledge())
+    if usual and (usual in units or not action.units):
+        units = (usual,)
+    for unit in units:
+        if ability := _ability(action, unit):
+            prepare = BY_RULE.get(action.rule or "") or prepare_for(unit, ability)
+            return Case(action, unit, prepare, race, place)
+    return Case(action, units[0], BY_RULE.get(action.rule or ""), race, place)
+
+
+def _ability(action: Action, unit: str) -> Ability | None:
+    """The ability of a type of unit that an action ends in, if the simulator has a rule for it."""
+    catalog = load_catalog()
+    known = knowledge()[unit].id
+    if action.pysc2 is None or known not in catalog.row_of_id:
+        return None
+    card = catalog.abilities_of(catalog.unit(known).row)
+    wanted = action.pysc2.ability_id
+    return next((a for a in card if wanted in {a.id, a.general} and is_modelled(a)), None)
+
+
+def task_of(case: Case) -> TaskConfig:
+    """A task of one agent whose units may be told this one thing."""
+    name = case.action.name
+    if case.action.subject == "side":
+        teams = (TeamConfig(name="Side", kind="side", actions=(name,)),)
+        agent = AgentConfig(name=AGENT, role="", kind="developer", admits="any", teams=teams)
+    else:
+        kind = "group" if case.action.subject == "two_units" or name.endswith("Morph_Archon") else "select"
+        teams = (TeamConfig(name="Team", unit_types=(case.caster,), kind=kind),)
+        agent = AgentConfig(name=AGENT, role="", admits="any", teams=teams, actions={case.caster: (name,)})
+    return TaskConfig(name="effects", map="Simple64", task="", agents=(agent,))
+
+
+# --- words ------------------------------------------------------------------------------------------------------------
+
+
+def replies(case: Case, stage: Stage, sight: Sight) -> Iterator[str]:
+    """What a model could say so that the action is done, the most promising first."""
+    teams = (t for t in sight.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
+    team = next(teams, None)
+    if team is None:
+        return
+    named = [hex(stage.caster)]
+    if case.action.subject == "two_units":
+        named.append(hex(next(tag for tag in team.team.tags if tag != stage.caster)))
+    named = named[: case.action.named]
+    for target in _targets(case.action, stage, team, sight):
+        yield f"Actions:\n    Team {team.view.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
+
+
+def _targets(action: Action, stage: Stage, team: TeamSight, sight: Sight) -> Iterator[list[str]]:
+    match action.target_kind:
+        case None:
+            yield []
+        case "tag":
+            yield from ([hex(tag)] for tag in _tags(action, stage, sight.snapshot))
+        case "screen":
+            assert team.camera is not None
+            for point in _points(action, stage):
+                x, y = team.camera.screen(*point)
+                if 0 <= x <= 24 and 0 <= y <= 24:
+                    yield [f"[{x:g}, {y:g}]"]
+        case "minimap":
+            for point in _points(action, stage):
+                x, y = sight.map.minimap(*point)
+                yield [f"[{x:g}, {y:g}]"]
+
+
+def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
+    """Units around the one that is told: first those at which the simulator lets it aim, then the others."""
+    here = snapshot.units[stage.caster].pos
+    whose = {"enemy": (raw_pb2.Enemy,), "own": (raw_pb2.Self,)}.get(
+        action.target or "", tuple(raw_pb2.Alliance.values())
+    )
+    near = [
+        unit
+        for unit in snapshot.units.values()
+        if unit.alliance in whose
+        and (unit.tag != stage.caster or action.subject == "side")
+        and max(abs(unit.pos.x - here.x), abs(unit.pos.y - here.y)) < 11.5
+    ]
+    near.sort(key=lambda u: math.dist((u.pos.x, u.pos.y), (here.x, here.y)))
+    return sorted((unit.tag for unit in near), key=lambda tag: not _may(action, stage, target=tag))
+
+
+def _points(action: Action, stage: Stage) -> Iterator[WorldPoint]:
+    """Places around the one that is told at which the simulator lets it aim, in steps of half a unit."""
+    x, y = stage.world.pos[stage.world.slot_of(stage.caster)].tolist()
+    steps = range(-22, 23)
+    points = [WorldPoint(math.floor(x) + dx / 2, math.floor(y) + dy / 2) for dx in steps for dy in steps]
+    points.sort(key=lambda point: abs(math.dist(point, (x, y)) - 4.5))
+    if action.rule == "build_at":
+        yield from _geysers(stage)
+    for point in points:
+        if _may(action, stage, point=point):
+            yield point
+
+
+def _geysers(stage: Stage) -> Iterator[WorldPoint]:
+    world = stage.world
+    for slot in world.live.tolist():
+        if world.unit_type(slot).name == "VespeneGeyser":
+            yield WorldPoint(*world.pos[slot].tolist())
+
+
+def _may(action: Action, stage: Stage, *, target: int = 0, point: WorldPoint | None = None) -> bool:
+    if action.pysc2 is None:
+        return True
+    command = Command(action.pysc2.ability_id, (stage.caster,), target=target, point=point)
+    return judge(stage.world, 1, command).result == SUCCESS
+
+
+# --- effects ----------------------------------------------------------------------------------------------------------
+
+
+def its_own(words: frozenset[str], action: Action) -> frozenset[str]:
+    """The words that speak of this action: its order and what came of it, not where somebody walks meanwhile."""
+    own = order_name(action.pysc2.ability_id) if action.pysc2 else ""
+    if own == "Smart":  # becomes whatever a right click would
+        return words
+    return frozenset(
+        word
+        for word in words
+        if not word.endswith(" moved") and (" order " not in word or word.endswith(f" order {own}"))
+    )

@@ -1,0 +1,75 @@
+"""A text action performed: from a model's words to what they changed in the game."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING, NamedTuple
+
+from bridge.act import Actor
+from bridge.observe import Observer
+from protocol.speech import parse
+
+from .cases import AGENT, its_own, replies, task_of
+from .effect import changes
+
+if TYPE_CHECKING:
+    from bridge.act import Executor
+    from bridge.act.plan import Plan
+
+    from .cases import Case
+    from .stage import Stage
+
+LOOPS, LONGER = 8, 40
+"""Loops after which an effect is looked for, and looked for again if there is none yet."""
+SAID, PLAYED = 60, 4
+"""How many replies are tried until one is taken, and how many that are taken until one has an effect."""
+
+
+class Performance(NamedTuple):
+    """What came of the words."""
+
+    text: str
+    """The last reply that was tried."""
+    words: frozenset[str]
+    """What it changed; nothing if it had no effect of its own."""
+    refusals: tuple[str, ...]
+    """Why others were not taken."""
+    accepted: bool
+    """Whether the last reply was an action of the catalogue that may be done."""
+
+
+def perform(case: Case, stage: Stage, executor: Executor) -> Performance:
+    """Says it in the ways that the stage offers, until one of them has an effect."""
+    task, seen = task_of(case), stage.again()
+    sight = Observer(task).observe(seen.snapshot)
+    refusals: list[str] = []
+    text, accepted, played = "", False, 0
+    for text in islice(replies(case, stage, sight), SAID):
+        joint = Actor(task).joint(sight, {AGENT: parse(text)})
+        refusals += [rejection.message for rejection in joint.rejections[AGENT]]
+        accepted = bool(joint.accepted[AGENT])
+        if not joint.commands:
+            continue
+        executor.begin()
+        words, refused = _play(case, stage, executor.plan(joint.commands, seen.snapshot, LOOPS))
+        if words:
+            return Performance(text, words, tuple(refusals), accepted)
+        refusals += refused
+        played += 1
+        if played == PLAYED:
+            break
+        stage.again()
+    return Performance(text, frozenset(), tuple(dict.fromkeys(refusals)), accepted)
+
+
+def _play(case: Case, stage: Stage, plan: Plan) -> tuple[frozenset[str], list[str]]:
+    """What a plan changed, if something of it is the action's own doing, and what was refused."""
+    played, seen, loops = stage.play(plan)
+    for more in (0, LONGER):
+        if more:
+            loops += more
+            seen = stage.look(stage.client.step(more))
+        words = changes(stage.idle(loops), seen)
+        if its_own(words, case.action):
+            return words, []
+    return frozenset(), [refusal.rejection.message for refusal in played.refusals]

@@ -1,0 +1,256 @@
+"""What has to be the case before a unit can use an ability: by the rule of the simulator that carries the ability out.
+
+Each preparation is a function of the world and of the unit's slot, and lets some loops pass where it has to.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+from simulator import buffs, casting, commands, harvesting, production, targets
+from simulator.abilities import Aim
+from simulator.skills import addons
+from simulator.tick import advance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simulator.abilities import Ability
+    from simulator.world import World
+
+    Point = tuple[float, float]
+    Preparation = Callable[[World, int], None]
+
+FOE = "Roach"
+"""What is fought and aimed at, where it has to be an enemy."""
+LONG = 1.0e6
+
+
+def prepare_for(caster: str, ability: Ability) -> Preparation | None:
+    """What has to happen before a unit of this type can use an ability; None for nothing."""
+    if ability.does in {"cancel", "cancel_growth", "cancel_morph"}:
+        return _begin(ability.link, ability.does)
+    if (caster, ability.does) in OF_UNIT:
+        return OF_UNIT[caster, ability.does]
+    return PREPARE.get(ability.does)
+
+
+# --- what the unit does already -----------------------------------------------------------------------------------
+
+
+def _walk(world: World, slot: int) -> None:
+    """On its way somewhere."""
+    x, y = world.pos[slot].tolist()
+    commands.move(world, [slot], (x, y + 9.0))
+    advance(world, 4)
+
+
+def _bear(*names: str) -> Preparation:
+    """Under the first of these buffs that the version has."""
+    return lambda world, slot: buffs.apply(world, slot, next(n for n in names if n in world.catalog.buff_of_name))
+
+
+def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
+    """Just after another ability, at an enemy or beside itself."""
+
+    def prepare(world: World, slot: int) -> None:
+        ability = world.catalog.ability(number)
+        x, y = world.pos[slot].tolist()
+        tag = world.tag_of(_foe(world, (x + distance, y))) if Aim.UNIT in ability.aim else 0
+        point = (x + distance, y) if Aim.POINT in ability.aim and not tag else None
+        assert casting.use(world, [slot], ability, target=tag, point=point)
+        advance(world, loops)
+
+    return prepare
+
+
+@functools.cache
+def _begin(link: str, does: str) -> Preparation:
+    """In the middle of the morph or add-on that an ability calls off, or else in the making itself."""
+
+    def prepare(world: World, slot: int) -> None:
+        name = world.unit_type(slot).name
+        before = next((a for a in world.catalog.abilities if a.numbers.get("cocoon") == name), None)
+        if before is not None:
+            world.become(slot, world.catalog.unit(before.users[0]))
+        x, y = world.pos[slot].tolist()
+        for ability in world.catalog.abilities_of(int(world.type[slot])):
+            wanted = before is ability or (before is None and ability.link == link and ability.does != does)
+            if does == "cancel_morph":
+                wanted = ability.does in {"morph", "root"} and ability.loops + ability.prep_loops > 0
+            if does == "cancel_growth" and before is None:
+                wanted = ability.does == "grow"
+            point = (x, y) if Aim.POINT in ability.aim and Aim.NONE not in ability.aim else None
+            if wanted and casting.use(world, [slot], ability, point=point):
+                advance(world, 4 if does == "cancel" else 16)
+                return
+        _in_the_making(world, slot)
+        advance(world, 2)
+
+    return prepare
+
+
+def _in_the_making(world: World, slot: int) -> None:
+    world.build_progress[slot], world.build_loops[slot] = 0.5, 1000.0
+    world.refresh(slot)
+
+
+def _at_work(world: World, slot: int) -> None:
+    """An SCV that builds something, or a structure that an SCV builds."""
+    x, y = world.pos[slot].tolist()
+    site = slot
+    if world.unit_type(slot).worker:
+        site = world.spawn(world.catalog.unit("SupplyDepot"), 1, (x - 3.0, y + 3.0))
+    else:
+        slot = world.spawn(world.catalog.unit("SCV"), 1, (x, y - 3.5))
+    _in_the_making(world, site)
+    assert casting.smart(world, [slot], target=world.tag_of(site))
+    advance(world, 40)
+
+
+def _queue(world: World, slot: int) -> None:
+    """Something in the queue, twice."""
+    for _ in range(2):
+        production.enqueue(world, slot, world.catalog.ability(1006), makes="Probe", loops=2000.0)
+
+
+def _load_up(world: World, slot: int) -> None:
+    harvesting.take_up(world, slot, 5, gas=False, rich=False)
+
+
+def _hungry(world: World, slot: int) -> None:
+    world.energy[slot] = 10.0
+
+
+# --- who else is there --------------------------------------------------------------------------------------------
+
+
+def _foe(world: World, point: Point) -> int:
+    slot = world.spawn(world.catalog.unit(FOE), 2, point)
+    world.looks_around[slot] = False
+    return slot
+
+
+def _fill(world: World, slot: int) -> None:
+    """A passenger in the carrier."""
+    passenger = world.spawn(world.catalog.unit("SCV"), 1, tuple(world.pos[slot].tolist()))
+    world.stow(passenger, slot)
+
+
+def _man(world: World, slot: int) -> None:
+    """Soldiers with stimpacks in a Bunker, and an enemy before it whom they fight."""
+    commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
+    x, y = world.pos[slot].tolist()
+    for name in ("Marine", "Marauder"):
+        world.stow(world.spawn(world.catalog.unit(name), 1, (x, y)), slot)
+    for passenger in world.passengers(slot):
+        world.pos[passenger] = x, y
+        world.refresh(passenger)
+    targets.engage(world, world.passengers(slot)[0], _foe(world, (x, y + 4.0)))
+
+
+def _split(world: World, slot: int) -> None:
+    """An Adept in its phase shift, or the shade of one."""
+    x, y = world.pos[slot].tolist()
+    adept = slot if world.unit_type(slot).name == "Adept" else world.spawn(world.catalog.unit("Adept"), 1, (x, y + 1.0))
+    casting.use(world, [adept], world.catalog.ability(2544), point=(x + 4.0, y))
+    advance(world, 4)
+    if adept != slot:
+        world.fields[-1].target = world.tag_of(slot)
+
+
+def _worker(world: World, slot: int) -> None:
+    """A worker beside a structure that takes workers in."""
+    x, y = world.pos[slot].tolist()
+    world.spawn(world.catalog.unit("SCV"), 1, (x, y - 4.0))
+
+
+def _drained(world: World, slot: int) -> None:
+    """A Stalker without shields beside a battery."""
+    x, y = world.pos[slot].tolist()
+    stalker = world.spawn(world.catalog.unit("Stalker"), 1, (x - 1.5, y + 3.0))
+    world.shields[stalker] = 5.0
+    world.damaged_loop[stalker] = LONG
+    advance(world, 2)
+
+
+def _recharge(world: World, slot: int) -> None:
+    """A battery that recharges somebody."""
+    _drained(world, slot)
+    advance(world, 4)
+
+
+def _battery(world: World, slot: int) -> None:
+    """A Shield Battery with power beside a Nexus."""
+    x, y = world.pos[slot].tolist()
+    world.spawn(world.catalog.unit("Pylon"), 1, (x - 4.0, y - 4.0))
+    world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.0, y))
+    advance(world, 2)
+
+
+def _with_tech_lab(world: World, slot: int) -> None:
+    """A structure with a TechLab at its side."""
+    lab = world.catalog.unit(f"{world.unit_type(slot).name}TechLab")
+    world.addon[slot] = world.spawn(lab, 1, addons.place_of(world, slot))
+
+
+def _know(upgrade: str) -> Preparation:
+    """A player who has an upgrade."""
+    return lambda world, _: commands.grant_upgrade(world, 1, world.catalog.upgrade(upgrade).id)
+
+
+def _at_it(producer: str, ability: int, makes: str) -> Preparation:
+    """A structure of another type that makes something."""
+
+    def prepare(world: World, slot: int) -> None:
+        x, y = world.pos[slot].tolist()
+        other = world.spawn(world.catalog.unit(producer), 1, (x - 4.0, y - 6.0))
+        world.spawn(world.catalog.unit("Pylon"), 1, (x - 1.0, y - 4.5))
+        production.enqueue(world, other, world.catalog.ability(ability), makes=makes, loops=2000.0)
+        advance(world, 2)
+
+    return prepare
+
+
+PREPARE: dict[str, Preparation] = {
+    "stop": _walk,
+    "ghost_weapons_free": _bear("GhostHoldFireB"),
+    "ghost_cloak_off": _bear("GhostCloak"),
+    "banshee_cloak_off": _bear("BansheeCloak"),
+    "generate_creep_off": _bear("makeCreep2x2Overlord"),
+    "lurker_remove_hold_fire": _bear("LurkerHoldFireB"),
+    "volatile_burst_building_off": _bear("VolatileBurstBuilding"),
+    "cancel_lock_on_cancel": _use(2350, 8),
+    "cancel_channel_snipe": _use(2714),
+    "cancel_tac_nuke_strike": _use(1622),
+    "cancel_neural_parasite": _use(249),
+    "cancel_graviton_beam": _use(173, distance=3.0),
+    "cancel_prismatic_alignment": _use(2393),
+    "pulsar_beam_off": _use(2375),
+    "cancel_phase_shift": _split,
+    "cancel_job": _queue,
+    "cancel_slot": _queue,
+    "halt": _at_work,
+    "return": _load_up,
+    "viper_consume_structure": _hungry,
+    "recharge_shields": _drained,
+    "stop_recharging": _recharge,
+    "battery_overcharge": _battery,
+    "load_all": _worker,
+    **dict.fromkeys(("redirect_attack", "redirect_stop", "redirect_stim"), _man),
+    **dict.fromkeys(("unload_all", "unload_all_at", "unload_unit"), _fill),
+}
+"""By a skill's name: what has to be the case before a unit can use it."""
+OF_UNIT: dict[tuple[str, str], Preparation] = {
+    **dict.fromkeys([(name, "train") for name in ("Barracks", "Factory", "Starport")], _with_tech_lab),
+    ("Gateway", "structure_morph"): _know("WarpGateResearch"),
+}
+"""The same for one type of unit."""
+BY_RULE: dict[str, Preparation] = {
+    "chrono_economy": _at_it("Nexus", 1006, "Probe"),
+    "chrono_military": _at_it("Gateway", 916, "Zealot"),
+    "chrono_research": _at_it("CyberneticsCore", 1568, "WarpGateResearch"),
+    "morph_warpgates": _know("WarpGateResearch"),
+}
+"""By the rule of a text action: what has to be the case before it finds anything."""

@@ -1,0 +1,45 @@
+"""Every text action, said as a model would say it and played through the raw interface, changes the game."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bridge.act.raw import RawExecutor
+from bridge.catalog import catalogue
+
+from .cases import Case, cases
+from .performance import perform
+from .without_effect import BY_RAW, SINGLE, reason
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from .stage import Stage
+
+    Stages = Callable[..., Stage]
+
+
+def every_case() -> Iterator[object]:
+    """Those that are made by rule for one unit of a team are left to the long tests."""
+    for name, case in cases().items():
+        by_rule = name.startswith(SINGLE) and case.action.group == "generated"
+        yield pytest.param(case, id=name, marks=[pytest.mark.slow] if by_rule else [])
+
+
+@pytest.mark.parametrize("case", list(every_case()))
+def test_a_text_action_does_what_it_says(case: Case, stage_of: Stages) -> None:
+    action = case.action
+    performance = perform(case, stage_of(case), RawExecutor())
+    if action.function is None:
+        assert performance.accepted
+        assert performance.words == frozenset()
+    elif why := reason(action.name, BY_RAW):
+        assert performance.words == frozenset(), f"it has an effect, though {why}: it has to leave the table"
+    else:
+        assert performance.words, f"{performance.text} had no effect; refused: {performance.refusals[:3]}"
+
+
+def test_the_table_of_those_without_effect_names_actions() -> None:
+    assert BY_RAW.keys() <= catalogue().keys()
