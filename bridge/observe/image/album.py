@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import cv2
+
 from bridge.observe.image import features, minimap, own, screen, titles
 from bridge.observe.image.canvas import Canvas, inner_px
 from bridge.observe.image.layers import LAYERS, coloured, explain
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from bridge.observe.image.picture import Picture
     from bridge.observe.sight import AgentSight
     from bridge.snapshot import Snapshot
+
+cv2.setNumThreads(1)  # a picture is too small to share, and agents of other processes want the rest
 
 
 class Drawing(NamedTuple):

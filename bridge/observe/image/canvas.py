@@ -47,31 +47,25 @@ class Canvas:
 
     image: Image
     """(size, size, 3), margins included."""
-    extent: float
-    """Size of the frame on both axes, in its own cells."""
+    inner: Image
+    """The part of the image that shows the frame; drawing on it never touches the margins."""
+    scale: float
+    """Pixels of a cell of the frame."""
 
     @classmethod
     def on(cls, ground: Image, size_px: int, extent: float) -> Canvas:
-        """A canvas with a ground of `inner_px` pixels on both axes."""
+        """A canvas with a ground of `inner_px` pixels on both axes.
+
+        Args:
+            ground: what is under everything.
+            size_px: of the whole picture on both axes.
+            extent: size of the frame on both axes, in its own cells.
+        """
         margin = margin_of(size_px, extent)
         image = _blank(size_px, extent).copy()
-        image[margin:, margin:] = ground
-        return cls(image, extent)
-
-    @property
-    def margin(self) -> int:
-        """Pixels on the left and at the top that are not part of the frame."""
-        return margin_of(self.image.shape[0], self.extent)
-
-    @property
-    def inner(self) -> Image:
-        """The part of the image that shows the frame; drawing on it never touches the margins."""
-        return self.image[self.margin :, self.margin :]
-
-    @property
-    def scale(self) -> float:
-        """Pixels of a cell of the frame."""
-        return float((self.image.shape[0] - self.margin) / self.extent)
+        inner = image[margin:, margin:]
+        inner[:] = ground
+        return cls(image, inner, (size_px - margin) / extent)
 
     def pixel(self, x: float, y: float) -> tuple[int, int]:
         """Column and row, in `inner`, of a point of the frame."""

@@ -27,7 +27,7 @@ def code_of(unit_type: str) -> str:
 
 @functools.cache
 def _codes() -> dict[str, str]:
-    """By type: the most natural code that no type before it has; those that are played, and short names, choose first."""
+    """By type: the most natural code that is not taken; those that are played, and short names, choose first."""
     taken: dict[str, str] = {}
 
     def order(name: str) -> tuple[bool, int, str]:

@@ -151,7 +151,7 @@ LAYERS: dict[str, Layer] = {
             "whose units are where",
             _SIDES,
         ),
-        Layer("unit_type", _of_units(lambda one: one.type_id % 255 + 1), "types", "a colour for each type of unit"),
+        Layer("unit_type", _of_units(lambda one: one.type_id % 254 + 1), "types", "a colour for each type of unit"),
         Layer("unit_hit_points_ratio", _of_units(lambda one: _percent(one.health)), "scalar", "health, light is full"),
         Layer("unit_shields_ratio", _of_units(lambda one: _percent(one.shield)), "scalar", "shields, light is full"),
         Layer("unit_energy_ratio", _of_units(lambda one: _percent(one.energy)), "scalar", "energy, light is full"),
@@ -191,12 +191,16 @@ def coloured(layer: Layer, values: Cells) -> Image:
     if layer.kind == "scalar":
         return _graded(layer, values)
     if layer.kind == "types":
-        table[:] = _hues()
-        return np.asarray(table[np.where(values, 1 + values % 255, 0)], np.uint8)
+        return _mapped(np.where(values, values % 254 + 1, 0), _hues())
     table[:] = _DARK
     for value, _, colour in layer.colours:
         table[value] = colour
-    return np.asarray(table[np.clip(values, 0, 255)], np.uint8)
+    return _mapped(np.clip(values, 0, 255), table)
+
+
+def _mapped(values: Cells, table: Image) -> Image:
+    """The colours of a table, (256, 3), in the place of its numbers."""
+    return np.asarray(cv2.applyColorMap(values.astype(np.uint8), table[:, None]), np.uint8)
 
 
 def _graded(layer: Layer, values: Cells) -> Image:
@@ -206,7 +210,7 @@ def _graded(layer: Layer, values: Cells) -> Image:
         high = max(int(values.max()), 1)
     elif layer.name == "height_map" and int(values.max()) - int(values.min()) >= _CLIFF // 2:
         low, high = int(values.min()), int(values.max())
-    image = np.asarray(_viridis()[np.clip((values - float(low)) * (255 / (high - low)), 0, 255).astype(np.uint8)])
+    image = _mapped(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
     if layer.name != "height_map":
         image[values == 0] = _DARK  # nothing is there
     return image

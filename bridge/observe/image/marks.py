@@ -9,6 +9,7 @@ the three digits before them tell units apart, four where two units on one pictu
 from __future__ import annotations
 
 import functools
+import math
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _TAIL = 4
 """Hexadecimal digits at the end of a tag that say nothing."""
-_CELL = 3
+_CELL = 4
 """Pixels of a cell of the plan of what is hidden."""
 _WORST = 0.5
 """A mark of which more than this share would lie over other marks is left out."""
@@ -97,30 +98,26 @@ class _Plan:
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
-        self._stride = width // _CELL + 2
-        self._taken = 0
+        self.stride = width // _CELL + 2
+        self.taken = 0
+
+    def at(self, left: int, top: int) -> int:
+        """Number of the cell of a pixel, which is how far the bits of a rectangle there are from the first one."""
+        return top // _CELL * self.stride + left // _CELL
+
+    def bits(self, width: int, height: int) -> tuple[int, int]:
+        """The bits of a rectangle in the first cell, and how many there are."""
+        return _rectangle(width // _CELL + 1, height // _CELL + 1, self.stride)
 
     def add(self, left: int, top: int, width: int, height: int) -> None:
         """Takes a rectangle that begins in the picture."""
-        mask = _rectangle(width // _CELL + 1, height // _CELL + 1, self._stride)
-        self._taken |= mask << (top // _CELL * self._stride + left // _CELL)
-
-    def share(self, left: int, top: int, width: int, height: int) -> float:
-        """How much of a rectangle is taken, 0 to 1."""
-        columns, rows = width // _CELL + 1, height // _CELL + 1
-        there = self._taken >> (top // _CELL * self._stride + left // _CELL)
-        return (there & _rectangle(columns, rows, self._stride)).bit_count() / (columns * rows)
-
-    def holds(self, left: int, top: int, width: int, height: int) -> bool:
-        """Whether a rectangle is inside of the picture."""
-        return left >= 0 and top >= 0 and left + width <= self.width and top + height <= self.height
+        self.taken |= self.bits(width, height)[0] << self.at(left, top)
 
 
 @functools.lru_cache(1024)
-def _rectangle(columns: int, rows: int, stride: int) -> int:
-    """The bits of a rectangle in the corner of a plan."""
+def _rectangle(columns: int, rows: int, stride: int) -> tuple[int, int]:
     line = (1 << columns) - 1
-    return sum(line << (row * stride) for row in range(rows))
+    return sum(line << (row * stride) for row in range(rows)), columns * rows
 
 
 _WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
@@ -130,26 +127,29 @@ _WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
     """Where a mark hides least; None if every place is over other marks."""
     width, height = stamp.size
-    best: tuple[float, _Spot] | None = None
+    right_most, lowest = hidden.width - width, hidden.height - height
+    bits, count = hidden.bits(width, height)
+    marks, bodies = hidden.taken, covered.taken
+    best, lowest_cost = None, math.inf
     for ring, gap in enumerate(_RINGS_PX):
+        if lowest_cost < _FAR * ring:
+            break  # further away is no better
         beside, corner = one.radius + gap, round(0.72 * one.radius) + gap
         for way, (right, down) in enumerate(_WAYS):
             reach = corner if right and down else beside
             x, y = one.x + right * (reach + width // 2), one.y + down * (reach + height // 2)
             left, top = x - width // 2, y - height // 2
-            if not hidden.holds(left, top, width, height):
+            if not (0 <= left <= right_most and 0 <= top <= lowest):
                 continue
-            over = hidden.share(left, top, width, height)
-            if over > _WORST:
+            at = hidden.at(left, top)
+            over = (marks >> at & bits).bit_count() / count
+            cost = _OVER_MARK * over + _FAR * ring + way / 100
+            if over > _WORST or cost >= lowest_cost:
                 continue
-            cost = _OVER_MARK * over + _OVER_BODY * covered.share(left, top, width, height) + _FAR * ring + way / 100
-            if best is None or cost < best[0]:
-                best = cost, _Spot(left, top, ring, (x, y))
-            if cost < _FAR * ring + (way + 1) / 100:  # nothing is hidden, and all that follows is less handy
-                return best[1]
-        if best is not None and best[0] < _FAR * (ring + 1):
-            break  # further away is no better
-    return best[1] if best else None
+            cost += _OVER_BODY * (bodies >> at & bits).bit_count() / count
+            if cost < lowest_cost:
+                best, lowest_cost = _Spot(left, top, ring, (x, y)), cost
+    return best
 
 
 def _lead(image: Image, one: Marked, spot: _Spot) -> None:

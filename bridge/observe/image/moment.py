@@ -6,9 +6,10 @@ frame. It draws nothing, and knows no team.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from s2clientprotocol import raw_pb2
@@ -45,8 +46,7 @@ UNDRAWN = frozenset({"Larva", "KarakFemale", "CollapsiblePurifierTowerDiagonal"}
 """Types without a body worth a place; larvae crawl under their hatchery in swarms."""
 
 
-@dataclass(frozen=True, slots=True)
-class Subject:
+class Subject(NamedTuple):
     """One unit as it is drawn."""
 
     tag: int
@@ -153,27 +153,25 @@ class Moment:
 
 
 def _subject(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> Subject:
-    name = unit_name(unit.unit_type)
     side = _SIDES.get(unit.alliance, "neutral")
+    name, code, shape = _kind(unit.unit_type, side, unit.is_flying, unit.radius >= _STRUCTURE_RADIUS)
     order, target = _order(unit, units) if side == "own" else ("", None)
-    shape = _shape(unit, name, side)
-    is_ghost = (
-        unit.display_type == raw_pb2.Snapshot or unit.cloak in _CLOAKED or unit.is_hallucination or unit.is_burrowed
-    )
+    is_remembered = unit.display_type == raw_pb2.Snapshot
+    pos = unit.pos
     return Subject(
         tag=unit.tag,
         type_id=unit.unit_type,
         owner=unit.owner,
-        x=unit.pos.x,
-        y=unit.pos.y,
+        x=pos.x,
+        y=pos.y,
         radius=unit.radius or 0.5,
         facing=unit.facing,
         name=name,
-        code=code_of(name) if shape in {"ground", "air", "structure"} else "",
+        code=code,
         side=side,
         shape=shape,
-        ghost=is_ghost,
-        built=unit.build_progress if unit.display_type != raw_pb2.Snapshot else 1.0,
+        ghost=is_remembered or unit.cloak in _CLOAKED or unit.is_hallucination or unit.is_burrowed,
+        built=1.0 if is_remembered else unit.build_progress,
         health=_share(unit.health, unit.health_max),
         shield=_share(unit.shield, unit.shield_max),
         energy=_share(unit.energy, unit.energy_max),
@@ -182,28 +180,40 @@ def _subject(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> Subject:
     )
 
 
-def _shape(unit: raw_pb2.Unit, name: str, side: Side) -> Shape:
-    if name == "ForceField":
-        return "field"
-    if side == "neutral":
-        if "MineralField" in name:
-            return "rich" if "Rich" in name else "minerals"
-        return "geyser" if "Geyser" in name else "stone"
-    if unit.is_flying:
-        return "air"
+@functools.lru_cache(4096)
+def _kind(unit_type: int, side: Side, is_flying: bool, is_large: bool) -> tuple[str, str, Shape]:  # a key
+    """Name, letters and shape of a type of unit."""
+    name = unit_name(unit_type)
+    shape: Shape = "ground"
     known = knowledge().get(name)
-    is_structure = known.structure if known else unit.radius >= _STRUCTURE_RADIUS
-    return "structure" if is_structure else "ground"
+    if name == "ForceField":
+        shape = "field"
+    elif side == "neutral":
+        shape = _thing(name)
+    elif is_flying:
+        shape = "air"
+    elif known.structure if known else is_large:
+        shape = "structure"
+    return name, code_of(name) if shape in {"ground", "air", "structure"} else "", shape
+
+
+def _thing(name: str) -> Shape:
+    """The shape of what is nobody's."""
+    if "MineralField" in name:
+        return "rich" if "Rich" in name else "minerals"
+    return "geyser" if "Geyser" in name else "stone"
 
 
 def _share(value: float, full: float) -> float:
-    return min(max(value / full, 0.0), 1.0) if full else -1.0
+    if not full:
+        return -1.0
+    return 1.0 if value >= full else value / full
 
 
 def _order(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> tuple[str, tuple[float, float] | None]:
     """What an own unit does, and where that leads; whom it fires at comes first."""
-    if unit.engaged_target_tag in units:
-        enemy = units[unit.engaged_target_tag]
+    enemy = units.get(unit.engaged_target_tag)
+    if enemy is not None:
         return "Attack", (enemy.pos.x, enemy.pos.y)
     if not unit.orders:
         return "", None

@@ -32,8 +32,8 @@ T = TypeVar("T", bound=np.generic)
 
 FINE = 10
 """Pixels a world unit that the ground is painted with; a camera enlarges them."""
-_PAD = 2
-"""World units around a camera that are cut out with it, so that enlarging has something to go by."""
+_PAD = 1
+"""World units around a camera that are cut out with it, so that soft edges are those of the whole map."""
 _CELLS = int(CAMERA_WIDTH) + 2 * _PAD + 1
 _EXPLORED, _HIDDEN = 0.6, 0.3
 """Brightness of ground that is not seen now, and of ground that never was."""
@@ -71,14 +71,16 @@ class Painting:
         return _painting(Ground.of(info), (area.p0.x, area.p0.y, area.p1.x, area.p1.y))
 
     def seen(self, camera: Camera, size_px: int, veil: Veil) -> Image:
-        """What a camera shows of it, (size_px, size_px, 3)."""
+        """What a camera shows of it, (size_px, size_px, 3); at most half of its own pixels beside the truth."""
         left, top, x, y = self._window(camera)
         part = _cut(self.image, left * FINE, top * FINE, _CELLS * FINE, palette.VOID)
         if veil.creep is not None:
             tint(part, _cut(veil.creep, left, top, _CELLS, 0))
         if veil.sight is not None:
             shade(part, _cut(veil.sight, left, top, _CELLS, 0))
-        return _enlarged(part, x * FINE, y * FINE, size_px)
+        column, row, wide = round(x * FINE), round(y * FINE), int(CAMERA_WIDTH * FINE)
+        view = part[row : row + wide, column : column + wide]
+        return np.asarray(cv2.resize(view, (size_px, size_px), interpolation=cv2.INTER_LINEAR), np.uint8)
 
     def cells(self, values: Mask, camera: Camera, size_px: int) -> Mask:
         """What a camera shows of an image with a pixel a cell of the map, values as they are, (size_px, size_px)."""
@@ -192,12 +194,3 @@ def shade(part: Image, sight: Mask) -> None:
         return
     light = _smooth(_BRIGHTNESS[np.minimum(sight, 3)] * 255, (part.shape[1], part.shape[0])).astype(np.uint8)
     cv2.multiply(part, cv2.merge([light] * 3), dst=part, scale=1 / 255)
-
-
-def _enlarged(part: Image, x: float, y: float, size_px: int) -> Image:
-    """The camera's view in a part, which begins at this fraction of its pixels, as large as a picture wants it."""
-    scale = size_px / (CAMERA_WIDTH * FINE)
-    # OpenCV's pixels have their centres at whole numbers: half a pixel is added here and taken away there
-    move = np.array([[scale, 0, (0.5 - x) * scale - 0.5], [0, scale, (0.5 - y) * scale - 0.5]])
-    seen = cv2.warpAffine(part, move, (size_px, size_px), flags=cv2.INTER_LINEAR)
-    return np.asarray(seen, np.uint8)

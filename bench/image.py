@@ -1,0 +1,117 @@
+"""Draws pictures of battles on the simulator and says what one costs, from a snapshot to bytes.
+
+    python -m bench.image            a table
+    python -m bench.image --json     one JSON object on stdout
+
+A game is played for 40 decisions, all units attacking; then each picture is made of each of its snapshots, 512 pixels
+large, with marks. `ms` is the median and `p95 ms` the 95th percentile of one picture with everything that is new in a
+snapshot; `first ms` is the first one of the map, whose ground is painted once. `units` are those on the screen at most.
+The aim is 5 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from typing import Any
+
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc_pb
+
+from bridge.catalog import catalogue
+from bridge.frames import CAMERA_WIDTH, MapFrame
+from bridge.imagespec import ImageSpec
+from bridge.names import unit_name
+from bridge.observe import Observer
+from bridge.observe.image.album import Album
+from bridge.snapshot import Snapshot
+from bridge.task import AgentConfig, TaskConfig, TeamConfig
+from protocol.messages import Frames
+from simulator.client import Client, command, interface
+
+BATTLES = {"2s3z": "llm_smac/2s3z", "2c_vs_64zg": "llm_smac/2c_vs_64zg", "pvz_task6": "llm_pysc2/pvz_task6_level1"}
+PICTURES = {
+    "screen, JPEG": ImageSpec(what="screen", max_teams=1, source="drawn"),
+    "screen, PNG": ImageSpec(what="screen", max_teams=1, source="drawn", format="png"),
+    "screen, WebP": ImageSpec(what="screen", max_teams=1, source="drawn", format="webp"),
+    "minimap, JPEG": ImageSpec(what="minimap", source="drawn"),
+    "features, JPEG": ImageSpec(what="features", max_teams=1, source="drawn"),
+    "layer:buildable, JPEG": ImageSpec(what="layer:buildable", max_teams=1, source="drawn"),
+}
+DECISIONS, LOOPS = 40, 8
+ATTACK = 3674
+
+
+def play(map_name: str) -> list[Snapshot]:
+    """A game, decision by decision: everybody attacks where the enemies are."""
+    client = Client()
+    seen = client.play(map_name, interface(), seed=1)
+    info = client.ask(game_info=sc_pb.RequestGameInfo()).game_info
+    snapshots = []
+    for _ in range(DECISIONS):
+        units = seen.observation.raw_data.units
+        enemies = [unit.pos for unit in units if unit.alliance == raw_pb2.Enemy]
+        if enemies:
+            middle = (sum(p.x for p in enemies) / len(enemies), sum(p.y for p in enemies) / len(enemies))
+            own = [unit.tag for unit in units if unit.alliance == raw_pb2.Self]
+            client.act(command(ATTACK, own, point=middle))
+        seen = client.step(LOOPS)
+        snapshots.append(Snapshot(response=seen, info=info))
+    return [shown for shown in snapshots if shown.own]
+
+
+def task_of(shown: Snapshot, spec: ImageSpec) -> TaskConfig:
+    """One agent with all units that fight, and one picture."""
+    types = tuple(dict.fromkeys(unit_name(unit.unit_type) for unit in shown.own))
+    moves = {name: ("Move_Screen",) for name in types if catalogue()["Move_Screen"].fits(name)}
+    team = TeamConfig(name="A", unit_types=tuple(moves), kind="select_all_type")
+    agent = AgentConfig(name="A", role="", teams=(team,), actions=moves, images=(spec,), admits="any")
+    return TaskConfig(name="bench", map="2s3z", task="", agents=(agent,))
+
+
+def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
+    task = task_of(snapshots[0], spec)
+    observer = Observer(task.model_copy(update={"agents": (task.agents[0].model_copy(update={"images": ()}),)}))
+    took_ms, sizes, units = [], [], 0
+    for shown in snapshots:
+        seen = next(iter(observer.observe(shown).agents.values()))
+        seen = type(seen)(task.agents[0], seen.view, seen.teams, seen.idle_teams)
+        began = time.perf_counter()
+        pictures = Album(shown, MapFrame.of(shown.info, Frames())).pictures(seen)
+        took_ms.append(1000 * (time.perf_counter() - began))
+        sizes += [len(picture.data) for picture in pictures]
+        camera = seen.teams[0].camera if seen.teams else None
+        if camera is not None:
+            half = CAMERA_WIDTH / 2
+            near = (u for u in shown.units.values() if max(abs(u.pos.x - camera.x), abs(u.pos.y - camera.y)) < half)
+            units = max(units, sum(1 for _ in near))
+    return {
+        "units": units,
+        "first ms": round(took_ms[0], 1),
+        "ms": round(statistics.median(took_ms[1:]), 2),
+        "p95 ms": round(statistics.quantiles(took_ms[1:], n=20)[-1], 2),
+        "kB": round(statistics.mean(sizes) / 1000, 1),
+    }
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    results = {}
+    for battle, map_name in BATTLES.items():
+        snapshots = play(map_name)
+        results[battle] = {name: measure(snapshots, spec) for name, spec in PICTURES.items()}
+    if options.parse_args().json:
+        print(json.dumps(results))
+        return
+    columns = ("units", "first ms", "ms", "p95 ms", "kB")
+    print(f"{'battle':>12}  {'picture':>22}  " + "  ".join(f"{column:>9}" for column in columns))
+    for battle, by_name in results.items():
+        for name, row in by_name.items():
+            print(f"{battle:>12}  {name:>22}  " + "  ".join(f"{row[column]:>9}" for column in columns))
+
+
+if __name__ == "__main__":
+    main()
