@@ -21,7 +21,7 @@ from bridge.ground.terrain import Ground, grid
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from bridge.ground.footprints import Footprint
     from bridge.ground.resources import Base, Places
@@ -91,18 +91,44 @@ class Land:
         return taken
 
     @functools.cached_property
+    def plans(self) -> tuple[tuple[str, WorldPoint], ...]:
+        """What own workers are on their way to build, and where its middle is going to be; nothing stands there yet.
+
+        The game takes the price when it is begun, so that these are not paid for.
+        """
+        return tuple(plan for unit in self._raw.units if unit.alliance == raw_pb2.Self for plan in self._plans_of(unit))
+
+    def _plans_of(self, unit: raw_pb2.Unit) -> Iterator[tuple[str, WorldPoint]]:
+        for order in unit.orders:
+            structure = built_by(order.ability_id)
+            target = self.unit(order.target_unit_tag)
+            footprint = footprint_of(structure) if structure is not None else None
+            if structure is None or footprint is None:
+                continue
+            if target is not None:
+                middle, begun = WorldPoint(target.pos.x, target.pos.y), target.alliance == raw_pb2.Self
+            else:
+                point = order.target_world_space_pos
+                cell = footprint.cell(point.x, point.y)
+                middle, begun = footprint.middle(cell), self._is_begun(footprint, cell)
+            if not begun:
+                yield structure, middle
+
+    def _is_begun(self, footprint: Footprint, cell: tuple[int, int]) -> bool:
+        return self.ground.holds(*cell) and any(
+            unit.alliance == raw_pb2.Self and other.cell(unit.pos.x, unit.pos.y) == cell
+            for _, other, unit in self._standing
+            if other.size == footprint.size
+        )
+
+    @functools.cached_property
     def planned(self) -> Bools:
         """(w, h) where own units are on their way to build something."""
         planned = np.zeros(self.ground.size, np.bool_)
-        for unit in self._raw.units:
-            if unit.alliance != raw_pb2.Self:
-                continue
-            for order in unit.orders:
-                structure = built_by(order.ability_id)
-                footprint = structure and footprint_of(structure)
-                if footprint and order.HasField("target_world_space_pos"):
-                    point = order.target_world_space_pos
-                    mark(planned, footprint.cells, footprint.cell(point.x, point.y), value=True)
+        for structure, middle in self.plans:
+            footprint = footprint_of(structure)
+            if footprint is not None:
+                mark(planned, footprint.cells, footprint.cell(*middle), value=True)
         return planned
 
     @functools.cached_property

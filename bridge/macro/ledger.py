@@ -1,6 +1,8 @@
 """What one joint action may still spend and use, while the calls of all agents are turned into commands.
 
-Two agents that spend the same minerals, or send the same worker, are told so in the turn in which they try.
+Two agents that spend the same minerals, or send the same worker, are told so in the turn in which they try. What
+workers are on their way to build is not paid for yet, the game takes the price when it is begun; it is set aside, so
+that an order of this turn does not undo one of an earlier turn.
 """
 
 from __future__ import annotations
@@ -8,6 +10,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
+
+from bridge.ground import land_of
+from bridge.knowledge import knowledge
 
 if TYPE_CHECKING:
     from bridge.frames import WorldPoint
@@ -22,6 +27,8 @@ class Ledger:
     vespene: float
     supply: float
     """Supply that is free."""
+    aside: tuple[float, float] = (0.0, 0.0)
+    """Minerals and vespene that are set aside for what workers are on their way to build; no part of the above."""
     busy: set[int] = field(default_factory=set)
     """Tags of the units that an earlier call of this turn took."""
     sites: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -43,7 +50,13 @@ class Ledger:
     def of(cls, snapshot: Snapshot) -> Self:
         """The accounts at the beginning of a joint action."""
         common = snapshot.response.observation.player_common
-        return cls(float(common.minerals), float(common.vespene), float(common.food_cap) - float(common.food_used))
+        minerals, vespene = _planned(snapshot)
+        return cls(
+            max(common.minerals - minerals, 0.0),
+            max(common.vespene - vespene, 0.0),
+            float(common.food_cap) - float(common.food_used),
+            (min(minerals, common.minerals), min(vespene, common.vespene)),
+        )
 
     def pay(self, minerals: float, vespene: float, supply: float = 0.0) -> None:
         """Takes a price from the accounts."""
@@ -58,3 +71,10 @@ class Ledger:
     def promise(self, middle: WorldPoint, width: float, height: float) -> None:
         """Notes that something is going to stand around a point."""
         self.sites.append((middle.x - width / 2, middle.y - height / 2, middle.x + width / 2, middle.y + height / 2))
+
+
+def _planned(snapshot: Snapshot) -> tuple[float, float]:
+    """Minerals and vespene that structures will cost which workers are on their way to build."""
+    plans = [knowledge()[structure] for structure, _ in land_of(snapshot).plans]
+    drones = sum(knowledge()["Drone"].minerals for kind in plans if kind.race == "zerg")
+    return sum(kind.minerals for kind in plans) - drones, sum(kind.vespene for kind in plans)

@@ -40,9 +40,14 @@ def check(ask: Ask, facts: AbilityFacts, user: str) -> None:
         Impossible: there is not enough.
     """
     ledger = ask.ledger
-    for what, cost, left in (("minerals", facts.minerals, ledger.minerals), ("vespene", facts.vespene, ledger.vespene)):
+    accounts = (
+        ("minerals", facts.minerals, ledger.minerals, ledger.aside[0]),
+        ("vespene", facts.vespene, ledger.vespene, ledger.aside[1]),
+    )
+    for what, cost, left, aside in accounts:
         if cost > left:
-            raise never(ask, f"it costs {cost:g} {what} and {max(left, 0):g} are left.")
+            waits = f", {aside:g} more are for what workers are on their way to build" if aside else ""
+            raise never(ask, f"it costs {cost:g} {what} and {max(left, 0):g} are left{waits}.")
     supply = supply_of(facts, user)
     if supply > max(ledger.supply, 0):
         known = knowledge().get(user)

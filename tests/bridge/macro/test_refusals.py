@@ -241,3 +241,20 @@ def test_a_refused_call_takes_nothing_from_the_turn(make_game: Callable[..., Gam
     for action, given in tries:
         assert isinstance(game.refusal(action, **given), Impossible)
     assert repr(game.ledger) == before
+
+
+def test_what_workers_are_on_their_way_to_build_is_set_aside(make_game: Callable[..., Game]) -> None:
+    game = make_game("Flat64")
+    while game.ledger.minerals < 110:
+        game.play(20)
+    left = game.ledger.minerals
+    game.do(game.say("Build_Pylon"))
+    game.play(1)
+    assert (game.ledger.minerals, game.ledger.aside) == (left - 100, (100, 0))
+    assert game.refusal("Train_Probe").message == (
+        f"Train_Probe is not possible now: it costs 50 minerals and {left - 100:g} are left, "
+        "100 more are for what workers are on their way to build."
+    )
+    while not game.own("Pylon"):
+        game.play(8)
+    assert game.ledger.aside == (0, 0)
