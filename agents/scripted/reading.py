@@ -18,7 +18,7 @@ _SIGNED = r"(-?\d+(?:\.\d+)?)"
 _POINT = rf"\[{_SIGNED}, ?{_SIGNED}\]"
 _SECTION = re.compile(r"\n(?=\S)")
 _TEAM = re.compile(r"Team (\S+)")
-_UNITS = re.compile(r"^    (Your|Allied|Enemy) units\b[^\n]*:\n((?:        .*\n?)*)", re.MULTILINE)
+_UNITS = re.compile(r"^    (Your|Allied|Enemy) (?:units|structures)\b[^\n]*:\n((?:        .*\n?)*)", re.MULTILINE)
 _SCREEN = re.compile(rf"    Screen on the map: x {_SIGNED} to {_SIGNED}, y {_SIGNED} to {_SIGNED}", re.ASCII)
 _PLACE = re.compile(rf"    Minimap position: {_POINT}", re.ASCII)
 _VALID = re.compile(r"^    Team (\S+): (.*(?:\n     +<.*)*)", re.MULTILINE)
@@ -32,6 +32,12 @@ _SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
 _UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
 _MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+)?: '''(.*)'''", re.MULTILINE)
 _ACCEPTED = re.compile(r"^    accepted: (\S+) <(\w+)\((.*)\)>", re.MULTILINE)
+_COUNTED = re.compile(r"^    (Your units|Your structures|Under construction|In production): (.*)", re.MULTILINE)
+_COUNT = re.compile(r"(?:^|, )(\d{1,4}) (\w+)", re.ASCII)
+_MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
+_POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
 _TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
 _AT = re.compile(_POINT, re.ASCII)
@@ -113,6 +119,20 @@ class Situation:
     supply_used: float = 0.0
     supply_cap: float = 0.0
     upgrades: tuple[str, ...] = ()
+    counts: dict[str, int] = field(default_factory=dict)
+    """Units and finished structures of the side, by type."""
+    begun: dict[str, int] = field(default_factory=dict)
+    """Structures under construction, by type."""
+    producing: dict[str, int] = field(default_factory=dict)
+    """How often something is being made or waits for it, by the name of its action."""
+    power: list[tuple[str, str, Point]] = field(default_factory=list)
+    """Type, tag and place of what gives power."""
+    known: list[tuple[str, Point]] = field(default_factory=list)
+    """Types of enemies and where on the minimap one of them is."""
+    alarm: bool = False
+    """Whether own units are under attack."""
+    rejected: list[str] = field(default_factory=list)
+    """What became of calls that were refused, word for word."""
     task: str = ""
     """What all have to do, and what this agent has."""
     messages: list[tuple[str, str]] = field(default_factory=list)
@@ -134,12 +154,22 @@ def read(text: str) -> Situation:
             _read_game(situation, body)
         elif title == "Task":
             _read_task(situation, body)
+        elif title == "Unit counts":
+            _read_counts(situation, body)
+        elif title == "Alerts":
+            situation.alarm = True
         elif title == "Answer" and (found := _MAX_ACTIONS.search(body)):
             situation.max_actions = int(found[1])
         if found := _WRITE_TO.search(body):
             situation.correspondents = _NAME.findall(found[1])
         situation.messages += _MESSAGE.findall(body)
         situation.accepted += _ACCEPTED.findall(body)
+        situation.rejected += _REJECTED.findall(body)
+        situation.power += [
+            (kind, tag, (float(x), float(y)))
+            for kind, tag, x, y in _POWER.findall(body)
+            if kind in {"Pylon", "WarpPrismPhasing"}
+        ]
     return situation
 
 
@@ -161,6 +191,20 @@ def _read_game(situation: Situation, body: str) -> None:
         situation.supply_used, situation.supply_cap = float(found[1]), float(found[2])
     if found := _UPGRADES.search(body):
         situation.upgrades = tuple(found[1].split(", "))
+
+
+def _read_counts(situation: Situation, body: str) -> None:
+    for title, listed in _COUNTED.findall(body):
+        if title == "In production":
+            for action, how_many in _MADE.findall(listed):
+                situation.producing[action] = sum(
+                    int(number) for number in re.findall(r"(\d{1,4}) (?:at|more)", how_many)
+                )
+            continue
+        counts = situation.begun if title == "Under construction" else situation.counts
+        for number, kind in _COUNT.findall(re.sub(r"\([^()]*\)", "", listed)):
+            counts[kind] = counts.get(kind, 0) + int(number)
+    situation.known = [(kind, (float(x), float(y))) for kind, x, y in _SEEN_AT.findall(body)]
 
 
 def _read_task(situation: Situation, body: str) -> None:

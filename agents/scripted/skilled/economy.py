@@ -1,19 +1,107 @@
-"""Leading what has no team of units: production, building, research, and the army of easy control."""
+"""Leading what has no units of its own: production, building and research, and the army of easy control.
+
+A build order is a list of wants, looked through from the top at each observation: the first ones that are not met and
+possible are ordered. What is possible is what the observation lists; what is there and in the making it counts. So it
+needs no memory, and mends by itself what was shot down.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from agents.scripted.skilled.builds import BUILDS, Build, Want
+
 if TYPE_CHECKING:
-    from agents.scripted.reading import Team
+    from agents.scripted.reading import Situation
     from agents.scripted.skilled.plan import Plan
 
+STRONG = 16
+"""Army units with which the army sets out."""
+WEAK = 6
+"""Army units below which it comes home."""
+NO_ARMY = frozenset({"Probe", "SCV", "MULE", "Drone", "Overlord", "Overseer", "Larva", "Egg", "Queen", "Observer"})
+HALLS = ("Nexus", "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "Hatchery", "Lair", "Hive")
 
-def leads(team: Team) -> bool:
-    """Whether a team is production, not an army."""
-    return bool(team.own) and all(unit.type in {"WarpGate", "Gateway"} for unit in team.own)
 
-
-def lead(plan: Plan, observation: str) -> None:
+def lead(plan: Plan) -> None:
     """Plans what is built, trained, researched and commanded for the whole side."""
-    del plan, observation
+    command(plan)
+    warp_to_the_front(plan)
+    for build in BUILDS:
+        if any(plan.team.can(name) for name in build.signs):
+            produce(plan, build)
+            return
+
+
+def command(plan: Plan) -> None:
+    """Sends the army out when it is strong, and home when it is not and something is attacked."""
+    situation, size = plan.situation, army(plan.situation)
+    out = any(name == "All_Units_Attack" for _, name, _ in situation.accepted)
+    if size >= STRONG or (out and size >= WEAK):
+        plan.give("All_Units_Attack")
+    elif situation.alarm or out:
+        plan.give("All_Units_Defend")
+
+
+def army(situation: Situation) -> int:
+    """Units that fight."""
+    structures = sum(count for kind, count in situation.counts.items() if kind in _STRUCTURES)
+    civil = sum(count for kind, count in situation.counts.items() if kind in NO_ARMY)
+    return sum(situation.counts.values()) - structures - civil
+
+
+def warp_to_the_front(plan: Plan) -> None:
+    """Warps in at a phasing Warp Prism, if there is one: it went there for that."""
+    fields = [tag for kind, tag, _ in plan.situation.power if kind == "WarpPrismPhasing"]
+    if not fields:
+        return
+    for name in ("Warp_Zealot_Near", "Warp_Stalker_Near"):
+        while plan.left > 0 and plan.team.can(name):
+            if not plan.give(name, fields[len(plan.calls) % len(fields)]):
+                break
+
+
+def produce(plan: Plan, build: Build) -> None:
+    """Goes through a build order; a want that cannot be paid yet may keep others from being paid first."""
+    situation = plan.situation
+    if _needs_supply(situation, build) and not _pending(situation, build.supply):
+        given = plan.give(build.supply.action)
+        if not given and situation.minerals < 2 * build.supply_minerals:
+            return
+    for want in build.wants:
+        if plan.left <= 0:
+            return
+        if _met(situation, want):
+            continue
+        if not plan.give(want.action) and want.first:
+            return  # it is saved for
+    for action in build.army:
+        while plan.left > 0 and situation.supply_used < situation.supply_cap and plan.give(action):
+            pass
+
+
+def _needs_supply(situation: Situation, build: Build) -> bool:
+    pending = 8 * (situation.begun.get(build.supply.makes, 0) + situation.producing.get(build.supply.action, 0))
+    room = situation.supply_cap + pending - situation.supply_used
+    return situation.supply_cap < 200 and room < 3 + situation.supply_used / 8
+
+
+def _pending(situation: Situation, want: Want) -> bool:
+    return any(name == want.action for _, name, _ in situation.accepted)
+
+
+def _met(situation: Situation, want: Want) -> bool:
+    halls = sum(situation.counts.get(kind, 0) for kind in HALLS)
+    if any(situation.counts.get(kind, 0) < count for kind, count in want.after.items()):
+        return True  # not yet its turn
+    if want.upgrade:
+        return want.makes in situation.upgrades or want.action in situation.producing
+    there = sum(situation.counts.get(kind, 0) + situation.begun.get(kind, 0) for kind in want.makes.split("|"))
+    there += situation.producing.get(want.action, 0)
+    there += sum(name == want.action for _, name, _ in situation.accepted) if want.makes not in situation.begun else 0
+    if want.at_once and situation.producing.get(want.action, 0) >= max(1, halls):
+        return True
+    return there >= (want.wanted * halls if want.per_hall else want.wanted)
+
+
+_STRUCTURES = frozenset(kind for build in BUILDS for kind in build.structures)

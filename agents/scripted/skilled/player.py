@@ -31,16 +31,16 @@ def skilled(observation: str, rng: random.Random) -> str:
     orders: dict[str, list[str]] = {}
     for team in situation.teams.values():
         plan = Plan(team, situation, support=support)
-        _lead(plan, observation)
+        _lead(plan)
         if plan.calls:
             orders[team.name] = plan.calls
     return reply(_analysis(situation), orders, _said(situation, rng))
 
 
-def _lead(plan: Plan, observation: str) -> None:
+def _lead(plan: Plan) -> None:
     team = plan.team
-    if not team.own or economy.leads(team):
-        economy.lead(plan, observation)
+    if not team.own:
+        economy.lead(plan)
         return
     if any(unit.type.startswith("WarpPrism") for unit in team.own):
         prism(plan)
