@@ -155,6 +155,9 @@ def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
 # --- writing --------------------------------------------------------------------------------------------------
 
 
+_BETWEEN = "\n\n"
+
+
 def render(page: Page, sections: Sequence[Section], budget: int | None = None) -> str:
     """The text of a page.
 
@@ -166,7 +169,7 @@ def render(page: Page, sections: Sequence[Section], budget: int | None = None) -
     blocks = [_block(section.write, page) for section in sections]
     if budget is not None:
         blocks = _shortened(page, sections, blocks, budget)
-    return "\n\n".join(block for block in blocks if block) + "\n"
+    return _BETWEEN.join(block for block in blocks if block) + "\n"
 
 
 def _block(write: Write, page: Page) -> str:
@@ -175,15 +178,15 @@ def _block(write: Write, page: Page) -> str:
 
 def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
     """The blocks with shorter forms in the order of ranks, as many as are needed, and a notice of what is missing."""
-    costs = [tokens(block) for block in blocks]
+    costs = [tokens(block + _BETWEEN) for block in blocks]
     missing: dict[str, str] = {}
     notice = ""
     steps = ((form, place) for place, section in enumerate(sections) for form in section.shorter)
     for form, place in sorted(steps, key=lambda step: (step[0].rank, step[1])):
-        if sum(costs) + tokens(notice) <= budget:
+        if sum(costs) + tokens(notice + _BETWEEN) <= budget:
             break
         block = _block(form.write, page)
-        cost = tokens(block)
+        cost = tokens(block + _BETWEEN)
         if cost >= costs[place]:
             continue
         blocks[place], costs[place] = block, cost

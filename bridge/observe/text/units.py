@@ -35,7 +35,7 @@ def teams(page: Page) -> list[str]:
 @shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
 def near_units(page: Page) -> list[str]:
     """Allies and far enemies only by type."""
-    return _blocks(page, lambda page, team: _grouped(page, team, _distance_within(team, NEAR)), _tagged_events)
+    return _blocks(page, lambda page, team: _near(page, team, _distance_within(team, NEAR)), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
@@ -79,25 +79,40 @@ def _listed(heading: str, lines: list[str]) -> list[str]:
 
 
 def _all_units(page: Page, team: TeamView) -> list[str]:
-    lines = _listed("Your units:", _own_lines(page, team))
     if page.sight.agent.kind == "builder":
-        standing = [unit for unit in team.allies if is_structure(unit.type)]
-        lines += _listed("Allied structures:", _lines(page, standing))
-        lines += _listed("Allied units by type:", _group_lines([u for u in team.allies if not is_structure(u.type)]))
-    else:
-        lines += _listed("Allied units:", _lines(page, team.allies))
-    return lines + _listed("Enemy units:", _lines(page, team.enemies))
+        return _near(page, team, team.enemies)
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied units:", _lines(page, team.allies)),
+        *_listed("Enemy units:", _lines(page, team.enemies)),
+    ]
+
+
+def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
+    """Own units and some enemies one by one, everybody else by type; but structures for those who build beside them."""
+    standing = [unit for unit in team.allies if is_structure(unit.type) and page.sight.agent.kind == "builder"]
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied structures:", _lines(page, standing)),
+        *_listed("Allied units by type:", _group_lines(_without(team.allies, standing))),
+        *_listed("Enemy units:", _lines(page, told)),
+        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
+    ]
 
 
 def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
-    """Own units and the enemies that are told one by one; everybody else by type."""
-    tags = {unit.tag for unit in told}
+    """Own units and some enemies one by one; everybody else by type."""
     return [
         *_listed("Your units:", _own_lines(page, team)),
         *_listed("Allied units by type:", _group_lines(team.allies)),
         *_listed("Enemy units:", _lines(page, told)),
-        *_listed("Other enemy units by type:", _group_lines([u for u in team.enemies if u.tag not in tags])),
+        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
     ]
+
+
+def _without(units: Sequence[UnitView], told: Sequence[UnitView]) -> list[UnitView]:
+    tags = {unit.tag for unit in told}
+    return [unit for unit in units if unit.tag not in tags]
 
 
 def _distance_within(team: TeamView, distance: float) -> list[UnitView]:

@@ -29,8 +29,9 @@ PROBE, IDLE_PROBE = 0x100110001, 0x100120001
 STALKERS = (0x100210001, 0x100220001)
 SENTRY = 0x100230001
 FOES = (0x100310001, 0x100320001, 0x100330001)
-FIELDS_AT = ((5, 14), (4, 16), (4, 18), (5, 20))
-EXPANSION_AT = ((5, 44), (4, 46), (4, 48), (5, 50))
+FIELDS_AT: tuple[tuple[float, float], ...] = ((5, 14.5), (4, 16.5), (4, 18.5), (5, 20.5))
+EXPANSION_AT: tuple[tuple[float, float], ...] = ((5, 44.5), (4, 46.5), (4, 48.5), (5, 50.5))
+GEYSERS_AT = ((8.5, 10.5), (8.5, 40.5))
 
 TASK: dict[str, Any] = {
     "name": "base",
@@ -165,11 +166,9 @@ def _army(unit: Make, *, earlier: bool) -> Iterable[raw_pb2.Unit]:
 
 
 def _resources(unit: Make) -> Iterable[raw_pb2.Unit]:
-    for number, (x, y) in enumerate((*FIELDS_AT, *EXPANSION_AT)):
-        yield unit(
-            0x100910001 + 0x10000 * number, "MineralField", x, y + 0.5, alliance="neutral", mineral_contents=1800
-        )
-    for number, (x, y) in enumerate(((8.5, 10.5), (8.5, 40.5))):
+    for number, (x, y) in enumerate(FIELDS_AT + EXPANSION_AT):
+        yield unit(0x100910001 + 0x10000 * number, "MineralField", x, y, alliance="neutral", mineral_contents=1800)
+    for number, (x, y) in enumerate(GEYSERS_AT):
         tag = 0x100A10001 + 0x10000 * number
         yield unit(tag, "VespeneGeyser", x, y, alliance="neutral", vespene_contents=2250)
 

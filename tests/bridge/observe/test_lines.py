@@ -1,0 +1,144 @@
+"""Single lines of an observation: what they say of a unit, of a count, of a price."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from s2clientprotocol import raw_pb2
+
+from bridge.functions import functions
+from bridge.observe import Feedback, Observer
+from bridge.observe.text.words import n, one_line, percent, point, whole
+from protocol.messages import Received
+
+HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80 | total 100% | weapon ready"
+
+
+@pytest.fixture
+def stalker_line(unit: Any, snapshot: Any, task: Any) -> Any:
+    """The line of a Stalker with some fields, in its own team's block."""
+
+    def line(change: Any = None, **fields: Any) -> str:
+        made = unit(1, "Stalker", 16, 16, **fields)
+        if change is not None:
+            change(made)
+        text = Observer(task("3s_vs_3z")).observe(snapshot([made])).agents["CombatGroupSmac"].text
+        (found,) = (line.strip() for line in text.splitlines() if line.startswith("        Stalker | "))
+        return found
+
+    return line
+
+
+def order(unit: raw_pb2.Unit, function: str, **fields: Any) -> raw_pb2.UnitOrder:
+    return unit.orders.add(ability_id=functions()[function].ability_id, **fields)
+
+
+def ordered_to_a_unit(unit: raw_pb2.Unit) -> None:
+    order(unit, "Attack_screen", target_unit_tag=0x1A)
+
+
+def ordered_to_a_place(unit: raw_pb2.Unit) -> None:
+    place = order(unit, "Move_screen").target_world_space_pos
+    place.x, place.y = 8, 8
+
+
+def ordered_twice(unit: raw_pb2.Unit) -> None:
+    ordered_to_a_unit(unit)
+    ordered_to_a_place(unit)
+
+
+def training(unit: raw_pb2.Unit) -> None:
+    order(unit, "Train_Stalker_quick", progress=0.456)
+
+
+def carrying(unit: raw_pb2.Unit) -> None:
+    unit.cargo_space_max = 8
+    for name in (73, 74):
+        unit.passengers.add(tag=2, unit_type=name)
+
+
+def empty_hold(unit: raw_pb2.Unit) -> None:
+    unit.cargo_space_max = 8
+
+
+def working(unit: raw_pb2.Unit) -> None:
+    unit.assigned_harvesters, unit.ideal_harvesters = 14, 16
+
+
+@pytest.mark.parametrize(
+    ("change", "fields", "more"),
+    [
+        (None, {}, ""),
+        (ordered_to_a_unit, {}, " | order Attack 0x1a"),
+        (ordered_to_a_place, {}, " | order Move minimap [16, 48]"),
+        (ordered_twice, {}, " | order Attack 0x1a, then Move minimap [16, 48]"),
+        (training, {}, " | order Train_Stalker 46%"),
+        (carrying, {}, " | carries Stalker, Zealot, room for 8 in all"),
+        (empty_hold, {}, " | carries nobody, room for 8 in all"),
+        (working, {}, " | workers 14 of 16"),
+        (None, {"is_burrowed": True}, " | burrowed"),
+        (None, {"cloak": raw_pb2.CloakedAllied}, " | cloaked"),
+        (None, {"is_hallucination": True}, " | hallucination"),
+        (None, {"buff_ids": (5, 8)}, " | effects GravitonBeam, GhostCloak"),
+    ],
+)
+def test_a_unit_line_says(change: Any, fields: dict[str, Any], more: str, stalker_line: Any) -> None:
+    if more.startswith(" | effects"):
+        assert stalker_line(change, **fields).startswith(f"{HEAD} | effects GravitonBeam, ")
+    else:
+        assert stalker_line(change, **fields) == HEAD + more
+
+
+@pytest.mark.parametrize(
+    ("fields", "part"),
+    [
+        ({"health": 0.3}, "health 1/80"),
+        ({"health": 61.5, "shield": 0}, "health 62/80 | shield 0/80 | total 38%"),
+        ({"energy": 50.4, "energy_max": 200}, "energy 50/200"),
+        ({"weapon_cooldown": 14.0}, "weapon in 0.62 s"),
+    ],
+)
+def test_a_unit_line_has_its_numbers(fields: dict[str, Any], part: str, stalker_line: Any) -> None:
+    assert part in stalker_line(**fields)
+
+
+@pytest.mark.parametrize(
+    ("made", "text"),
+    [
+        (n(12.0), "12"),
+        (n(12.5), "12.5"),
+        (n(-0.5), "-0.5"),
+        (whole(0.2), "1"),
+        (whole(0), "0"),
+        (whole(1.6), "2"),
+        (percent(0.456), "46%"),
+        (point((3.0, 4.5)), "[3, 4.5]"),
+        (one_line(" a\n\n b "), "a b"),
+    ],
+)
+def test_small_words(made: str, text: str) -> None:
+    assert made == text
+
+
+def test_what_a_team_passes_of_its_own_side_is_no_event_if_it_stands_still(unit: Any, snapshot: Any, task: Any) -> None:
+    observer = Observer(task("3s_vs_3z"))
+    standing = [unit(2, "Pylon", 26, 16), unit(3, "Zealot", 26, 17)]
+    sights = [observer.observe(snapshot([unit(1, "Stalker", x, 16), *standing])) for x in (16, 4)]
+    text = sights[-1].agents["CombatGroupSmac"].text
+    assert "ally Zealot went out of sight: 0x3" in text
+    assert "Pylon" not in text
+
+
+def test_a_team_without_any_unit_leaves_an_agent_with_words_only(base_task: Any, look: Any) -> None:
+    text = Observer(base_task).observe(look([])).agents["CombatGroup1"].text
+    assert text.endswith(
+        "Answer\n    You have no team to order now: write messages to those who have.\n"
+        '    Now answer in the parts "Analysis:" and "Communications:".\n'
+    )
+
+
+def test_messages_stand_apart_from_whom_one_can_write_to(pages: Any) -> None:
+    told = {"Developer": Feedback(messages=(Received(sender="Commander", recipient="Developer", text="More!"),))}
+    text = pages(told)["Developer"]
+    assert "\nMessages\n    Message from Commander: '''More!'''\n\nCommunication\n    You can write to:\n" in text

@@ -1,0 +1,174 @@
+"""What may be told now, at what price, and why the rest may not: by the game's word and by what is known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from bridge.functions import functions, general
+from bridge.knowledge import abilities
+from bridge.observe import Observer
+from bridge.task import TaskConfig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from protocol.messages import TeamView
+
+ACTIONS = {
+    "Stalker": ["Attack_Unit", "Stop", "No_Operation", "Ability_Blink_Screen"],
+    "Zealot": ["Attack_Unit", "Stop"],
+    "HighTemplar": ["Move_Screen", "Ability_PsiStorm_Screen"],
+}
+
+
+@pytest.fixture
+def team(snapshot: Any) -> Callable[..., TeamView]:
+    """What a team of all types is told, or a team of the side that may do some things."""
+
+    def see(units: list[Any], *side: str, **fields: Any) -> TeamView:
+        kinds = tuple(ACTIONS)
+        teams = [{"name": "T", "kind": "side", "actions": side} if side else {"name": "T", "unit_types": kinds}]
+        agent = {"name": "A", "role": "", "teams": teams, "actions": {} if side else ACTIONS}
+        config = {"name": "t", "map": "2s3z", "task": "", "agents": [agent]}
+        sight = Observer(TaskConfig.model_validate(config)).observe(snapshot(units, **fields))
+        view: TeamView = sight.agents["A"].view.teams[0]
+        return view
+
+    return see
+
+
+def able(*names: str) -> frozenset[int]:
+    numbers = [functions()[name].ability_id for name in names]
+    return frozenset((*numbers, *map(general, numbers)))
+
+
+def names(view: TeamView) -> list[str]:
+    return [action.name for action in view.actions]
+
+
+def reasons(view: TeamView) -> dict[str, str]:
+    return {barred.action: barred.reason for barred in view.barred}
+
+
+RICH = {"minerals": 1000, "vespene": 1000, "food_used": 10, "food_cap": 50}
+
+
+# --- units of a team ------------------------------------------------------------------------------------------
+
+
+def test_an_action_is_valid_if_some_unit_of_the_team_can_do_it(unit: Any, team: Any) -> None:
+    units = [unit(1, "Stalker", 16, 16), unit(2, "Stalker", 17, 16)]
+    given = {1: able("Attack_screen"), 2: able("Attack_screen", "Effect_Blink_screen")}
+    view = team(units, abilities=given, upgrades=(87,))
+    assert names(view) == ["Attack_Unit", "No_Operation", "Ability_Blink_Screen"]
+    assert reasons(view) == {"Stop": "not in its present state"}
+
+
+def test_a_general_function_is_valid_by_a_special_ability_of_the_unit(unit: Any, team: Any) -> None:
+    special = next(f.id for f in abilities().values() if f.name == "Effect_Blink_Stalker")
+    view = team([unit(1, "Stalker", 16, 16)], abilities={1: frozenset({special, general(special)})}, upgrades=(87,))
+    assert "Ability_Blink_Screen" in names(view)
+
+
+def test_what_another_type_of_the_team_can_do_counts_only_if_it_is_listed_for_it(unit: Any, team: Any) -> None:
+    units = [unit(1, "Stalker", 16, 16), unit(2, "Zealot", 17, 16)]
+    view = team(units, abilities={1: frozenset(), 2: able("Stop_quick", "Effect_Blink_screen")}, upgrades=(87,))
+    assert names(view) == ["Stop", "No_Operation"]
+
+
+def test_without_the_games_word_nothing_is_barred_that_is_not_known_to_be(unit: Any, team: Any) -> None:
+    view = team([unit(1, "Stalker", 16, 16)], abilities=None)
+    assert names(view) == ["Attack_Unit", "Stop", "No_Operation"]
+    assert reasons(view) == {"Ability_Blink_Screen": "Blink is not researched"}
+
+
+@pytest.mark.parametrize(
+    ("energy", "upgrades", "reason"),
+    [
+        (200, (), "PsiStorm is not researched"),
+        (74.9, (52,), "needs 75 energy, there is 74"),
+        (200, (52,), "cooling down"),
+    ],
+)
+def test_a_skill_that_is_not_there_has_a_reason(
+    energy: float, upgrades: tuple[int, ...], reason: str, unit: Any, team: Any
+) -> None:
+    templar = unit(1, "HighTemplar", 16, 16, energy=energy, energy_max=200)
+    view = team([templar], abilities={1: able("Move_screen")}, upgrades=upgrades)
+    assert reasons(view) == {"Ability_PsiStorm_Screen": reason}
+
+
+def test_it_is_told_which_unit_has_a_skill_ready(unit: Any, team: Any) -> None:
+    units = [unit(tag, "Stalker", 15 + tag, 16) for tag in (1, 2)]
+    given = {1: able("Attack_screen"), 2: able("Attack_screen", "Effect_Blink_screen")}
+    details = [u.details for u in team(units, abilities=given, upgrades=(87,)).units]
+    assert [(d.ready, d.unready) for d in details] == [((), ("Blink",)), (("Blink",), ())]
+    given[2] = given[1]
+    assert [u.details for u in team(units, abilities=given, upgrades=(87,)).units] == [None, None]
+
+
+# --- the whole side -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("units", "player", "upgrades", "reason"),
+    [
+        ([], RICH, (), "no TwilightCouncil"),
+        ([("TwilightCouncil", {"build_progress": 0.5})], RICH, (), "TwilightCouncil is not finished"),
+        ([("TwilightCouncil", {})], RICH | {"minerals": 100}, (), "50 minerals too few"),
+        ([("TwilightCouncil", {})], {}, (), "150 minerals too few, 150 vespene too few"),
+        ([("TwilightCouncil", {})], RICH, (87,), "researched already"),
+        ([("TwilightCouncil", {"orders": (1593,)})], RICH, (), "being researched"),
+        ([("TwilightCouncil", {"is_powered": True})], RICH, (), "every TwilightCouncil is busy or not ready"),
+        ([("TwilightCouncil", {})], RICH, (), "no TwilightCouncil has power"),
+    ],
+)
+def test_research_that_is_not_possible_has_a_reason(
+    units: list[tuple[str, dict[str, Any]]], player: Any, upgrades: Any, reason: str, unit: Any, team: Any
+) -> None:
+    made = [unit(number, name, 16, 16, **fields) for number, (name, fields) in enumerate(units, 1)]
+    view = team(made, "Research_Blink", abilities={}, player=player, upgrades=upgrades)
+    assert (names(view), reasons(view)) == ([], {"Research_Blink": reason})
+
+
+def test_a_structure_that_is_required_is_named(unit: Any, team: Any) -> None:
+    gateway = unit(1, "Gateway", 16, 16, is_powered=True)
+    view = team([gateway], "Train_HighTemplar", abilities={}, player=RICH)
+    assert reasons(view) == {"Train_HighTemplar": "no TemplarArchive"}
+
+
+def test_supply_that_is_used_up_is_named(unit: Any, team: Any) -> None:
+    gateway = unit(1, "Gateway", 16, 16, is_powered=True)
+    view = team([gateway], "Train_Zealot", abilities={}, player=RICH | {"food_used": 49})
+    assert reasons(view) == {"Train_Zealot": "1 supply too few"}
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_what_somebody_can_do_is_offered_with_its_price(asked: bool, unit: Any, team: Any) -> None:
+    gateway = unit(1, "Gateway", 16, 16, is_powered=True)
+    given = {1: able("Train_Zealot_quick")} if asked else None
+    view = team([gateway], "Train_Zealot", abilities=given, player=RICH)
+    facts = abilities()[functions()["Train_Zealot_quick"].ability_id]
+    (offer,) = view.offers
+    assert (offer.minerals, offer.vespene, offer.supply) == (facts.minerals, facts.vespene, facts.supply)
+    affordable = min(RICH["minerals"] // facts.minerals, (RICH["food_cap"] - RICH["food_used"]) // facts.supply)
+    assert offer.times == affordable
+    assert not offer.first
+
+
+@pytest.mark.parametrize(("standing", "first"), [((), True), (("Forge",), False)])
+def test_the_first_structure_of_its_kind_is_marked(
+    standing: tuple[str, ...], first: bool, unit: Any, team: Any
+) -> None:
+    others = [unit(2 + number, name, 20, 16) for number, name in enumerate(standing)]
+    units = [unit(1, "Probe", 16, 16), *others]
+    view = team(units, "Build_Forge", abilities={1: able("Build_Forge_screen")}, player=RICH)
+    assert [offer.first for offer in view.offers] == [first]
+
+
+def test_research_is_done_once_however_rich_one_is(unit: Any, team: Any) -> None:
+    council = unit(1, "TwilightCouncil", 16, 16, is_powered=True)
+    view = team([council], "Research_Blink", abilities={1: able("Research_Blink_quick")}, player=RICH)
+    assert [offer.times for offer in view.offers] == [1]
