@@ -18,6 +18,7 @@ from bridge.act.recognise import recognise
 from bridge.act.screen import ScreenExecutor
 from bridge.act.translate import Translator
 from bridge.act.vocabulary import Vocabulary
+from bridge.macro.workers import automatic
 from protocol.messages import Rejection
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Actor:
             commands += ordered
             accepted[name] = tuple(said)
             rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
+        for order in automatic(self._task.auto, sight.snapshot, translator.ledger, frozenset(translator.ordered)):
+            commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections)
 
     def _one(

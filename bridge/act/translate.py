@@ -84,7 +84,6 @@ class Translator:
         first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
         later = tuple(tag for tag in order.units if queues and tag in self.ordered)
         self.ordered.update(order.units)
-        self.ledger.busy.update(order.units)
         found = [Command(said, order.function, first, order.target, order.queued)] if first else []
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
 
@@ -103,10 +102,16 @@ class Translator:
             limit = f"{self._max_actions} action{'s' if self._max_actions > 1 else ''}"
             raise Refused("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
         self._count[count] = self._count.get(count, 0) + 1
-        for order in found if said.action.rule is None else ():
+        if said.action.rule is None:
+            self._book(found)
+        return found
+
+    def _book(self, orders: Iterable[Order]) -> None:
+        """Takes from the ledger what orders cost and whom they keep busy; rules do so themselves."""
+        for order in orders:
+            self.ledger.busy.update(order.units)
             for tag in order.units:
                 self._validity.pay(order.function, self._snapshot.units[tag])
-        return found
 
     def _may_say(self, count: tuple[str, str]) -> bool:
         return self._count.get(count, 0) < self._max_actions

@@ -9,9 +9,10 @@
         <MessageTo(CombatGroup1, '''hold the ramp''')>
         <ListenTo(Channel-2)>
 
-`parse` is tolerant as models need it and exact in what it reports: whatever looks like a call and is none is a
-`Rejection` with its place and a sentence that the model can act on, and costs nothing but itself. Nothing
-raises, the time is linear in the length of the text, and a call that is not closed is never guessed at.
+`parse` is tolerant as models need it and exact in what it reports: what can mean one thing only is read as that,
+whatever else looks like a call and is none is a `Rejection` with its place and a sentence that the model can act on,
+and costs nothing but itself. Nothing raises, the time is linear in the length of the text, and a call that is cut off
+is never guessed at.
 
 This package knows no unit, no action and no game: whether a name, a tag or a team exists is the bridge's to
 say. The rules of tolerance, beside those of headings (H, `protocol.speech.headings`) and of arguments
@@ -39,9 +40,23 @@ say. The rules of tolerance, beside those of headings (H, `protocol.speech.headi
 | S18 | quotes, brackets or a keyword at a recipient; a comma left out | `<MessageTo(to="A" text="go")>` |
 | S19 | names of the two messages in any case, with an underscore or without | `<message_to(A, 'go')>` |
 | S20 | several channels in one call | `<ListenTo(Channel-1, Channel-2)>` |
+| S21 | a name with blanks is one with underscores | `<Attack Unit(0x1)>` |
+| S22 | a bracket too few or too many before a `>` on the line; no `>` where the line ends | `<Stop(>`, `<Stop()` |
+| S23 | a call without angle brackets that stands alone, behind a heading or in a list of JSON | `- Stop()` |
+| S24 | what is in a comment or struck out is not said | `<!-- <Stop()> -->`, `~~<Stop()>~~` |
+| S25 | nor is what stands right behind a negation, in many languages | `do not <Stop()>`, `instead of <Stop()>` |
+| S26 | a turn of somebody else that the model makes up ends the reply | `User:` |
+| S27 | a section that says under the same heading what an earlier one said counts once | the whole reply twice |
+| S28 | a call as an object of JSON | `{"action": "Attack_Unit", "args": ["0x1"]}` |
+| S29 | a call as an element or with attributes | `<Attack_Unit>0x1</Attack_Unit>`, `<Attack_Unit tag="0x1"/>` |
+| S30 | tags and points in other brackets or in none | `<Attack_Unit[0x1]>`, `<Attack_Unit 0x1>` |
+| S31 | entities of HTML, escaped quotes and line ends, a tag between angle brackets | `&lt;Stop()&gt;` |
+| S32 | reasoning between other marks | `◁think▷`, `<|channel|>analysis<|message|>` |
+| S33 | a message without angle brackets, as an element, with three quotes and `>` | `MessageTo(A, 'go')` |
 """
 
 from protocol.speech.arguments import render
-from protocol.speech.reader import ListenTo, MessageTo, Speech, parse
+from protocol.speech.reader import parse
+from protocol.speech.said import ListenTo, MessageTo, Speech
 
 __all__ = ["ListenTo", "MessageTo", "Speech", "parse", "render"]

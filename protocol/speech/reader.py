@@ -1,15 +1,14 @@
-"""One pass over a reply, from mark to mark and never back; decides what counts.
+"""One pass over a reply, from mark to mark and never back.
 
-Above it: `protocol.speech`, which says the rules (S1 to S20). Below: `headings`, `calls`, `arguments` and
-`quoting`, each of which reads one kind of thing at one place.
+Above it: `protocol.speech`, which says the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting` and
+`objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 from protocol.messages import Call, Rejection
 from protocol.speech.arguments import read_arguments
@@ -20,72 +19,58 @@ from protocol.speech.calls import (
     close_bare,
     close_parentheses,
     closing_tags,
+    element_at,
+    in_words_at,
     is_markup,
     is_talk,
+    loose_arguments,
     naked_at,
+    naked_talk_at,
     opening_at,
     refuse_words,
     segment_end,
+    stands_alone,
 )
-from protocol.speech.headings import SENTENCE_END, Heading, Section, heading_at, tag_heading_at
-from protocol.speech.marks import SHORT, Malformed, to_ascii
+from protocol.speech.headings import SENTENCE_END, Heading, Section, Tone, heading_at, json_heading_at, tag_heading_at
+from protocol.speech.marks import SHORT, Malformed, to_ascii, unescaped
+from protocol.speech.objects import object_call_at
 from protocol.speech.quoting import MessageReader
+from protocol.speech.said import Gathering, ListenTo, MessageTo, Speech
+from protocol.speech.words import NEGATION
 
-
-@dataclass(frozen=True, slots=True)
-class MessageTo:
-    """Words for another agent, or for everybody on a channel; `reply[start:end]` is the call."""
-
-    recipient: str
-    text: str
-    start: int
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
-class ListenTo:
-    """The wish to hear a channel; `reply[start:end]` is the call."""
-
-    channel: str
-    start: int
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
-class Speech:
-    """What a reply says, in the order of the text.
-
-    Attributes:
-        calls: actions to carry out.
-        messages: messages to agents or channels.
-        listens: channels to listen to.
-        faults: what looked like one of these and is none, reason `malformed`.
-        mentions: actions that the analysis speaks of and that are not to be carried out (rule S10).
-    """
-
-    calls: tuple[Call, ...] = ()
-    messages: tuple[MessageTo, ...] = ()
-    listens: tuple[ListenTo, ...] = ()
-    faults: tuple[Rejection, ...] = ()
-    mentions: tuple[Call, ...] = ()
+if TYPE_CHECKING:
+    from protocol.messages import Point
+    from protocol.speech.quoting import Addressed
 
 
 def parse(text: str) -> Speech:
     """Reads a reply. Never raises; see the table of `protocol.speech`."""
     walk = _Walk(text)
     walk.run()
-    return walk.speech()
+    return walk.gathering.speech()
 
 
-_Item: TypeAlias = Call | MessageTo | ListenTo | Rejection
-
-_THINK = r"(?:<\s*+{slash}\s*+(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)\s*+>|\[{slash}THINK\])"
-_THINK_ENDS = re.compile(_THINK.format(slash="/"), re.IGNORECASE)
+_THINK = (
+    r"<\s*+{slash}\s*+(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)\s*+>|\[{slash}THINK\]|◁{slash}think▷"
+)
+_CHANNEL = r"<\|channel\|>\s*+"
+_THINKS = rf"{_THINK.format(slash='')}|<\|begin_of_thought\|>|{_CHANNEL}(?:analysis|commentary)\b[^<>\n]*+<\|message\|>"
+_THOUGHT = rf"{_THINK.format(slash='/')}|<\|end_of_thought\|>"
+_THINK_ENDS = re.compile(rf"{_THOUGHT}|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
 _NEXT = re.compile(
-    rf"(?P<line>\n\s*+)|(?P<thought>{_THINK.format(slash='/')})|(?P<think>{_THINK.format(slash='')})|(?P<angle><)"
+    rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<think>{_THINKS})|(?P<comment><!--)"
+    r"|(?P<speaker><\|(?:im_)?start\|>\s*+user\b)|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
+    r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\())"
     rf"|(?P<sentence>{SENTENCE_END})",
     re.IGNORECASE,
 )
+_OBJECT_AHEAD = re.compile(r"[\s\[,]*+\{")
+_OTHER_SPEAKER = re.compile(r"[*_#]*+(?:user|human)[*_]*+:", re.IGNORECASE)
+_GENERIC = re.compile(r"[A-Za-z0-9]<")
+_NEGATED = re.compile(rf"(?:{NEGATION})[\s`*\"'_]*+$", re.IGNORECASE)
+_STRUCK = re.compile(r"~~[\s`*]*+$")
+_STRUCK_BEHIND = re.compile(r"[ \t`*]*+~~")
+_LOOKED_BACK = 24
 _DIRECTLY_ABOVE = 80
 
 
@@ -97,39 +82,31 @@ class _Walk:
         self._start_over()
 
     def _start_over(self) -> None:
-        self._found: list[tuple[_Item, Section, bool]] = []  # item, section it belongs under, stands in prose
-        self._headed: set[Section] = set()
+        self.gathering = Gathering()
         self._section = Section.NONE
         self._team: str | None = None
         self._team_above_section: str | None = None
         self._team_end = -_DIRECTLY_ABOVE
 
     def run(self) -> None:
-        at = self._headings(0, line_start=True)
+        at = self._line(0)
         while mark := _NEXT.search(self._plain, at):
-            match mark.lastgroup:
-                case "line":
-                    at = self._headings(mark.end(), line_start=True)
-                case "sentence":
-                    at = self._headings(mark.end(), line_start=False)
-                case "thought":  # S9
-                    self._start_over()
-                    at = mark.end()
-                case "think":
-                    at = self._skip_thoughts(mark)
-                case _:
-                    at = self._angle(mark.start())
+            at = self._at(mark)
 
-    def speech(self) -> Speech:
-        said = [item for item, kind, prose in self._found if not (prose and kind in self._headed)]
-        mentioned = [item for item, kind, prose in self._found if prose and kind in self._headed]
-        return Speech(
-            calls=tuple(item for item in said if isinstance(item, Call)),
-            messages=tuple(item for item in said if isinstance(item, MessageTo)),
-            listens=tuple(item for item in said if isinstance(item, ListenTo)),
-            faults=tuple(item for item in said if isinstance(item, Rejection)),
-            mentions=tuple(item for item in mentioned if isinstance(item, Call)),
-        )
+    def _at(self, mark: re.Match[str]) -> int:
+        read = {
+            "line": lambda: self._line(mark.end()),
+            "sentence": lambda: self._headings(mark.end(), line_start=False),
+            "thought": lambda: self._end_of_thoughts(mark),
+            "think": lambda: self._skip_thoughts(mark),
+            "comment": lambda: max(mark.end(), self._plain.find("-->", mark.end())),  # S24
+            "speaker": lambda: len(self._plain) if self.gathering else mark.end(),  # S26
+            "object": lambda: self._object(mark.start()) or mark.end(),
+            "team": lambda: self._json_team(mark),
+            "quoted": lambda: self._naked(mark.end()) or mark.end(),
+            "angle": lambda: self._angle(mark.start()),
+        }
+        return read[str(mark.lastgroup)]()
 
     @cached_property
     def _closing_tags(self) -> frozenset[str]:
@@ -137,45 +114,107 @@ class _Walk:
 
     # Each of the following takes what stands at one place and returns the offset behind it.
 
+    def _line(self, at: int) -> int:
+        if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
+            return len(self._plain)
+        at = self._headings(at, line_start=True)
+        if self._section is Section.ACTIONS and (words := in_words_at(self._plain, at)):
+            reason = f"a call stands in angle brackets: write <{words['name'][:SHORT]}(...)>"
+            self._fault(words.start(), words.end(), words["name"], reason)
+            return words.end()
+        return at
+
     def _headings(self, at: int, *, line_start: bool) -> int:
-        while heading := heading_at(self._plain, at, line_start=line_start):
-            self._enter(heading, at)
-            at, line_start = heading.end, False
-        naked = naked_at(self._plain, at)
-        if naked is None:
-            return at
-        reason = f"a call stands in angle brackets: write <{naked['name'][:SHORT]}(...)>"
-        self._fault(naked.start("call"), naked.end(), naked["name"], reason)
-        return naked.end()
+        while True:
+            brace = _OBJECT_AHEAD.match(self._plain, at)
+            if brace and (end := self._object(brace.end() - 1)):
+                at = end
+            elif heading := heading_at(self._plain, at, line_start=line_start):
+                self._enter(heading, at)
+                at = heading.end
+            else:
+                break
+            line_start = False
+        while naked := self._naked(at):
+            at = naked
+        return at
 
     def _enter(self, heading: Heading, at: int) -> None:
+        if heading.section and heading.section is Section.ACTIONS and heading.tone is Tone.INSTEAD:
+            self.gathering.withdraw_orders(heading.team)
+        if heading.explains and self._section is Section.ACTIONS and self.gathering.has_orders():
+            self._section = Section.ANALYSIS
         if heading.section:
+            self.gathering.open_block(self._plain[at : heading.end])
             if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip("#*_> \t\n"):
                 self._team_above_section = self._team  # S14
             elif (self._section, heading.section) != (Section.ANALYSIS, Section.ACTIONS):
                 self._team_above_section = None
-            self._team = self._team_above_section
-            self._section = heading.section
-            self._headed.add(heading.section)
+            self._team = self._team if heading.numbered else self._team_above_section
+            if heading.tone is Tone.SPEAK_OF and heading.section is Section.ACTIONS:
+                self._section = Section.ANALYSIS
+            else:
+                self._section = heading.section
+                self.gathering.headed.add(heading.section)
         if heading.names_team:
             self._team = heading.team
             self._team_end = heading.end
 
+    def _end_of_thoughts(self, end: re.Match[str]) -> int:  # S9
+        self._start_over()
+        return self._line(end.end())
+
     def _skip_thoughts(self, begin: re.Match[str]) -> int:
         end = _THINK_ENDS.search(self._plain, begin.end())
         if end is not None:
-            return end.end()
+            return self._line(end.end())
         reason = "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>"
         self._section = Section.ACTIONS  # never a mention, wherever it stands
         self._fault(begin.start(), begin.end(), "", reason)
         return len(self._text)
+
+    def _json_team(self, mark: re.Match[str]) -> int:
+        heading = json_heading_at(self._plain, mark.start())
+        if heading is None:
+            return mark.end()
+        self._enter(heading, mark.start())
+        return heading.end
+
+    def _object(self, start: int) -> int | None:
+        """A call as an object of JSON; None if there is none at this `{`."""
+        found = object_call_at(self._plain, start)
+        if found is None:
+            return None
+        self._add_call(found.name, found.args, start, found.end, team=found.team)
+        return found.end
+
+    def _naked(self, at: int) -> int | None:
+        """A call without angle brackets; None if there is none."""
+        talk, naked = naked_talk_at(self._plain, at), naked_at(self._plain, at)
+        if (found := talk or naked) is None:
+            return None
+        start, name = found.start("call"), found["name"]
+        try:
+            if talk:
+                return self._message(start, self._messages.read(talk.end(), naked=True))
+            if not stands_alone(self._plain, found.end()):
+                self._fault(start, found.end(), name, f"a call stands in angle brackets: write <{name[:SHORT]}(...)>")
+            elif is_talk(name):
+                self._listen(start, found.end(), name, found["inside"])
+            else:
+                self._add_call(name, read_arguments(found["inside"]), start, found.end(), team=found["team"])
+            return found.end()
+        except Malformed as error:
+            end = naked.end() if naked else found.end()
+            self._fault(start, end, name, str(error))
+            return end
 
     def _angle(self, start: int) -> int:
         if heading := tag_heading_at(self._plain, start):
             self._enter(heading, start)
             return self._headings(heading.end, line_start=False)
         opening = opening_at(self._plain, start)
-        if opening is None:
+        if opening is None or (not opening.has_parenthesis and _GENERIC.match(self._plain, start - 1)):  # S7
             return start + 1
         try:
             end = self._call(start, opening)
@@ -186,29 +225,46 @@ class _Walk:
         return self._headings(end, line_start=False)
 
     def _call(self, start: int, opening: Opening) -> int:
-        name, inside = opening.name, ""
         if not opening.has_parenthesis:
-            end = close_bare(self._plain, opening.end)
-            if end is None:
-                refuse_words(self._plain, opening)
-            if is_markup(name, self._closing_tags):
-                return end
-        elif name.lower() in MESSAGE_NAMES:
-            return self._message(start, opening.end)
-        else:
-            inner_end, end = close_parentheses(self._plain, opening.end, name)
-            inside = self._plain[opening.end : inner_end]
+            return self._without_parentheses(start, opening)
+        name = opening.name
+        if name.lower() in MESSAGE_NAMES:
+            return self._message(start, self._messages.read(opening.end))
+        inner_end, end = close_parentheses(self._plain, opening)
+        inside = self._plain[opening.end : inner_end]
         if is_talk(name):
             self._listen(start, end, name, inside)
         else:
-            call = Call(name=name, args=read_arguments(inside), team=self._team, start=start, end=end)
-            self._add(call, Section.ACTIONS)
+            self._add_call(name, read_arguments(inside), start, end)
         return end
 
-    def _message(self, start: int, at: int) -> int:
-        found = self._messages.read(at)
-        text = self._text[found.start : found.stop].strip()
-        self._add(MessageTo(found.recipient, text, start, found.end), Section.COMMUNICATIONS)
+    def _without_parentheses(self, start: int, opening: Opening) -> int:
+        name, end = opening.name, close_bare(self._plain, opening.end)
+        if name.lower() in MESSAGE_NAMES:
+            reader = self._messages
+            if found := reader.attributes(opening.end) if end is None else reader.element(end):
+                return self._message(start, found)
+        found_at = loose_arguments(self._plain, opening.end) if end is None else element_at(self._plain, end, name)
+        if found_at and "_" in name and (args := self._typed(*found_at[:2])):
+            self._add_call(name, args, start, found_at[2])
+            return found_at[2]
+        if end is None:
+            refuse_words(self._plain, opening)
+        if not is_markup(name, self._closing_tags):
+            if is_talk(name):
+                self._listen(start, end, name, "")
+            else:
+                self._add_call(name, (), start, end)
+        return end
+
+    def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
+        """Arguments at this place, if all of them are tags and points; otherwise none."""
+        args = read_arguments(self._plain[start:stop])
+        return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
+
+    def _message(self, start: int, found: Addressed) -> int:
+        text = unescaped(self._text[found.start : found.stop])
+        self._add(MessageTo(found.recipient, text, start, found.end), Section.COMMUNICATIONS, start)
         return found.end
 
     def _listen(self, start: int, end: int, name: str, inside: str) -> None:
@@ -218,12 +274,22 @@ class _Walk:
         if not channels:
             raise Malformed("a channel is missing: write <ListenTo(Name)>")
         for channel in channels:
-            self._add(ListenTo(channel, start, end), Section.COMMUNICATIONS)
+            self._add(ListenTo(channel.split("=")[-1].strip("\"' "), start, end), Section.COMMUNICATIONS, start)
+
+    def _add_call(
+        self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
+    ) -> None:
+        self._add(Call(name=name, args=args, team=team or self._team, start=start, end=end), Section.ACTIONS, start)
 
     def _fault(self, start: int, end: int, name: str, reason: str) -> None:
         text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
         fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
-        self._add(fault, Section.COMMUNICATIONS if is_talk(name) else Section.ACTIONS)
+        kind = Section.COMMUNICATIONS if is_talk(name) else Section.ACTIONS
+        self.gathering.add(fault, kind, self._section)
 
-    def _add(self, item: _Item, belongs_under: Section) -> None:
-        self._found.append((item, belongs_under, self._section in (Section.NONE, Section.ANALYSIS)))
+    def _add(self, item: Call | MessageTo | ListenTo, kind: Section, start: int) -> None:
+        before = self._plain[max(0, start - _LOOKED_BACK) : start]
+        before = before[before.rfind("\n") + 1 :]
+        struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
+        taken_back = bool(struck or _NEGATED.search(before))
+        self.gathering.add(item, kind, self._section, taken_back=taken_back)

@@ -257,8 +257,8 @@ REFUSED = [
         "<Move_Screen([50, 4])>",
         "wrong_frame",
         (
-            "[50, 4] is outside of the screen, where x and y are from 0 to 24; Move_Screen takes a point of the screen, "
-            "for one of the minimap there is Move_Minimap."
+            "[50, 4] is outside of the screen, where x and y are from 0 to 24; Move_Screen takes a point of the "
+            "screen, for one of the minimap there is Move_Minimap."
         ),
     ),
     ("<Move_Screen([100, 4])>", "out_of_bounds", "[100, 4] is outside of the screen: x and y are from 0 to 24."),
@@ -315,7 +315,7 @@ def test_a_call_is_refused_in_words_that_help(
             "not_available",
             "Team Mixed-1 cannot do Select_Unit_Attack_Unit now: Observer has no weapon.",
         ),
-        (team("<Stop(>"), "malformed", None),
+        (team("<Stop(0x1"), "malformed", None),
     ],
 )
 def test_a_call_to_the_wrong_team_is_refused(

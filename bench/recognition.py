@@ -1,0 +1,226 @@
+"""Reads the corpus of replies and says how much of what they mean is understood.
+
+    python -m bench.recognition            a table
+    python -m bench.recognition --misses   and every reply that is not read as a person would read it
+    python -m bench.recognition --json     one JSON object on stdout
+
+The corpus (`tests/bridge/corpus/*.yaml`) holds replies as models write them, and what a reasonable person would
+understand: calls with team, name and arguments, messages, channels, and what has to be said back. It was written by
+hand, before the reader was measured with it. `found` is the share of the meant calls and words that are read exactly;
+`invented` is what was read and not meant, calls that are only mentioned, negated or taken back among it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc_pb
+
+from bridge.act import Actor
+from bridge.knowledge import knowledge
+from bridge.maps import MapSpec
+from bridge.observe import Observer
+from bridge.snapshot import Snapshot
+from bridge.task import AgentConfig, TaskConfig
+from protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bridge.observe.sight import Sight
+
+CORPUS = Path(__file__).parent.parent / "tests" / "bridge" / "corpus"
+AGENT = "CombatGroup1"
+OWN = {
+    0x100040001: "Stalker",
+    0x100080001: "Stalker",
+    0x1000C0001: "Zealot",
+    0x100100001: "Zealot",
+    0x100140001: "Immortal",
+}
+FOES = {0x1001C0001: "Zealot", 0x100200001: "Roach", 0x100240001: "Hydralisk"}
+DEAD = 0x1002C0001
+BLINK = 87
+ACTIONS = (
+    *("No_Operation", "Hold_Position", "Stop", "Move_Screen", "Move_Minimap", "Attack_Unit"),
+    *("Select_Unit_Move_Screen", "Select_Unit_Move_Minimap", "Select_Unit_Attack_Unit"),
+)
+BLINKS = ("Ability_Blink_Screen", "Select_Unit_Blink_Screen")
+
+
+class Entry(BaseModel):
+    """One reply, and what it means."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    title: str
+    reply: str
+    roster: Literal["one", "many"] = "many"
+    """Whether the agent has one team of Stalkers, or teams of Stalkers, Zealots and an Immortal."""
+    calls: tuple[str, ...] = ()
+    """`Stalker-1 <Attack_Unit(0x1)>`, in the order of the text."""
+    messages: tuple[str, ...] = ()
+    """`Commander: hold the ramp`."""
+    listens: tuple[str, ...] = ()
+    rejections: tuple[str, ...] = ()
+    """Reason and words: `malformed <Stop(`."""
+    not_meant: tuple[str, ...] = ()
+    """What stands there and nobody wants to be done."""
+
+
+@dataclass
+class Reading:
+    """What was made of a reply."""
+
+    calls: list[str]
+    messages: list[str]
+    listens: list[str]
+    rejections: list[str]
+
+
+@dataclass
+class Score:
+    """How well replies were read."""
+
+    replies: int = 0
+    meant: int = 0
+    """Calls, messages and channels that the replies mean."""
+    found: int = 0
+    invented: int = 0
+    rejections: int = 0
+    """Things that have to be said back."""
+    rejected: int = 0
+    exact: int = 0
+    """Replies that are read exactly as they are meant, with the right rejections."""
+    not_meant: int = 0
+    misses: list[str] = field(default_factory=list)
+
+    def add(self, entry: Entry, reading: Reading) -> None:
+        """Counts one reply."""
+        self.replies += 1
+        self.not_meant += len(entry.not_meant)
+        pairs = (entry.calls, reading.calls), (entry.messages, reading.messages), (entry.listens, reading.listens)
+        for meant, read in pairs:
+            both = (Counter(meant) & Counter(read)).total()
+            self.meant += len(meant)
+            self.found += both
+            self.invented += len(read) - both
+        self.rejections += len(entry.rejections)
+        self.rejected += (Counter(entry.rejections) & Counter(reading.rejections)).total()
+        said = (*pairs, (entry.rejections, reading.rejections))
+        if all(list(meant) == read for meant, read in said):
+            self.exact += 1
+        else:
+            self.misses.append(
+                f"{entry.title}\n" + "".join(f"    {list(m)}\n    {r}\n" for m, r in said if list(m) != r)
+            )
+
+
+def corpus() -> dict[str, list[Entry]]:
+    """The replies by the name of their file."""
+    return {
+        file.stem: [Entry.model_validate(entry) for entry in yaml.safe_load(file.read_text("utf-8"))]
+        for file in sorted(CORPUS.glob("*.yaml"))
+    }
+
+
+def read(entry: Entry) -> Reading:
+    """What a reply is taken to mean."""
+    actor, sight = _scene(entry.roster)
+    speech = parse(entry.reply)
+    joint = actor.joint(sight, {AGENT: speech})
+    return Reading(
+        calls=list(joint.accepted[AGENT]),
+        messages=[f"{message.recipient}: {message.text}" for message in speech.messages],
+        listens=[listen.channel for listen in speech.listens],
+        rejections=[f"{rejection.reason} {rejection.text}" for rejection in joint.rejections[AGENT]],
+    )
+
+
+def scores(files: Iterable[tuple[str, list[Entry]]]) -> dict[str, Score]:
+    """How well the replies of each file were read."""
+    found = {name: Score() for name, _ in files}
+    for name, entries in files:
+        for entry in entries:
+            found[name].add(entry, read(entry))
+    return found
+
+
+@cache
+def _scene(roster: str) -> tuple[Actor, Sight]:
+    task = _task(("Stalker",) if roster == "one" else ("Stalker", "Zealot", "Immortal"))
+    return Actor(task), Observer(task).observe(_snapshot())
+
+
+def _task(types: tuple[str, ...]) -> TaskConfig:
+    agent = AgentConfig.model_validate(
+        {
+            "name": AGENT,
+            "role": "",
+            "teams": [{"name": f"{name}-1", "unit_types": [name]} for name in types],
+            "actions": {name: ACTIONS + BLINKS if name == "Stalker" else ACTIONS for name in types},
+        }
+    )
+    return TaskConfig(
+        name="corpus",
+        task="",
+        own_map=MapSpec(file="none.SC2Map", race="protoss", opponent="zerg"),
+        agents=(agent,),
+        max_actions=5,
+    )
+
+
+def _snapshot() -> Snapshot:
+    response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
+    raw = response.observation.raw_data
+    for units, alliance, x in ((OWN, raw_pb2.Self, 32.0), (FOES, raw_pb2.Enemy, 36.0)):
+        for place, (tag, name) in enumerate(units.items()):
+            unit = raw.units.add(
+                tag=tag,
+                unit_type=knowledge()[name].id,
+                alliance=raw_pb2.Alliance.ValueType(alliance),
+                display_type=raw_pb2.Visible,
+                health=40,
+                health_max=160,
+                build_progress=1,
+            )
+            unit.pos.x, unit.pos.y = x, 32.0 + place
+    raw.player.upgrade_ids.append(BLINK)
+    for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
+        size.x = size.y = 64
+    return Snapshot(response=response, info=info, dead=frozenset({DEAD}))
+
+
+def main() -> None:
+    """Prints the figures."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    options.add_argument("--misses", action="store_true", help="show what is not read as it is meant")
+    chosen = options.parse_args()
+    found = scores(list(corpus().items()))
+    columns = ("replies", "exact", "meant", "found", "invented", "rejections", "rejected", "not_meant")
+    figures = {name: {column: getattr(score, column) for column in columns} for name, score in found.items()}
+    figures["all"] = {column: sum(row[column] for row in figures.values()) for column in columns}
+    if chosen.json:
+        print(json.dumps(figures))
+        return
+    print("  ".join(f"{column:>10}" for column in ("file", *columns, "found %")))
+    for name, row in figures.items():
+        share = 100 * row["found"] / max(row["meant"], 1)
+        print("  ".join(f"{value:>10}" for value in (name, *row.values(), f"{share:.1f}")))
+    for name, score in found.items() if chosen.misses else ():
+        for miss in score.misses:
+            print(f"{name}: {miss}")
+
+
+if __name__ == "__main__":
+    main()
