@@ -177,7 +177,7 @@ class _Tries:
             status, text, usage = "cancelled", None, UNKNOWN + self._images
             try:
                 completion = await self._policy.client.complete(self._request(began))
-                status, text, usage = "ok", completion.text, completion.usage + self._images
+                status, text, usage = "ok", completion.text, self._with_images(completion.usage)
                 ticket.settle(usage)
             except LLMError as error:
                 status = error.status
@@ -188,6 +188,9 @@ class _Tries:
             finally:
                 self._tell(began, ticket.waited_s, status, text, usage)
             return completion
+
+    def _with_images(self, usage: Usage) -> Usage:
+        return usage if usage.images else usage + self._images  # a recorded one has them counted already
 
     def _request(self, now: float) -> Request:
         timeout_s = self._policy.try_timeout_s

@@ -80,6 +80,30 @@ async def test_a_step_ends_when_all_have_replied(broker: MemoryBroker, observe: 
     }
 
 
+async def test_pictures_are_published_before_the_observation_that_names_them(
+    broker: MemoryBroker, observe: Observe
+) -> None:
+    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+        heard = await broker.session().subscribe("**", Delivery.STATE)
+        for step, pictures in enumerate(([b"one", b"two"], [b"three"], [])):
+            (question,) = observe(ZEALOTS, step=step, within_s=60)
+            asked = asyncio.create_task(turn.ask([question._replace(pictures=pictures)]))
+            await zealots.observed()
+            await zealots.reply("seen", step=step)
+            await asked
+        samples = [await anext(heard) for _ in range(6 + 3)]
+    root = f"khala/{RUN}/p1/Zealots"
+    said = [(s.key.removeprefix(f"{root}/"), s.payload) for s in samples if not s.key.endswith("/reply")]
+    assert [(key, payload if key.startswith("image") else b"") for key, payload in said] == [
+        ("image/0", b"one"),
+        ("image/1", b"two"),
+        ("observation", b""),
+        ("image/0", b"three"),
+        ("observation", b""),
+        ("observation", b""),
+    ]
+
+
 async def test_messages_sent_before_a_reply_belong_to_its_step(broker: MemoryBroker, observe: Observe) -> None:
     async with table(broker, ZEALOTS) as (turn, (zealots,)):
         for step in range(20):
