@@ -5,7 +5,7 @@ A rule never overrides what an agent said; it finds the argument that is missing
 
 from bridge.macro.army import army_attack, army_defend, army_retreat
 from bridge.macro.build import build_at, build_auto, build_near, lock_base
-from bridge.macro.cast import cast, recall_near, stop_building
+from bridge.macro.cast import cancel_building, cast, recall_near, stop_building
 from bridge.macro.chrono import chrono_economy, chrono_military, chrono_research
 from bridge.macro.ledger import Ledger
 from bridge.macro.produce import morph_warpgates, research, train
@@ -33,6 +33,7 @@ RULES: dict[str, Rule] = {
     "cast": cast,
     "recall_near": recall_near,
     "stop_building": stop_building,
+    "cancel_building": cancel_building,
     "chrono_economy": chrono_economy,
     "chrono_military": chrono_military,
     "chrono_research": chrono_research,

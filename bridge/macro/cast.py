@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from s2clientprotocol import raw_pb2
+
 from bridge.ground import land_of
 from bridge.macro.price import require
 from bridge.macro.rule import Impossible, Order, never
@@ -53,6 +55,24 @@ def stop_building(ask: Ask) -> list[Order]:
         named = f"the {name(units[0])} {hex(units[0].tag)} trains and researches" if units else "the team does"
         raise never(ask, f"{named} nothing that could be called off.")
     return [Order(ask.function, busy)]
+
+
+def cancel_building(ask: Ask) -> list[Order]:
+    """Calls off, or halts, the building of the structure that is named; what of it stands is what the game makes of it.
+
+    Raises:
+        Impossible: it is no structure in the making, or the game does not take it.
+    """
+    unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
+    if unit is None or unit.alliance != raw_pb2.Self or not is_structure(unit):
+        raise Impossible(
+            "invalid_target", f"{hex(ask.tag or 0)} is no structure of yours; name one that is being built."
+        )
+    if unit.build_progress >= 1:
+        raise never(ask, f"the {name(unit)} {hex(unit.tag)} is finished; only what is being built can be called off.")
+    if not ask.has(unit.tag):
+        raise never(ask, f"the game does not take it from the {name(unit)} {hex(unit.tag)} at this moment.")
+    return [Order(ask.function, (unit.tag,))]
 
 
 # who ------------------------------------------------------------------------------------------------------------------

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
+from bridge.action import Action
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
+from bridge.macro import RULES, Ask, Impossible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -151,3 +153,25 @@ def test_what_is_trained_is_called_off(protoss: Game) -> None:
         f"Stop_Building_Unit is not possible now: the Gateway {hex(gateway)} trains and researches nothing "
         "that could be called off."
     )
+
+
+def test_a_structure_in_the_making_is_called_off(protoss: Game) -> None:
+    call_off = Action(name="Call_Off", about="", function="Cancel_BuildInProgress_quick", rule="cancel_building")
+    rule = RULES["cancel_building"]
+    protoss.do(protoss.say("Build_Pylon"))
+    while len(protoss.own("Pylon")) < 2:
+        protoss.play(8)
+    pylon = min(protoss.own("Pylon"), key=lambda unit: unit.build_progress).tag
+    orders = rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=pylon))
+    assert protoss.do(orders) == ["Success"]
+    protoss.play(2)
+    assert len(protoss.own("Pylon")) == 1
+    forge, probe = protoss.own("Forge")[0].tag, protoss.own("Probe")[0].tag
+    with pytest.raises(Impossible) as finished:
+        rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=forge))
+    assert finished.value.message == (
+        f"Call_Off is not possible now: the Forge {hex(forge)} is finished; only what is being built can be called off."
+    )
+    with pytest.raises(Impossible) as none:
+        rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=probe))
+    assert none.value.message == f"{hex(probe)} is no structure of yours; name one that is being built."
