@@ -158,6 +158,8 @@ class AgentConfig(Frozen):
     group that the type has."""
     task: str = ""
     """What it has to do besides the task of all."""
+    max_actions: int | None = Field(default=None, ge=1)
+    """Actions that one of its teams may have in one reply; None for as many as the task says."""
     required: bool = True
     """Whether the match waits for it at the start."""
 
@@ -273,6 +275,10 @@ class TaskConfig(Frozen):
     def agent(self, name: str) -> AgentConfig:
         """The agent of this name."""
         return next(agent for agent in self.agents if agent.name == name)
+
+    def max_actions_of(self, agent: AgentConfig) -> int:
+        """Actions that one team of an agent may have in one reply."""
+        return self.max_actions if agent.max_actions is None else agent.max_actions
 
     def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:
         """The agents that this one may write to, in the order of the task."""

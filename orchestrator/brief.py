@@ -33,7 +33,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Br
         channels=task.channels if others else (),
         frames=task.frames,
         clock=task.clock,
-        max_actions=task.max_actions,
+        max_actions=task.max_actions_of(agent),
     )
 
 

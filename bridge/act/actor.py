@@ -58,7 +58,7 @@ class Actor:
             sight: what the agents see at the moment at which their replies are to take effect.
             replies: by agent; an agent without one goes on with what it does.
         """
-        translator = Translator(sight, self._task.max_actions)
+        translator = Translator(sight, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}

@@ -28,7 +28,7 @@ from bridge.macro import RULES, Ask, Impossible, Ledger, Order
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from s2clientprotocol import raw_pb2
 
@@ -58,8 +58,8 @@ class Command:
 class Translator:
     """Translates the calls of one turn, one after the other, those of all agents of a side."""
 
-    def __init__(self, sight: Sight, max_actions: int) -> None:
-        """Takes what the agents see now, and how many actions one team may have in a turn."""
+    def __init__(self, sight: Sight, max_actions: Mapping[str, int]) -> None:
+        """Takes what the agents see now, and by agent how many actions one team may have in a turn."""
         self._sight = sight
         self._snapshot = sight.snapshot
         self._max_actions = max_actions
@@ -99,7 +99,8 @@ class Translator:
         else:
             found = self._as_said(said)
         if not self._may_say(count):
-            limit = f"{self._max_actions} action{'s' if self._max_actions > 1 else ''}"
+            allowed = self._max_actions[said.team.team.agent]
+            limit = f"{allowed} action{'s' if allowed > 1 else ''}"
             raise Refused("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
         self._count[count] = self._count.get(count, 0) + 1
         if said.action.rule is None:
@@ -114,7 +115,7 @@ class Translator:
                 self._validity.pay(order.function, self._snapshot.units[tag])
 
     def _may_say(self, count: tuple[str, str]) -> bool:
-        return self._count.get(count, 0) < self._max_actions
+        return self._count.get(count, 0) < self._max_actions[count[0]]
 
     def _by_rule(self, said: Recognised, rule: str) -> list[Order]:
         """What a rule makes of a call; it takes the price from the ledger itself."""

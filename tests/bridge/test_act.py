@@ -351,6 +351,15 @@ def test_more_actions_than_a_team_may_have_are_refused_and_wrong_ones_do_not_cou
     ]
 
 
+def test_an_agent_may_have_more_actions_than_the_others(
+    task: Callable[..., TaskConfig], world: Callable[..., Snapshot]
+) -> None:
+    agent = AGENT.model_copy(update={"max_actions": 4})
+    config = task("2s3z", agents=(agent,), max_actions=2)
+    joint = Actor(config).joint(Observer(config).observe(world()), {"A": parse(team(*["<Stop()>"] * 5))})
+    assert (len(joint.accepted["A"]), [r.reason for r in joint.rejections["A"]]) == (4, ["too_many_actions"])
+
+
 def test_one_wrong_call_costs_nothing_but_itself(act: Callable[..., JointAction]) -> None:
     joint = act(team("<Move_Screen([12, 12])>", "<Attack_Unit(0x1, 2)>", "<Hold_Position()>"))
     assert names(joint) == ["Move_Screen", "Hold_Position"]

@@ -47,7 +47,7 @@ def answer(page: Page) -> Iterator[str]:
     parts = ['"Analysis:"']
     yield "Answer"
     if page.teams:
-        limit = page.task.max_actions
+        limit = page.task.max_actions_of(page.sight.agent)
         fights = page.sight.agent.kind == "combat_group"
         advice = "; use abilities before moving or attacking." if fights else "."
         yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team{advice}"
