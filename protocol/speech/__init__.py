@@ -51,7 +51,7 @@ say. The rules of tolerance, beside those of headings (H, `protocol.speech.headi
 | S29 | a call as an element or with attributes | `<Attack_Unit>0x1</Attack_Unit>`, `<Attack_Unit tag="0x1"/>` |
 | S30 | tags and points in other brackets or in none | `<Attack_Unit[0x1]>`, `<Attack_Unit 0x1>` |
 | S31 | entities of HTML, escaped quotes and line ends, a tag between angle brackets | `&lt;Stop()&gt;` |
-| S32 | reasoning between other marks | `◁think▷`, `<|channel|>analysis<|message|>` |
+| S32 | reasoning between other marks, or in a channel of its own | `◁think▷` … `◁/think▷` |
 | S33 | a message without angle brackets, as an element, with three quotes and `>` | `MessageTo(A, 'go')` |
 """
 
