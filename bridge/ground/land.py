@@ -16,7 +16,7 @@ from s2clientprotocol import raw_pb2
 from bridge.frames import WorldPoint
 from bridge.functions import functions_of
 from bridge.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, sites, stands_on
-from bridge.ground.resources import base_places, mark
+from bridge.ground.resources import base_places, coordinates, mark
 from bridge.ground.terrain import Ground, grid
 from bridge.names import unit_name
 
@@ -56,7 +56,7 @@ class Land:
         for unit in self._raw.units:
             found = stands_on(unit.unit_type)
             if found is not None:
-                self._standing.append((*found, unit))
+                self._standing.append((found[0], found[1], unit))
             elif unit.alliance != raw_pb2.Self and not unit.is_flying:
                 self._bodies.append(unit)
 
@@ -84,11 +84,19 @@ class Land:
     def taken(self) -> Bools:
         """(w, h) where something stands, or a unit of others is in the way, so that nothing can be built."""
         taken = np.zeros(self.ground.size, np.bool_)
-        for _, footprint, unit in self._standing:
-            mark(taken, footprint.cells, footprint.cell(unit.pos.x, unit.pos.y), value=True)
-        for unit in self._bodies:
-            mark(taken, ((0, 0),), (int(unit.pos.x), int(unit.pos.y)), value=True)
+        for footprint, cells in self._cells.values():
+            mark(taken, footprint.cells, cells, value=True)
+        mark(taken, ((0, 0),), [(int(unit.pos.x), int(unit.pos.y)) for unit in self._bodies], value=True)
         return taken
+
+    @functools.cached_property
+    def _cells(self) -> dict[str, tuple[Footprint, list[tuple[int, int]]]]:
+        """By name of a footprint, where it is."""
+        found: dict[str, tuple[Footprint, list[tuple[int, int]]]] = {}
+        for name, footprint, unit in self._standing:
+            _, cells = found.setdefault(name, (footprint, []))
+            cells.append(footprint.cell(unit.pos.x, unit.pos.y))
+        return found
 
     @functools.cached_property
     def plans(self) -> tuple[tuple[str, WorldPoint], ...]:
@@ -128,16 +136,16 @@ class Land:
         for structure, middle in self.plans:
             footprint = footprint_of(structure)
             if footprint is not None:
-                mark(planned, footprint.cells, footprint.cell(*middle), value=True)
+                mark(planned, footprint.cells, [footprint.cell(*middle)], value=True)
         return planned
 
     @functools.cached_property
     def open(self) -> Bools:
         """(w, h) where ground units can walk now."""
         walls = np.zeros(self.ground.size, np.bool_)
-        for _, footprint, unit in self._standing:
+        for footprint, cells in self._cells.values():
             if not footprint.flat:
-                mark(walls, footprint.cells, footprint.cell(unit.pos.x, unit.pos.y), value=True)
+                mark(walls, footprint.cells, cells, value=True)
         return self.ground.walkable & ~walls
 
     @functools.cached_property
@@ -149,9 +157,9 @@ class Land:
     def clear(self) -> Bools:
         """(w, h) where the game lets town halls stand, as far as resources go."""
         clear = np.ones(self.ground.size, np.bool_)
-        for name, footprint, unit in self._standing:
+        for name, (footprint, cells) in self._cells.items():
             if name in RESOURCES:
-                mark(clear, footprint.near, footprint.cell(unit.pos.x, unit.pos.y), value=False)
+                mark(clear, footprint.near, cells, value=False)
         return clear
 
     # --- what lies on it --------------------------------------------------------------------------------------
@@ -196,7 +204,7 @@ class Land:
             x0, y0 = max(int(source.pos.x) - reach, 0), max(int(source.pos.y) - reach, 0)
             part = np.s_[x0 : int(source.pos.x) + reach + 1, y0 : int(source.pos.y) + reach + 1]
             height = self.ground.height[part]
-            x, y = np.ogrid[x0 : x0 + height.shape[0], y0 : y0 + height.shape[1]]
+            x, y = coordinates((height.shape[0], height.shape[1]), (x0, y0))
             inside = (x + shift - source.pos.x) ** 2 + (y + shift - source.pos.y) ** 2 <= source.radius**2
             if source.tag not in self._flying:
                 inside = inside & (height <= self.ground.level(source.pos.x, source.pos.y) + POWER_RISE)
@@ -244,7 +252,7 @@ class Land:
         for _, footprint, unit in self._standing:
             site = sites().get(unit_name(unit.unit_type)) if unit.alliance == raw_pb2.Self else None
             if site is not None and site.addon and not unit.add_on_tag:
-                mark(kept, ADDON, footprint.cell(unit.pos.x, unit.pos.y), value=True)
+                mark(kept, ADDON, [footprint.cell(unit.pos.x, unit.pos.y)], value=True)
         return kept
 
 
@@ -301,6 +309,6 @@ def _mark_way(kept: Bools, start: tuple[float, ...], end: WorldPoint) -> None:
     y0, y1 = sorted((int(start[1]), int(end.y)))
     x0, y0 = max(x0 - 2, 0), max(y0 - 2, 0)
     part = kept[x0 : x1 + 3, y0 : y1 + 3]
-    x, y = np.ogrid[x0 : x0 + part.shape[0], y0 : y0 + part.shape[1]]
+    x, y = coordinates((part.shape[0], part.shape[1]), (x0, y0))
     way = np.hypot(x + 0.5 - start[0], y + 0.5 - start[1]) + np.hypot(x + 0.5 - end.x, y + 0.5 - end.y)
     part |= way <= math.dist(start, end) + LINE_WIDTH

@@ -17,10 +17,12 @@ from bridge.frames import WorldPoint
 from bridge.ground.footprints import footprints
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from bridge.ground.footprints import Cells
-    from bridge.ground.terrain import Bools, Ground
+    from bridge.ground.terrain import Bools, Floats, Ground
 
 SPREAD = 8.5
 """Resources of one base lie at most so far from the next one; the usual figure of bots, an estimate."""
@@ -93,8 +95,7 @@ def _free_of(ground: Ground, fields: Places, geysers: Places) -> Bools:
     clear = ground.buildable.copy()
     for name, places in (("mineral_field", fields), ("geyser", geysers)):
         footprint = footprints()[name]
-        for x, y in places:
-            mark(clear, footprint.near, footprint.cell(x, y), value=False)
+        mark(clear, footprint.near, [footprint.cell(x, y) for x, y in places], value=False)
     return everywhere(clear, footprints()["town_hall"].cells)
 
 
@@ -114,11 +115,20 @@ def _best_place(free: Bools, resources: NDArray[np.float64], halls: Places) -> W
 # grids ----------------------------------------------------------------------------------------------------------------
 
 
-def mark(grid: Bools, cells: Cells, at: tuple[int, int], *, value: bool) -> None:
-    """Writes a value into the cells (dx, dy) around a cell, as far as they are on the grid."""
-    where = np.array(cells) + at
+def mark(grid: Bools, cells: Cells, at: Sequence[tuple[int, int]], *, value: bool) -> None:
+    """Writes a value into the cells (dx, dy) around each of some cells, as far as they are on the grid."""
+    if not at:
+        return
+    where = (np.array(at)[:, None, :] + np.array(cells)).reshape(-1, 2)
     inside = ((where >= 0) & (where < grid.shape)).all(axis=1)
     grid[where[inside, 0], where[inside, 1]] = value
+
+
+def coordinates(part: tuple[int, int], start: tuple[int, int] = (0, 0)) -> tuple[Floats, Floats]:
+    """(w, 1) and (1, h) the lower left corners of the cells of a part of a grid, which add up to its shape."""
+    x = np.arange(start[0], start[0] + part[0], dtype=np.float32)
+    y = np.arange(start[1], start[1] + part[1], dtype=np.float32)
+    return x[:, None], y[None, :]
 
 
 def everywhere(grid: Bools, cells: Cells) -> Bools:

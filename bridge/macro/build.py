@@ -48,7 +48,7 @@ def build_at(ask: Ask) -> list[Order]:
             raise Impossible("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
         return _on_geyser(ask, near_by[0])
     footprint = footprint_need(_structure(ask))
-    return _at(ask, footprint.middle(footprint.cell(*ask.point)))
+    return _checked(ask, footprint.middle(footprint.cell(*ask.point)))
 
 
 def build_near(ask: Ask) -> list[Order]:
@@ -67,7 +67,7 @@ def build_near(ask: Ask) -> list[Order]:
             raise Impossible("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
         return _on_geyser(ask, found)
     if sites()[structure].clear:
-        return _at(ask, _base_of(ask, unit).place)
+        return _checked(ask, _base_of(ask, unit).place)
     cost = near(land, [place(unit)], reach=NEAR, corner=on_corner(structure))
     cell = best(good(land, ask.ledger, structure), cost) or best(legal(land, ask.ledger, structure), cost)
     if cell is None:
@@ -85,7 +85,7 @@ def lock_base(ask: Ask) -> list[Order]:
     unit = _named(ask)
     _prepare(ask)
     footprint = footprint_need(_structure(ask))
-    return _at(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
+    return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
 
 def build_auto(ask: Ask) -> list[Order]:
@@ -119,10 +119,15 @@ def _prepare(ask: Ask) -> None:
         check(ask, facts, _user(ask))
 
 
+def _checked(ask: Ask, middle: WorldPoint) -> list[Order]:
+    """The orders to build at the middle of some cells, which somebody else than the host has chosen."""
+    _check_site(ask, land_of(ask.snapshot), middle)
+    return _at(ask, middle)
+
+
 def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
     """The orders to build at the middle of some cells."""
-    land, structure = land_of(ask.snapshot), _structure(ask)
-    _check_site(ask, land, middle)
+    structure = _structure(ask)
     worker, queued = builder(ask, middle)
     orders = _go(ask, worker, middle, queued=queued)
     width, height = footprint_need(structure).size

@@ -15,7 +15,7 @@ from bridge.frames import WorldPoint
 from bridge.ground import footprint_of, sites
 from bridge.ground.footprints import ADDON
 from bridge.ground.land import SEEN_NOW
-from bridge.ground.resources import everywhere
+from bridge.ground.resources import coordinates, everywhere
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -153,12 +153,12 @@ def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, cor
 
     Measured from the cell's middle, or its lower left corner, which is the middle of structures of 2 x 2.
     """
-    width, height = land.ground.size
-    x, y = np.ogrid[:width, :height]
+    x, y = coordinates(land.ground.size)
     shift = 0.0 if corner else 0.5
-    least = np.full((width, height), np.inf, np.float32)
+    squared = np.full(land.ground.size, np.inf, np.float32)
     for point in points:
-        np.minimum(least, np.hypot(x + shift - point.x, y + shift - point.y), out=least)
+        np.minimum(squared, (x + (shift - point.x)) ** 2 + (y + (shift - point.y)) ** 2, out=squared)
+    least: Floats = np.sqrt(squared)
     least[least > reach] = np.inf
     return least
 

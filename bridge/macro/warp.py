@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
-from bridge.ground.resources import everywhere
+from bridge.ground.resources import coordinates, everywhere
 from bridge.macro.price import charge, check, require
 from bridge.macro.rule import Impossible, Order, never
 from bridge.macro.side import finished, is_structure, kind, name, of_types, place
@@ -149,7 +149,7 @@ def _bodies(ask: Ask, land: Land, source: raw_pb2.PowerSource) -> Bools:
         apart = BODY + unit.radius
         x0, y0 = max(int(unit.pos.x - apart - 1), 0), max(int(unit.pos.y - apart - 1), 0)
         part = result[x0 : int(unit.pos.x + apart + 2), y0 : int(unit.pos.y + apart + 2)]
-        x, y = np.ogrid[x0 : x0 + part.shape[0], y0 : y0 + part.shape[1]]
+        x, y = coordinates((part.shape[0], part.shape[1]), (x0, y0))
         part |= (x + 0.5 - unit.pos.x) ** 2 + (y + 0.5 - unit.pos.y) ** 2 < apart**2
     return result
 
