@@ -99,8 +99,10 @@ def body(look: Look) -> Stamp:
         _draw_solid(colours, opacity, look)
     small = np.asarray(cv2.resize(colours, (size, size), interpolation=cv2.INTER_AREA), np.uint8)
     alpha = np.asarray(cv2.resize(opacity, (size, size), interpolation=cv2.INTER_AREA), np.uint8)
+    covered = np.where(opacity, np.uint8(255), np.uint8(0))
+    cover = np.asarray(cv2.resize(covered, (size, size), interpolation=cv2.INTER_AREA), np.uint8)
     share = _GHOST if look.ghost else _UNFINISHED if look.unfinished else 1.0
-    stamp = stamp_of(_unfringed(small, alpha), np.asarray(alpha * share, np.uint8))
+    stamp = stamp_of(_unfringed(small, cover), np.asarray(alpha * share, np.uint8))
     return _lettered(stamp, look, half) if look.code else stamp
 
 
@@ -149,9 +151,9 @@ def _fill(
             cv2.polylines(image, [outline], True, value, round(2 * grow_px * _FINER), cv2.LINE_8, _SHIFT)
 
 
-def _unfringed(colours: Image, alpha: Mask) -> Image:
-    """Colours as they are where the stamp is opaque: shrinking has mixed the black around it into its edge."""
-    share = np.maximum(alpha, 1).astype(np.float32)[..., None] / 255
+def _unfringed(colours: Image, cover: Mask) -> Image:
+    """Colours as they are inside of the outline: shrinking has mixed the black around it into its edge."""
+    share = np.maximum(cover, 1).astype(np.float32)[..., None] / 255
     return np.asarray(np.clip(colours / share, 0, 255), np.uint8)
 
 
