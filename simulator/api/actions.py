@@ -23,9 +23,9 @@ from simulator.api.abilities import Command, Outcome
 from simulator.api.selection import at_point, panel_order
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
+    from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2, ui_pb2
 
     from simulator.api.projection import View
     from simulator.api.seat import Seat
@@ -57,7 +57,7 @@ def perform(seat: Seat, action: sc.Action, loop: int) -> None:
     if action.action_raw.HasField("toggle_autocast"):
         toggle = action.action_raw.toggle_autocast
         if clicks.toggle_autocast(seat.world, seat.player, toggle.ability_id, toggle.unit_tags):
-            seat.report(loop).action_raw.toggle_autocast.CopyFrom(toggle)
+            _report_autocast(seat, toggle.ability_id, toggle.unit_tags, loop)
     if action.action_raw.HasField("camera_move"):
         point = action.action_raw.camera_move.center_world_space
         if _finite(point):
@@ -70,8 +70,8 @@ def perform(seat: Seat, action: sc.Action, loop: int) -> None:
         report = seat.report(loop)
         for message, shown in _images(seat, report):
             pixels.write_selection(message, shown, spatial, view)
-    if action.HasField("action_ui") and clicks.press(seat, action.action_ui):
-        seat.report(loop).action_ui.CopyFrom(action.action_ui)
+    if action.HasField("action_ui"):
+        _press(seat, action.action_ui, loop)
 
 
 def _spatial(seat: Seat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, View]:
@@ -167,6 +167,24 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
         spatial.unit_command.queue_command = command.queue
         if point is not None:
             pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=does in ON_MINIMAP)
+
+
+def _press(seat: Seat, ui: ui_pb2.ActionUI, loop: int) -> None:
+    if not clicks.press(seat, ui):
+        return
+    if ui.HasField("toggle_autocast"):
+        _report_autocast(seat, ui.toggle_autocast.ability_id, seat.selection.tags, loop)
+    else:
+        seat.report(loop).action_ui.CopyFrom(ui)
+
+
+def _report_autocast(seat: Seat, ability: int, tags: Iterable[int], loop: int) -> None:
+    """A switch of autocast, in the words of the raw interface and in those of the panel."""
+    action = seat.report(loop)
+    action.action_ui.toggle_autocast.ability_id = ability
+    if seat.options.raw:
+        action.action_raw.toggle_autocast.ability_id = ability
+        action.action_raw.toggle_autocast.unit_tags.extend(tags)
 
 
 # camera and clicks ----------------------------------------------------------------------------------------------------

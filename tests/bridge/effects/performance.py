@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .stage import Stage
 
 LOOPS, LONGER = 8, 40
-"""Loops after which an effect is looked for, and looked for again if there is none yet."""
+"""Loops after the order when an effect is looked for, and after which it is looked for again if there is none."""
 SAID, PLAYED = 60, 4
 """How many replies are tried until one is taken, and how many that are taken until one has an effect."""
 
@@ -51,7 +51,7 @@ def perform(case: Case, stage: Stage, executor: Executor) -> Performance:
         if not joint.commands:
             continue
         executor.begin()
-        words, refused = _play(case, stage, executor.plan(joint.commands, seen.snapshot, LOOPS))
+        words, refused = _play(case, stage, executor.plan(joint.commands, seen.snapshot, 1))
         if words:
             return Performance(text, words, tuple(refusals), accepted)
         refusals += refused
@@ -64,11 +64,9 @@ def perform(case: Case, stage: Stage, executor: Executor) -> Performance:
 
 def _play(case: Case, stage: Stage, plan: Plan) -> tuple[frozenset[str], list[str]]:
     """What a plan changed, if something of it is the action's own doing, and what was refused."""
-    played, seen, loops = stage.play(plan)
-    for more in (0, LONGER):
-        if more:
-            loops += more
-            seen = stage.look(stage.client.step(more))
+    played, loops = stage.play(plan)
+    for more in (LOOPS, LONGER):
+        seen, loops = stage.look(stage.client.step(more)), loops + more
         words = changes(stage.idle(loops), seen)
         if its_own(words, case.action):
             return words, []

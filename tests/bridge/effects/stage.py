@@ -176,8 +176,8 @@ class Stage:
             process.playing = current
         return self._idle[loops]
 
-    def play(self, plan: Plan) -> tuple[Played, Seen, int]:
-        """Plays a plan from now on; what was played, what is seen then, and how many loops it took."""
+    def play(self, plan: Plan) -> tuple[Played, int]:
+        """Plays a plan from now on; what was played, and how many loops it took."""
         step, loops = next(plan), 0
         while True:
             self._enter(step.actions)
@@ -186,7 +186,7 @@ class Stage:
             try:
                 step = plan.send(seen.snapshot)
             except StopIteration as done:
-                return done.value, seen, loops
+                return done.value, loops
 
     def _enter(self, actions: Sequence[Any]) -> None:
         """Lets actions enter the game; calls of functions are translated by PySC2, which refuses what it should."""

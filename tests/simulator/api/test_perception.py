@@ -182,6 +182,9 @@ def test_autocast_is_switched_off_and_on(make_table: Any, by: str) -> None:
         table.game.act(1, action)
         table.game.step(1)
         assert table.world.autocast[slot] == expected
+        (told,) = table.respond().actions  # PySC2 knows the words of the panel only
+        assert told.action_ui.toggle_autocast.ability_id == told.action_raw.toggle_autocast.ability_id == HEAL
+        assert list(told.action_raw.toggle_autocast.unit_tags) == [tag]
 
 
 def test_a_panel_of_cargo_that_is_not_there_is_no_fault(make_table: Any) -> None:
