@@ -1,7 +1,7 @@
 """The knowledge of the game, made from the simulator's tables: the facts in `bridge/data/knowledge/<version>/`.
 
     units, abilities, upgrades, buffs   records out of a catalogue          files   the files that they become
-    naming, measures                    PySC2's names, seconds of "faster"  cli     `khala knowledge`
+    naming, measures, melee             names, seconds, what is in use    cli     `khala knowledge`
 
 It stands here because the bridge, which reads the files, knows no simulator, and the simulator no bridge. Words about
 the game are written by hand, beside the facts; this package never touches them.

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from bridge.functions import functions_of
 from khala.knowledge.measures import in_seconds, plain, seconds, sparse
-from khala.knowledge.naming import ability_name, unit_name, unit_names, upgrade_name, upgrade_names
+from khala.knowledge.melee import melee_types
+from khala.knowledge.naming import ability_name, table_name, unit_name, unit_names, upgrade_name, upgrade_names
 from simulator.abilities import AIMS
 
 if TYPE_CHECKING:
@@ -102,12 +103,11 @@ def _users(catalog: Catalog) -> dict[int, list[str]]:
 
 def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, Any]:
     upgrade = catalog.upgrade_of.get(ability.upgrade) if ability.upgrade else None
-    product = catalog.row_of_name.get(ability.unit)
-    in_melee = ability.does and any(_is_melee(name, catalog) for name in users)
+    in_melee = ability.does and any(table_name(name) in melee_types(catalog) for name in users)
     if ability.does == "research":
         in_melee = in_melee and upgrade is not None and upgrade.researchable
         in_melee = in_melee and upgrade is not None and research_of(upgrade, catalog) == ability
-    elif product is not None and catalog.units[product].not_in_melee:
+    elif ability.unit in catalog.row_of_name and ability.unit not in melee_types(catalog):
         in_melee = False
     return {
         "name": ability_name(ability),
@@ -120,11 +120,6 @@ def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, 
         **_outcome(ability),
         "figures": _figures(ability),
     }
-
-
-def _is_melee(name: str, catalog: Catalog) -> bool:
-    own = next(own for own, ours in unit_names().items() if ours == name)
-    return not catalog.unit(own).not_in_melee
 
 
 def _terms(ability: Ability) -> dict[str, Any]:

@@ -44,6 +44,16 @@ def unit_name(name: str) -> str:
     return unit_names().get(name, name)
 
 
+def table_name(unit_type: str) -> str:
+    """What the tables call a unit type; the other way of `unit_name`."""
+    return _table_names().get(unit_type, unit_type)
+
+
+@functools.cache
+def _table_names() -> dict[str, str]:
+    return {ours: own for own, ours in unit_names().items()}
+
+
 def upgrade_name(name: str) -> str:
     """What the bridge calls an upgrade of the tables; one that is newer than PySC2 keeps its name."""
     return upgrade_names().get(name, name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from khala.knowledge.abilities import needs_of
 from khala.knowledge.measures import per_second, plain, seconds, sparse
+from khala.knowledge.melee import melee_types
 from khala.knowledge.naming import unit_name, unit_names
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
     return {
         "id": unit.id,
         "race": unit.race,
-        "melee": not unit.not_in_melee,
+        "melee": unit.name in melee_types(catalog),
         "structure": unit.structure,
         "attributes": sorted(unit.attributes),
         "flying": unit.flying,

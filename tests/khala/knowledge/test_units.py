@@ -25,7 +25,6 @@ WEAPONS_OF_THEIR_OWN = {"Carrier", "Battlecruiser", "Baneling", "BroodlingEscort
     [
         ("id", lambda row: row.id),
         ("race", lambda row: row.race),
-        ("melee", lambda row: not row.not_in_melee),
         ("structure", lambda row: row.structure),
         ("worker", lambda row: row.worker),
         ("attributes", lambda row: tuple(sorted(row.attributes))),
@@ -63,6 +62,16 @@ def test_a_fact_is_that_of_the_tables(
 ) -> None:
     told = {name: getattr(kind, field) for name, kind in knowledge(version).items()}
     assert told == {name: expected(tables.unit(table_names(name))) for name in told}
+
+
+def test_types_of_melee_games_are_those_that_the_tables_mark_and_what_these_pass_through(
+    version: str, tables: Catalog, table_names: Callable[[str], str]
+) -> None:
+    told = {name: kind.melee for name, kind in knowledge(version).items()}
+    marked = {name: not tables.unit(table_names(name)).not_in_melee for name in told}
+    infested = {"InfestedTerran", "InfestedTerranBurrowed", "InfestedTerranCocoon"}
+    passed = {"4.10": {"BanelingCocoon", *infested}, "5.0.13": {"BanelingCocoon"}}[version]
+    assert told == marked | dict.fromkeys(passed, True)
 
 
 def test_speeds_are_per_second_of_the_games_clock(

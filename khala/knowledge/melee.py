@@ -1,0 +1,38 @@
+"""Which unit types occur in melee games.
+
+The tables mark types that only campaigns, other maps or older versions have. A few of these are passed through
+nevertheless, as cocoons and eggs of what melee games do have, and by what hatches from them.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from simulator.catalog import Catalog
+
+
+@functools.cache
+def melee_types(catalog: Catalog) -> frozenset[str]:
+    """The tables' names of the types that occur in melee games."""
+    marked = {unit.name for unit in catalog.units if not unit.not_in_melee}
+    shells = {
+        str(ability.numbers[shell])
+        for name in marked
+        for ability in catalog.abilities_of(catalog.row_of_name[name])
+        for shell in ("cocoon", "egg")
+        if shell in ability.numbers
+    }
+    found, new = set(marked), shells - marked
+    while new:
+        found |= new
+        new = _products(new, catalog) - found
+    return frozenset(found)
+
+
+def _products(names: Iterable[str], catalog: Catalog) -> set[str]:
+    cards = (catalog.abilities_of(catalog.row_of_name[name]) for name in names)
+    return {ability.unit for card in cards for ability in card if ability.unit in catalog.row_of_name}
