@@ -11,6 +11,7 @@ Sections are pure functions of the page: no clock, no game, no state.
 from __future__ import annotations
 
 import difflib
+import importlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -137,19 +138,26 @@ def shorter(name: str, *, rank: int, says: str) -> Callable[[Write], Write]:
 
 
 def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
-    """The sections of these names.
+    """The sections of these names, `game`, or `my_module:game` for one that a module registers when it is imported.
 
     Raises:
         ValueError: there is none of a name; the text says which there are.
     """
-    found = []
-    for name in names:
-        if name not in SECTIONS:
-            close = difflib.get_close_matches(name, SECTIONS, n=1)
-            hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(SECTIONS)}"
-            raise ValueError(f"there is no section '{name}' of an observation: {hint}")
-        found.append(SECTIONS[name])
-    return tuple(found)
+    return tuple(map(_find, names))
+
+
+def _find(reference: str) -> Section:
+    module, colon, name = reference.rpartition(":")
+    if colon:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise ValueError(f"the module of section '{reference}' cannot be imported: {error}") from None
+    if name not in SECTIONS:
+        close = difflib.get_close_matches(name, SECTIONS, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(sorted(SECTIONS))}"
+        raise ValueError(f"there is no section '{name}' of an observation: {hint}")
+    return SECTIONS[name]
 
 
 # --- writing --------------------------------------------------------------------------------------------------

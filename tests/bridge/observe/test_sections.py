@@ -11,6 +11,7 @@ from bridge.observe.text import SECTIONS, Page, find_sections, section, shorter
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from bridge.task import TaskConfig
 
@@ -110,6 +111,26 @@ def test_a_section_that_does_not_exist_is_named_when_an_observer_is_made(name: s
     with pytest.raises(ValueError) as raised:  # noqa: PT011  # the text is compared below
         told("game", name)
     assert str(raised.value).startswith(complaint)
+
+
+@pytest.mark.usefixtures("own_sections")
+def test_a_section_can_come_with_a_module_of_ones_own(
+    told: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = (
+        "from bridge.observe.text import section",
+        "@section('creed')",
+        "def creed(page):",
+        "    yield 'Creed'",
+    )
+    (tmp_path / "khala_test_creed.py").write_text("\n".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+    assert told("khala_test_creed:creed", "answer").startswith("Creed\n\nAnswer\n")
+
+
+def test_a_module_that_is_not_there_is_named(told: Any) -> None:
+    with pytest.raises(ValueError, match="the module of section 'nowhere:creed' cannot be imported: No module named"):
+        told("nowhere:creed")
 
 
 def test_sections_are_found_in_the_order_of_their_names() -> None:
