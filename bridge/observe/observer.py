@@ -39,7 +39,7 @@ class Observer:
         """Takes a task, and whoever says which unit answers to which of its agents.
 
         Raises:
-            ValueError: an agent's configuration names a section that does not exist.
+            ConfigError: an agent's configuration names a section that does not exist.
         """
         self._task = task
         self._new_roster = roster

@@ -58,6 +58,6 @@ def sections_of(agent: AgentConfig) -> tuple[Section, ...]:
     """The sections of an agent's page.
 
     Raises:
-        ValueError: its configuration names one that does not exist.
+        ConfigError: its configuration names one that does not exist.
     """
     return find_sections(agent.sections or SECTIONS_OF[agent.kind])

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from bridge.observe.text.tokens import tokens
 from bridge.observe.text.words import INDENT
+from protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -141,7 +142,7 @@ def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
     """The sections of these names, `game`, or `my_module:game` for one that a module registers when it is imported.
 
     Raises:
-        ValueError: there is none of a name; the text says which there are.
+        ConfigError: there is none of a name; the text says which there are.
     """
     return tuple(map(_find, names))
 
@@ -152,11 +153,11 @@ def _find(reference: str) -> Section:
         try:
             importlib.import_module(module)
         except ImportError as error:
-            raise ValueError(f"the module of section '{reference}' cannot be imported: {error}") from None
+            raise ConfigError(f"the module of section '{reference}' cannot be imported: {error}") from None
     if name not in SECTIONS:
         close = difflib.get_close_matches(name, SECTIONS, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(sorted(SECTIONS))}"
-        raise ValueError(f"there is no section '{name}' of an observation: {hint}")
+        raise ConfigError(f"there is no section '{name}' of an observation: {hint}")
     return SECTIONS[name]
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from bridge.observe import Observer
 from bridge.observe.text import SECTIONS, Page, find_sections, section, shorter
+from protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -108,7 +109,7 @@ def test_a_name_cannot_be_taken_twice_unawares() -> None:
     ],
 )
 def test_a_section_that_does_not_exist_is_named_when_an_observer_is_made(name: str, complaint: str, told: Any) -> None:
-    with pytest.raises(ValueError) as raised:  # noqa: PT011  # the text is compared below
+    with pytest.raises(ConfigError) as raised:
         told("game", name)
     assert str(raised.value).startswith(complaint)
 
@@ -129,7 +130,7 @@ def test_a_section_can_come_with_a_module_of_ones_own(
 
 
 def test_a_module_that_is_not_there_is_named(told: Any) -> None:
-    with pytest.raises(ValueError, match="the module of section 'nowhere:creed' cannot be imported: No module named"):
+    with pytest.raises(ConfigError, match="the module of section 'nowhere:creed' cannot be imported: No module named"):
         told("nowhere:creed")
 
 
