@@ -8,7 +8,7 @@ PYTHONS ?= 3.11 3.12 3.13
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
 
-.PHONY: help install check format types test pysc2 slow test-all demo bench docs golden picture clean
+.PHONY: help install check format types test pysc2 slow test-all demo bench scenarios docs golden picture clean
 
 help: ## What can be made
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,6 +59,9 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 
 bench: install ## Measure what the README claims
 	$(RUN)python -m bench
+
+scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
+	$(RUN)python -m bench.scenarios
 
 docs: install ## Write the generated pages of docs/reference
 	$(RUN)python -m docs.generate

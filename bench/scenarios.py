@@ -1,0 +1,133 @@
+"""Plays every scenario of the paper with scripted players, through `khala run`, and says what came of it.
+
+    python -m bench.scenarios                              all 33 maps, skilled and focus-fire, one episode each
+    python -m bench.scenarios --tasks 'pvz_task1*' --episodes 5 --players skilled
+    python -m bench.scenarios --json                       one JSON object on stdout
+
+Host, agents and the scripted model are processes that talk over the bus, as in any other run. The table goes to
+`<out>/scenarios.md` as well, a recording of every run lies beside it. The end code is 1 if a run failed, or if a player
+said something that is no action (class `malformed` or `unknown_action`): a scripted player reads its actions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import json
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.config import all_tasks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+PLAYERS = ("skilled", "focus-fire")
+FAMILIES = ("llm_smac/", "llm_pysc2/pvz_")
+"""Where the paper's 33 maps are."""
+SHAME = ("malformed", "unknown_action")
+COLUMNS = ("task", "player", "won", "drawn", "lost", "KD", "steps", "accepted", "rejections", "wall s", "recording")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What a player made of a task in some episodes."""
+
+    task: str
+    player: str
+    outcomes: Counter[str] = field(default_factory=Counter)
+    killed: float = 0.0
+    """Minerals and vespene, of all episodes."""
+    lost: float = 0.0
+    steps: int = 0
+    accepted: int = 0
+    rejections: Counter[str] = field(default_factory=Counter)
+    wall_s: float = 0.0
+    recording: str = ""
+    fault: str = ""
+    """What the run ended with, if it failed."""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row as it is printed."""
+        if self.fault:
+            return (self.task, self.player, *["-"] * 7, f"{self.wall_s:.0f}", self.fault)
+        count = sum(self.outcomes.values())
+        kd = "-" if not self.killed and not self.lost else f"{self.killed / self.lost:.2f}" if self.lost else "no loss"
+        said = ", ".join(f"{number} {reason}" for reason, number in sorted(self.rejections.items())) or "none"
+        outcomes = (f"{self.outcomes[name]}/{count}" for name in ("win", "draw", "loss"))
+        work = (str(self.steps), str(self.accepted), said, f"{self.wall_s:.0f}", self.recording)
+        return (self.task, self.player, *outcomes, kd, *work)
+
+
+def scenarios(pattern: str = "*") -> list[str]:
+    """Names of the tasks of the paper's maps that fit a pattern, maps in the order of their names."""
+    found = (task for task in all_tasks() if task.map == task.name and task.map_spec.file.startswith(FAMILIES))
+    return sorted(task.name for task in found if fnmatch.fnmatch(task.name, pattern))
+
+
+def play(task: str, player: str, *, episodes: int, seed: int, out: Path) -> Row:
+    """One run of a task with a scripted player; a run that fails is a row that says so."""
+    command = [sys.executable, "-m", "khala", "run", task, "--model-name", player, "--latency", "0", "--json"]
+    command += ["--episodes", str(episodes), "--seed", str(seed), "--out", str(out), "--max-wait", "60"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or [f"code {done.returncode}"]
+        return Row(task, player, fault=lines[-1])
+    said = json.loads(done.stdout)
+    results: list[dict[str, Any]] = said["results"]
+    return Row(
+        task=task,
+        player=player,
+        outcomes=Counter(result["outcome"] for result in results),
+        killed=sum(result["killed"]["value"] for result in results),
+        lost=sum(result["lost"]["value"] for result in results),
+        steps=sum(result["steps"] for result in results),
+        accepted=sum(result["accepted"] for result in results),
+        rejections=sum((Counter(result["rejections"]) for result in results), Counter()),
+        wall_s=sum(result["wall_s"] for result in results),
+        recording=said["recording"],
+    )
+
+
+def table(rows: Iterable[Row]) -> Iterator[str]:
+    """The rows as lines of a Markdown table."""
+    yield f"| {' | '.join(COLUMNS)} |"
+    yield f"|{'---|' * len(COLUMNS)}"
+    yield from (f"| {' | '.join(row.cells)} |" for row in rows)
+
+
+def main() -> int:
+    """Plays what the options name; prints and writes the table."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--tasks", default="*", metavar="PATTERN", help="only tasks whose names fit, such as 'pvz_*'")
+    options.add_argument("--players", default=",".join(PLAYERS), help="scripted players, with commas between them")
+    options.add_argument("--episodes", type=int, default=1, help="of each task, with seeds one after the other")
+    options.add_argument("--seed", type=int, default=1, help="of the first episode")
+    options.add_argument("--out", type=Path, default=Path("runs/scenarios"), help="directory for table and recordings")
+    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    given = options.parse_args()
+    names = scenarios(given.tasks)
+    if not names:
+        options.error(f"no scenario fits {given.tasks}")
+    rows: list[Row] = []
+    for name in names:
+        for player in given.players.split(","):
+            rows.append(play(name, player, episodes=given.episodes, seed=given.seed, out=given.out))
+            if not given.json:
+                print(" | ".join(rows[-1].cells), flush=True)
+    given.out.mkdir(parents=True, exist_ok=True)
+    (given.out / "scenarios.md").write_text("\n".join(table(rows)) + "\n", encoding="utf-8")
+    if given.json:
+        print(json.dumps({"scenarios": [asdict(row) for row in rows]}))
+    else:
+        print(f"\n{given.out / 'scenarios.md'} has the table")
+    return 1 if any(row.fault or set(SHAME) & row.rejections.keys() for row in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
