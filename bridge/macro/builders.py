@@ -51,7 +51,7 @@ def _has_more_to_do(ask: Ask, unit: Unit) -> bool:
 def _of_side(ask: Ask, where: WorldPoint) -> Unit:
     free = [unit for unit in finished(of_types(ask.snapshot, ask.action.units)) if unit.tag not in ask.ledger.busy]
     ranked = [
-        (use, math.dist(place(unit), where), unit.tag) for unit in free if (use := _use(ask.snapshot, unit)) < _USED
+        (cost, math.dist(place(unit), where), unit.tag) for unit in free if (cost := use(ask.snapshot, unit)) < _USED
     ]
     if not ranked:
         raise never(ask, f"you have no {' or '.join(ask.action.units)} that is free to build.")
@@ -61,8 +61,8 @@ def _of_side(ask: Ask, where: WorldPoint) -> Unit:
 _IDLE, _LADEN, _ON_GAS, _USED = range(4)
 
 
-def _use(snapshot: Snapshot, unit: Unit) -> int:
-    """How much a worker would be missed."""
+def use(snapshot: Snapshot, unit: Unit) -> int:
+    """How much a worker would be missed: 0 if it is idle or gathers minerals, 3 if it does anything but gather."""
     if unit.orders and not is_doing(unit, ability("Harvest_Gather_screen"), ability("Harvest_Return_quick")):
         return _USED
     if is_on_gas(snapshot, unit):

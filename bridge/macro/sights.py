@@ -10,9 +10,9 @@ import numpy as np
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
 from bridge.ground.land import SEEN_NOW
-from bridge.macro.builders import is_on_gas
+from bridge.macro.builders import use
 from bridge.macro.rule import Order, never
-from bridge.macro.side import bears_resources, finished, is_worker, of_types, place
+from bridge.macro.side import ability, finished, is_doing, is_worker, of_types, place
 
 if TYPE_CHECKING:
     from bridge.ground import Land
@@ -40,14 +40,13 @@ def scout(ask: Ask) -> list[Order]:
         raise never(ask, f"you have no {wanted} without an order in this turn.")
     home = next(map(place, land_of(ask.snapshot).own_halls), place(units[0]))
     places = unseen_places(ask.snapshot, home)
-    looking = [(n, unit) for unit in units for n, point in enumerate(places) if _looks_at(unit, point)]
+    goals = {unit.tag: goal for unit in ask.snapshot.own if (goal := _goal(unit)) is not None}
+    looking = [(n, unit) for unit in units if (n := _seen_by(places, goals.get(unit.tag))) is not None]
     if looking:  # it goes on, so that the same words mean the same in the next turn
         number, unit = min(looking, key=lambda found: (found[0], found[1].tag))
         return _look(ask, unit, places[number])
-    others = [goal for unit in ask.snapshot.own if (goal := _goal(unit)) is not None]
-    watched = [*others, *(WorldPoint(*point) for point in ask.ledger.looks)]
-    free = [point for point in places if all(math.dist(point, goal) > SAME_PLACE for goal in watched)]
-    to = (free or places)[0]
+    watched = {_seen_by(places, WorldPoint(*goal)) for goal in (*goals.values(), *ask.ledger.looks)}
+    to = next((point for number, point in enumerate(places) if number not in watched), places[0])
     return _look(ask, min(units, key=lambda u: (_needed(ask.snapshot, u), math.dist(place(u), to), u.tag)), to)
 
 
@@ -57,24 +56,26 @@ def _look(ask: Ask, unit: Unit, to: WorldPoint) -> list[Order]:
     return [Order(ask.function, (unit.tag,), to)]
 
 
-def _looks_at(unit: Unit, point: WorldPoint) -> bool:
-    goal = _goal(unit)
-    return goal is not None and math.dist(goal, point) <= SAME_PLACE
-
-
 def _goal(unit: Unit) -> WorldPoint | None:
-    """The point that a unit is on its way to."""
-    if not unit.orders or not unit.orders[0].HasField("target_world_space_pos"):
+    """The point that a unit walks to; nobody who builds there or gathers has one."""
+    if not is_doing(unit, ability("Move_screen"), ability("Attack_screen")) or not unit.orders[0].HasField(
+        "target_world_space_pos"
+    ):
         return None
     point = unit.orders[0].target_world_space_pos
     return WorldPoint(point.x, point.y)
 
 
+def _seen_by(places: list[WorldPoint], goal: WorldPoint | None) -> int | None:
+    """Which of the places somebody looks at who goes to a point."""
+    if goal is None:
+        return None
+    return next((n for n, p in enumerate(places) if abs(p.x - goal.x) + abs(p.y - goal.y) <= SAME_PLACE), None)
+
+
 def _needed(snapshot: Snapshot, unit: Unit) -> int:
     """How much a unit would be missed where it is."""
-    if not is_worker(unit):
-        return 0
-    return 2 if is_on_gas(snapshot, unit) else int(bears_resources(unit))
+    return int(use(snapshot, unit)) if is_worker(unit) else 0
 
 
 def unseen_places(snapshot: Snapshot, home: WorldPoint) -> list[WorldPoint]:
@@ -89,7 +90,8 @@ def unseen_places(snapshot: Snapshot, home: WorldPoint) -> list[WorldPoint]:
         return sorted(points, key=lambda point: (round(math.dist(point, home), 3), point))
 
     starts, bases = list(land.ground.starts), [base.place for base in land.bases]
-    never_seen = [*order(_never(land, starts)), *order(_never(land, bases)), *order(_never(land, _squares(land)))]
+    squares = _never(land, _squares(land, home))
+    never_seen = [*order(_never(land, starts)), *order(_never(land, bases)), *order(squares)]
     if never_seen:
         return list(dict.fromkeys(never_seen))
     hidden = order([p for p in dict.fromkeys((*starts, *bases)) if land.sight[_cell(land, p)] < SEEN_NOW])
@@ -108,9 +110,9 @@ def _cell(land: Land, point: WorldPoint) -> tuple[int, int]:
     return min(max(int(point.x), 0), width - 1), min(max(int(point.y), 0), height - 1)
 
 
-def _squares(land: Land) -> list[WorldPoint]:
-    """The middles of the squares of the map that can be walked on."""
+def _squares(land: Land, home: WorldPoint) -> list[WorldPoint]:
+    """The middles of the squares of the map to which one can walk from home."""
     width, height = land.ground.size
     x, y = np.meshgrid(np.arange(CELL // 2, width, CELL), np.arange(CELL // 2, height, CELL), indexing="ij")
-    walkable = land.ground.walkable[x, y]
+    walkable = np.isfinite(land.ground.ways_from(home)[x, y])
     return [WorldPoint(i + 0.5, j + 0.5) for i, j in zip(x[walkable].tolist(), y[walkable].tolist(), strict=True)]

@@ -122,6 +122,15 @@ def test_two_scouts_of_a_turn_look_at_two_places(make_game: Callable[..., Game])
     assert goal(second) in {base.place for base in land_of(game.snapshot).bases}
 
 
+def test_a_builder_on_its_way_is_no_scout(make_game: Callable[..., Game]) -> None:
+    game = make_game()
+    game.cheat(debug_pb2.all_resources)
+    orders = game.say("Build_Nexus")
+    game.do(orders)
+    game.play(10)
+    assert game.say("Worker_Scan")[0].units != orders[0].units
+
+
 def test_what_was_seen_is_not_looked_at_again_before_the_rest(make_game: Callable[..., Game]) -> None:
     game = make_game("Flat64")
     start = land_of(game.snapshot).ground.starts[0]
