@@ -10,7 +10,6 @@ Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves a
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -25,7 +24,7 @@ from simulator.world import NO_TAG, NOBODY
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.catalog import Ability, Catalog
+    from simulator.catalog import Ability
     from simulator.world import World
 
     Point = tuple[float, float]
@@ -82,16 +81,6 @@ def meant(world: World, slot: int, requested: int) -> Ability | None:
     fitting = [a for a in card if a.general == requested and casting.is_modelled(a)]
     now = (a for a in fitting if casting.refusal(world, slot, a) is Refusal.SUCCESS)
     return next(now, fitting[0] if fitting else None)
-
-
-@functools.lru_cache(maxsize=2048)
-def aims_of(catalog: Catalog, requested: int) -> Aim:
-    """What an ability, by its general or specific id, can be aimed at; nothing for one that is not known."""
-    aims = Aim(0)
-    for ability in catalog.abilities:
-        if requested in (ability.id, ability.general):
-            aims |= ability.aim
-    return aims
 
 
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:

@@ -120,7 +120,7 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view:
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
         point = clicked = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
-        if Aim.UNIT in abilities.aims_of(seat.world.catalog, message.ability_id):
+        if _takes_units(seat, message.ability_id):
             sight = seat.look()
             row = at_point(sight, seat.types, point, view.screen.scale / 2)
             if row is not None:
@@ -130,6 +130,12 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view:
         point = view.minimap.to_world(float(pixel.x), float(pixel.y))
     tags = tuple(seat.selection.tags)
     return Command(message.ability_id, tags, target, point, queue=message.queue_command, clicked=clicked)
+
+
+def _takes_units(seat: Seat, requested: int) -> bool:
+    """Whether a click can mean a unit: what the selected units have of a general ability may take points only."""
+    meant = (abilities.meant(seat.world, slot, requested) for slot in seat.selection.slots(seat.world))
+    return any(Aim.UNIT in ability.aim for ability in meant if ability is not None)
 
 
 def _give(seat: Seat, command: Command, loop: int, *, by_tags: bool) -> None:

@@ -43,6 +43,8 @@ CASTERS = {
 """Who is told what too many could be told for the first of them to be the right one; by the stem of the function."""
 BASE_PLACE = (46.0, 46.0)
 """Beside resources where nobody has a base."""
+NEARBY = ((0.0, 0.0), (0.1, 0.1), (-0.1, -0.1))
+"""A click may be off by half a pixel; what stands on a grid is to stand on the same cells then."""
 TOWN_HALLS = frozenset({"Nexus", "CommandCenter", "Hatchery"})
 
 
@@ -170,7 +172,7 @@ def _points(action: Action, stage: Stage) -> Iterator[WorldPoint]:
     if action.rule == "build_at":
         yield from _geysers(stage)
     for point in points:
-        if _may(action, stage, point=point):
+        if all(_may(action, stage, point=WorldPoint(point.x + dx, point.y + dy)) for dx, dy in NEARBY):
             yield point
 
 

@@ -38,7 +38,7 @@ def give_orders(world: World, chance: random.Random) -> None:
 
 
 def _give(world: World, player: int, slot: int, ability: int, chance: random.Random) -> None:
-    aims = [aim for aim in Aim if aim & abilities.aims_of(world.catalog, ability)]
+    aims = [aim for aim in Aim if aim & world.catalog.ability(ability).aim]
     aim = chance.choice(aims)
     target, point = 0, None
     if aim is Aim.UNIT:
