@@ -59,9 +59,17 @@ def take_other_weapon(world: World, slot: int) -> None:
 
 
 def measure_reach(world: World, slot: int) -> None:
-    """Write the reach of the weapon at hand, with what buffs add to it or take from it."""
+    """Write the reach of the weapon at hand, with what buffs add to it or take from it.
+
+    Bodies of some types, such as Siege Tanks and Sentries, keep others farther off than their edges are; whoever
+    touches one reaches it.
+    """
     plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])
-    world.reach[slot] = max(plain + more, min(plain, 0.0))  # what is taken away leaves an arm's length
+    touch, target = 0.0, world.target[slot]
+    if target != NOBODY:
+        bodies = world.separation[slot] + world.separation[target]
+        touch = float(bodies - world.radius[slot] - world.radius[target])
+    world.reach[slot] = max(plain + more, min(plain, 0.0), touch)  # what is taken away leaves an arm's length
 
 
 def disengage(world: World, slot: int) -> None:

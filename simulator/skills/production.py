@@ -47,7 +47,7 @@ def has_place(world: World, slot: int, ability: Ability) -> Refusal:
     if ability.unit and ability.unit not in world.catalog.row_of_name:
         return Refusal.NOT_SUPPORTED
     jobs = world.jobs.get(slot, [])
-    if any(job.kind in MORPHS for job in jobs) or world.casts[slot]:
+    if any(job.kind in MORPHS for job in jobs) or (world.casts[slot] and world.bound[slot]):
         return Refusal.CANT_QUEUE_THAT_ORDER
     if not world.powered[slot]:
         return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER

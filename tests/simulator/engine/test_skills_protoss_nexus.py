@@ -12,6 +12,7 @@ from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 RECALL, NEXUS_RECALL, TIME_WARP, CLOAK, CHRONO, OVERCHARGE = 142, 3757, 2244, 4122, 3755, 4107
+TRAIN_PROBE = 1006
 RECHARGE = {"4.10": 3765, "5.0.13": 4111}
 
 
@@ -160,6 +161,16 @@ def test_in_5_0_13_the_cloaking_field_is_an_ability_of_448_loops(make_field: Any
 
 
 # Chrono Boost and batteries -------------------------------------------------------------------------------------------
+
+
+def test_a_nexus_that_boosts_itself_trains_all_the_same(field: Any) -> None:
+    nexus = put(field, "Nexus", 1, 16.5, 16.5)
+    field.world.players[1].minerals = 100.0
+    assert field.order(nexus, CHRONO, target=nexus)
+    assert field.order(nexus, TRAIN_PROBE)
+    field.play(1)
+    assert [job.ability for job in field.world.jobs[nexus]] == [TRAIN_PROBE]
+    assert has(field, nexus, "ChronoBoostEnergyCost")
 
 
 @pytest.mark.parametrize("version", VERSIONS)

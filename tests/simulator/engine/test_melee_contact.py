@@ -1,0 +1,34 @@
+"""Whoever touches a unit reaches it: bodies that keep others off farther than their edges are hit by melee as well."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from simulator import commands
+from simulator.catalog import load_catalog
+
+CATALOG = load_catalog()
+MELEE = [u.name for u in CATALOG.units if any(w.range <= 0.1 and w.hits for w in u.weapons) and u.speed_n and u.army]
+WIDE = [
+    unit.name for unit in CATALOG.units
+    if unit.separation > unit.radius and not (unit.passive or unit.uncommandable or unit.structure) and unit.army
+]  # fmt: skip
+
+
+def test_there_are_such_units() -> None:
+    assert {"Zergling", "Zealot", "DarkTemplar"} <= set(MELEE)
+    assert {"SiegeTank", "SiegeTankSieged", "Sentry", "Hellion"} <= set(WIDE)
+
+
+@pytest.mark.parametrize("victim", WIDE)
+@pytest.mark.parametrize("attacker", MELEE)
+def test_a_melee_unit_hits_a_wide_body(field: Any, attacker: str, victim: str) -> None:
+    world = field.world
+    target = field.still(victim, 2, 20.0, 16.0)
+    slot = field.put(attacker, 1, 14.0, 16.0)
+    world.life[slot] = world.life_max[slot] = 10_000.0
+    whole = field.vitals(target)
+    commands.attack_unit(world, [slot], world.tag_of(target))
+    field.until(lambda: field.vitals(target) < whole, most=200)
