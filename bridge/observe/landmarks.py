@@ -7,6 +7,7 @@ can name it by, which is that of the resource nearest to its middle.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from bridge.ground import land_of
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from bridge.ground import Land
     from bridge.observe.body import Body
     from bridge.observe.scene import Scene
+    from protocol.messages import OrderView
 
     What: TypeAlias = Literal["base place", "geyser", "power field", "structure"]
 
@@ -91,12 +93,18 @@ def structures(scene: Scene) -> Iterator[Landmark]:
         yield _landmark("structure", body, None, _busy(body))
 
 
+def _queue(orders: Sequence[OrderView]) -> str:
+    """What a structure makes, and what waits behind it by name."""
+    first, *waiting = orders
+    begun = f"{first.name} {100 * first.progress:.0f}%" if first.progress else first.name
+    return " then ".join([begun, *(f"{count} {name}" for name, count in Counter(o.name for o in waiting).items())])
+
+
 def _busy(body: Body) -> str:
     view = body.view
     if view.build_progress < 1:
         return f"{100 * view.build_progress:.0f}% built"
-    doing = [order.name + (f" {100 * order.progress:.0f}%" if order.progress else "") for order in view.orders]
-    parts = [" then ".join(doing)] if doing else []
+    parts = [_queue(view.orders)] if view.orders else []
     if details := view.details:
         parts += ["no power"] if details.unpowered else []
         parts += [f"{details.harvesters[0]} of {details.harvesters[1]} workers"] if details.harvesters else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from bridge.frames import CAMERA_WIDTH
@@ -76,10 +77,17 @@ def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a sectio
     yield from ()
 
 
+_TOO_FEW = re.compile(r"(\d+) (\w+) too few")
+
+
 def _reasons(team: TeamView) -> dict[str, list[str]]:
+    """Actions by what stands in their way; those that are only too dear stand together, with what is missing."""
     reasons: dict[str, list[str]] = {}
     for barred in team.barred:
-        reasons.setdefault(barred.reason, []).append(barred.action)
+        if too_few := _TOO_FEW.fullmatch(barred.reason):
+            reasons.setdefault(f"too few {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
+        else:
+            reasons.setdefault(barred.reason, []).append(barred.action)
     return reasons
 
 

@@ -7,6 +7,7 @@ Unit lines are fields between bars, so that programs can read them as well (the 
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from bridge.observe.chronicle import is_structure
@@ -182,7 +183,7 @@ def _condition(unit: UnitView) -> str:
     if (cooldown_s := unit.weapon_cooldown_s) is not None:
         fields.append(f"weapon in {n(cooldown_s)} s" if cooldown_s else "weapon ready")
     if unit.orders:
-        fields.append(f"order {', then '.join(map(_order, unit.orders))}")
+        fields.append(f"order {orders(unit.orders)}")
     fields += [word for word, is_so in (("cloaked", unit.cloaked), ("hallucination", unit.hallucination)) if is_so]
     if unit.details is not None:
         fields += _details(unit.details)
@@ -206,6 +207,14 @@ def _skills(details: UnitDetails) -> str:
     """What a unit may be told to use now: part of no condition, since agents differ in it."""
     ready = f" | ready {', '.join(details.ready)}" if details.ready else ""
     return ready + (f" | not ready {', '.join(details.unready)}" if details.unready else "")
+
+
+def orders(queue: Sequence[OrderView]) -> str:
+    """What a unit does and will do: `Train_Marine 83%, then 4 Train_Marine`."""
+    if not queue:
+        return ""
+    waiting = [(words, len(list(same))) for words, same in groupby(map(_order, queue[1:]))]
+    return ", then ".join([_order(queue[0]), *(f"{count} {words}" if count > 1 else words for words, count in waiting)])
 
 
 def _order(order: OrderView) -> str:

@@ -52,6 +52,12 @@ def training(unit: raw_pb2.Unit) -> None:
     order(unit, "Train_Stalker_quick", progress=0.456)
 
 
+def training_many(unit: raw_pb2.Unit) -> None:
+    training(unit)
+    for function in ("Train_Stalker_quick", "Train_Stalker_quick", "Train_Zealot_quick"):
+        order(unit, function)
+
+
 def carrying(unit: raw_pb2.Unit) -> None:
     unit.cargo_space_max = 8
     for name in (73, 74):
@@ -74,6 +80,7 @@ def working(unit: raw_pb2.Unit) -> None:
         (ordered_to_a_place, {}, " | order Move minimap [16, 48]"),
         (ordered_twice, {}, " | order Attack 0x1a, then Move minimap [16, 48]"),
         (training, {}, " | order Train_Stalker 46%"),
+        (training_many, {}, " | order Train_Stalker 46%, then 2 Train_Stalker, then Train_Zealot"),
         (carrying, {}, " | carries Stalker, Zealot, room for 8 in all"),
         (empty_hold, {}, " | carries nobody, room for 8 in all"),
         (working, {}, " | workers 14 of 16"),
@@ -142,3 +149,11 @@ def test_messages_stand_apart_from_whom_one_can_write_to(pages: Any) -> None:
     told = {"Developer": Feedback(messages=(Received(sender="Commander", recipient="Developer", text="More!"),))}
     text = pages(told)["Developer"]
     assert "\nMessages\n    Message from Commander: '''More!'''\n\nCommunication\n    You can write to:\n" in text
+
+
+def test_what_is_only_too_dear_stands_together(base_task: Any, look: Any, unit: Any) -> None:
+    gateway = unit(1, "Gateway", 16, 16, is_powered=True)
+    nexus = unit(2, "Nexus", 30, 16, is_powered=True)
+    poor = {"minerals": 40, "food_used": 10, "food_cap": 30}
+    text = Observer(base_task).observe(look([gateway, nexus], abilities={}, player=poor)).agents["Developer"].text
+    assert "        too few minerals: Train_Probe (10 missing)\n" in text

@@ -187,7 +187,7 @@ def test_structures_say_what_they_do(base: Any, look: Any, views: Any) -> None:
     assert marks(view, "structure") == [
         ("CyberneticsCore", "no power"),
         ("Gateway", ""),
-        ("Gateway", "Train_Stalker 25% then Train_Zealot"),
+        ("Gateway", "Train_Stalker 25% then 1 Train_Zealot"),
         ("Nexus", "Train_Probe 40%, 14 of 16 workers, 50 energy"),
         ("Pylon", ""),
         ("Stargate", "35% built"),
