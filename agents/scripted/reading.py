@@ -37,6 +37,8 @@ _COUNT = re.compile(r"(?:^|, )(\d{1,4}) (\w+)", re.ASCII)
 _MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
 _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
+_PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
 _REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
 _TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
@@ -77,6 +79,15 @@ class Unit(NamedTuple):
     def share(self) -> float:
         """Hit points that are left, of all: 0 to 1."""
         return self.hit_points / self.full if self.full else 1.0
+
+
+class Price(NamedTuple):
+    """What an action costs, and how often that can be paid now."""
+
+    minerals: int = 0
+    vespene: int = 0
+    supply: int = 0
+    times: int = 1
 
 
 class Action(NamedTuple):
@@ -125,6 +136,8 @@ class Situation:
     """Structures under construction, by type."""
     producing: dict[str, int] = field(default_factory=dict)
     """How often something is being made or waits for it, by the name of its action."""
+    prices: dict[str, Price] = field(default_factory=dict)
+    """By the name of the action; only of what can be paid now."""
     power: list[tuple[str, str, Point]] = field(default_factory=list)
     """Type, tag and place of what gives power."""
     known: list[tuple[str, Point]] = field(default_factory=list)
@@ -272,3 +285,6 @@ def _read_valid_actions(situation: Situation, body: str) -> None:
         _team(situation, team).actions += [
             Action(name, tuple(args.split(", ")) if args else ()) for name, args in _ACTION.findall(listed)
         ]
+    for name, price, times in _COSTS.findall(body):
+        amounts = {what: int(amount) for amount, what in _PRICE.findall(price)}
+        situation.prices[name] = Price(**amounts, times=int(times or 1))

@@ -37,6 +37,9 @@ class Build:
     supply_minerals: int
     wants: tuple[Want, ...]
     army: tuple[str, ...]
+    """Actions that make units of the army, the best first."""
+    producers: tuple[str, ...] = ()
+    """Types of the structures that make them one at a time; () if larvae do."""
     structures: tuple[str, ...] = field(default=())
 
 
@@ -63,6 +66,7 @@ PROTOSS = Build(
         Want("Build_Assimilator", "Assimilator", 4, {"Nexus": 2, "Probe": 34}),
     ),
     army=("Train_Immortal", "Warp_Stalker", "Train_Stalker", "Warp_Zealot", "Train_Zealot"),
+    producers=("Gateway", "WarpGate", "RoboticsFacility"),
     structures=(
         "Nexus", "Pylon", "Assimilator", "Gateway", "WarpGate", "CyberneticsCore", "Forge", "TwilightCouncil",
         "RoboticsFacility", "RoboticsBay", "Stargate", "FleetBeacon", "TemplarArchive", "DarkShrine", "PhotonCannon",
@@ -89,6 +93,7 @@ TERRAN = Build(
         Want("Research_TerranInfantryWeapons", "TerranInfantryWeaponsLevel1", 1, {"EngineeringBay": 1}, upgrade=True),
     ),
     army=("Train_Marauder", "Train_Marine"),
+    producers=("Barracks",),
     structures=(
         "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "SupplyDepot", "SupplyDepotLowered", "Refinery",
         "Barracks", "BarracksTechLab", "BarracksReactor", "EngineeringBay", "Factory", "FactoryTechLab",

@@ -7,8 +7,11 @@ needs no memory, and mends by itself what was shot down.
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from agents.scripted.reading import Price
 from agents.scripted.skilled.builds import BUILDS, Build, Want
 
 if TYPE_CHECKING:
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
 
 STRONG = 16
 """Army units with which the army sets out."""
+MANY = 200
+LARVAE_MAKE = frozenset({"Train_Drone", "Train_Overlord", "Train_Zergling", "Train_Roach", "Train_Hydralisk"})
 WEAK = 6
 """Army units below which it comes home."""
 NO_ARMY = frozenset({"Probe", "SCV", "MULE", "Drone", "Overlord", "Overseer", "Larva", "Egg", "Queen", "Observer"})
@@ -39,7 +44,7 @@ def command(plan: Plan) -> None:
     out = any(name == "All_Units_Attack" for _, name, _ in situation.accepted)
     if size >= STRONG or (out and size >= WEAK):
         plan.give("All_Units_Attack")
-    elif situation.alarm or out:
+    elif size and (situation.alarm or out):
         plan.give("All_Units_Defend")
 
 
@@ -61,11 +66,39 @@ def warp_to_the_front(plan: Plan) -> None:
                 break
 
 
+@dataclass(slots=True)
+class Purse:
+    """What may still be spent in this reply."""
+
+    plan: Plan
+    minerals: int
+    vespene: int
+    supply: float
+    bought: Counter[str] = field(default_factory=Counter)
+
+    def buy(self, action: str) -> bool:
+        """Orders something, if it can be paid after all that was ordered before it; says whether it did."""
+        price = self.plan.situation.prices.get(action, Price())
+        larvae = sum(self.bought[name] for name in LARVAE_MAKE) if action in LARVAE_MAKE else -1
+        if larvae >= self.plan.situation.counts.get("Larva", 0):
+            return False
+        enough = price.minerals <= self.minerals and price.vespene <= self.vespene and price.supply <= self.supply
+        if not enough or self.bought[action] >= price.times or not self.plan.give(action):
+            return False
+        self.bought[action] += 1
+        self.minerals -= price.minerals
+        self.vespene -= price.vespene
+        self.supply -= price.supply
+        return True
+
+
 def produce(plan: Plan, build: Build) -> None:
     """Goes through a build order; a want that cannot be paid yet may keep others from being paid first."""
     situation = plan.situation
+    room = max(0.0, situation.supply_cap - situation.supply_used)
+    purse = Purse(plan, situation.minerals, situation.vespene, room)
     if _needs_supply(situation, build) and not _pending(situation, build.supply):
-        given = plan.give(build.supply.action)
+        given = purse.buy(build.supply.action)
         if not given and situation.minerals < 2 * build.supply_minerals:
             return
     for want in build.wants:
@@ -73,11 +106,21 @@ def produce(plan: Plan, build: Build) -> None:
             return
         if _met(situation, want):
             continue
-        if not plan.give(want.action) and want.first:
+        if not purse.buy(want.action) and want.first:
             return  # it is saved for
+    free = _free_producers(situation, build)
     for action in build.army:
-        while plan.left > 0 and situation.supply_used < situation.supply_cap and plan.give(action):
-            pass
+        while plan.left > 0 and free > 0 and purse.buy(action):
+            free -= 1
+
+
+def _free_producers(situation: Situation, build: Build) -> int:
+    """About how many units of the army can be begun without one waiting for another; larvae are not counted."""
+    if not build.producers:
+        return MANY
+    there = sum(situation.counts.get(kind, 0) for kind in build.producers)
+    busy = sum(situation.producing.get(action, 0) for action in build.army if not action.startswith("Warp_"))
+    return there - busy
 
 
 def _needs_supply(situation: Situation, build: Build) -> bool:
