@@ -12,7 +12,15 @@ from bridge.functions import functions
 from bridge.ground import land_of
 from bridge.macro.places import front
 from bridge.macro.rule import Order, never
-from bridge.macro.side import army, enemy_structures, own_structures, place, threats
+from bridge.macro.side import (
+    army,
+    enemies_in_reach,
+    enemy_structures,
+    is_armed,
+    is_structure,
+    own_structures,
+    place,
+)
 from bridge.macro.sights import unseen_places
 
 if TYPE_CHECKING:
@@ -30,13 +38,15 @@ INTRUDES: Final = 15.0
 def army_attack(ask: Ask) -> list[Order]:
     """Fights its way to enemies near the army, else to the nearest known enemy structure, else to where they may be.
 
+    Of the enemies near it those that fight come first, then structures and workers.
+
     Raises:
         Impossible: there is no army that is free.
     """
     units = _army(ask)
     middle = _middle(units)
-    close = [u for u in threats(ask.snapshot) if _is_close(u, units, middle)]
-    known = close or enemy_structures(ask.snapshot)
+    close = [u for u in enemies_in_reach(ask.snapshot, units) if _is_close(u, units, middle)]
+    known = [unit for unit in close if is_armed(unit)] or close or enemy_structures(ask.snapshot)
     if known:
         return _send(ask, units, _nearest(known, [middle]), fight=True)
     return _send(ask, units, unseen_places(ask.snapshot, middle)[0], fight=True)
@@ -50,7 +60,8 @@ def army_defend(ask: Ask) -> list[Order]:
     """
     units = _army(ask)
     homes = [place(unit) for unit in own_structures(ask.snapshot)]
-    intruders = [u for u in threats(ask.snapshot) if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
+    enemies = [unit for unit in enemies_in_reach(ask.snapshot, units) if not is_structure(unit) or is_armed(unit)]
+    intruders = [u for u in enemies if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
     if intruders:
         halls = [place(hall) for hall in land_of(ask.snapshot).own_halls]
         return _send(ask, units, _nearest(intruders, halls or homes), fight=True)

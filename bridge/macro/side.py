@@ -26,6 +26,10 @@ NO_ARMY = frozenset({"Queen", "QueenBurrowed"})
 """Armed, and yet at home: they heal, spread creep and make larvae."""
 
 
+UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "RavagerCocoon", "LurkerCocoon"})
+"""What is to become a unit, and does nothing until then."""
+
+
 def kind(unit: Unit) -> UnitType | None:
     """What is known of the type of a unit."""
     return _kind(unit.unit_type)
@@ -87,15 +91,31 @@ def _fights(known: UnitType | None) -> bool:
     return known is not None and not (known.structure or known.worker) and known.speed > 0 and known.supply > 0
 
 
-def threats(snapshot: Snapshot) -> list[Unit]:
-    """Enemy units in sight that can move or shoot, no workers among them if there are others, by ascending tags."""
-    found = [u for u in snapshot.units.values() if u.alliance == raw_pb2.Enemy and _threatens(kind(u))]
-    armed = [unit for unit in found if not is_worker(unit)]
-    return armed or found
+def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
+    """Enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
+
+    A Zealot hits no Overlord: what flies over an army on the ground is no aim. Neither are Larvae and eggs.
+    """
+    enemies = [u for u in snapshot.units.values() if u.alliance == raw_pb2.Enemy and name(u) not in UNBORN]
+    ours = tuple(sorted({unit.unit_type for unit in of}))
+    return [unit for unit in enemies if _hit(ours, unit.unit_type, flying=unit.is_flying)]
 
 
-def _threatens(known: UnitType | None) -> bool:
-    return known is None or (not known.structure and known.speed > 0) or bool(known.weapons)
+@functools.lru_cache(4096)
+def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
+    """Whether a unit of any of some types hits one of another; unknown types are taken to, and to be hit."""
+    known = [kind for kind in map(_kind, ours) if kind is not None]
+    target = _kind(other)
+    if target is None or len(known) < len(ours) or not any(kind.weapons for kind in known):
+        return True
+    planes = target.planes or (("air",) if flying else ("ground",))
+    return any(weapon.targets in ("any", *planes) for kind in known for weapon in kind.weapons)
+
+
+def is_armed(unit: Unit) -> bool:
+    """Whether a unit fights, workers aside."""
+    known = kind(unit)
+    return known is None or (bool(known.weapons) and not known.worker)
 
 
 def enemy_structures(snapshot: Snapshot) -> list[Unit]:

@@ -63,6 +63,16 @@ def test_enemies_near_it_come_first_and_known_structures_next(game: Game) -> Non
     assert goal(game.say("All_Units_Attack")) == pytest.approx((36, 30), abs=2)
 
 
+def test_it_does_not_run_after_what_it_cannot_hit(game: Game) -> None:
+    for unit in ("Overlord", "Larva"):
+        game.put(unit, 34, 34, owner=2)
+    game.put("Hatchery", 28.5, 37.5, owner=2)
+    assert goal(game.say("All_Units_Attack")) == pytest.approx((28.5, 37.5), abs=0.5)
+    game.put("Drone", 31, 33, owner=2)
+    game.put("Zergling", 26, 33, owner=2)
+    assert goal(game.say("All_Units_Attack")) == pytest.approx((26, 33), abs=3)
+
+
 def test_who_was_ordered_in_this_turn_is_left_to_it(game: Game) -> None:
     zealot = game.own("Zealot")[0].tag
     game.ledger.take(zealot)
