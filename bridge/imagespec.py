@@ -82,9 +82,10 @@ class ImageSpec(Frozen):
     """Whether units on a screen carry three digits of their tags, and their types two letters."""
     grid: bool = True
     """Whether grid lines are drawn."""
-    source: Literal["auto", "drawn", "game"] = "auto"
-    """`drawn` draws a screen, a minimap or a layer from raw data; `game` takes the game's own pixels, and shows
-    nothing where its camera is not at the team; `auto` takes them where they are there, and draws otherwise."""
+    source: Literal["drawn", "game", "auto"] | None = None
+    """`drawn` from raw data, for any team at any time; `game`: the game's own pixels, and no picture where its camera
+    is not at the team; `auto`: those where they are there, and drawn elsewhere. By default what can be drawn is
+    drawn."""
     max_teams: int = Field(default=3, ge=1)
     """A picture is made for so many of the agent's teams, the first ones of its observation."""
 
@@ -99,10 +100,23 @@ class ImageSpec(Frozen):
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> ImageSpec:
-        kind, _, name = self.what.partition(":")
-        if self.source == "drawn" and ((kind == "minimap" and name) or name in GAME_LAYERS):
+        if self.source == "drawn" and not self._is_drawable:
             raise ValueError(f"{self.what} comes from the game only: leave source out, or say source: game")
         return self
+
+    @property
+    def _is_drawable(self) -> bool:
+        return self.what == "minimap" or (self.of_teams and self.layer not in GAME_LAYERS)
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it may be drawn from raw data."""
+        return self._is_drawable and self.source != "game"
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether the game's own pixels will do, where they are there."""
+        return self.source in {"game", "auto"} or not self._is_drawable
 
     @property
     def layer(self) -> str:
@@ -112,7 +126,7 @@ class ImageSpec(Frozen):
     @property
     def is_rendered(self) -> bool:
         """Whether it asks the game to render."""
-        return self.source == "game" and self.what in {"screen", "minimap"}
+        return self.is_taken and self.what in {"screen", "minimap"}
 
     @property
     def of_teams(self) -> bool:

@@ -83,11 +83,11 @@ def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentSight) ->
 def _screen(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:
     camera, size_px = team.camera, spec.size_px
     pixels = None
-    if spec.source != "drawn":
+    if spec.is_taken:
         pixels = own.screen(moment.snapshot, camera, inner_px(size_px, camera.size))
     if pixels is not None:
         image, legend = screen.draw_over(pixels, moment, camera, team.tags, size_px, marks=spec.marks, grid=spec.grid)
-    elif spec.source == "game":
+    elif not spec.is_drawn:
         return
     else:
         image, legend = screen.draw(moment, camera, team.tags, size_px, marks=spec.marks, grid=spec.grid)
@@ -98,9 +98,9 @@ def _minimap(
     spec: ImageSpec, moment: Moment, world: MapFrame, teams: list[_Looker], seen: AgentSight
 ) -> Iterator[Drawing]:
     pixels = None
-    if spec.source != "drawn":
+    if spec.is_taken:
         pixels = own.minimap(moment.snapshot, inner_px(spec.size_px, world.minimap_size))
-    if pixels is None and spec.source == "game":
+    if pixels is None and not spec.is_drawn:
         return
     sites = [Site(team.name, team.camera) for team in teams]
     tags = frozenset(tag for team in teams for tag in team.tags)
@@ -143,8 +143,9 @@ def _on_canvas(spec: ImageSpec, layer: Layer, extent: float, values: Cells) -> I
 
 def _values(spec: ImageSpec, moment: Moment, camera: Camera, layer: Layer, size_px: int) -> Cells | None:
     """The values of a layer, of the game or drawn; None if there are none."""
-    if spec.source != "drawn":
+    if spec.is_taken:
         values = own.layer(moment.snapshot, layer.name, camera, size_px)
-        if values is not None or spec.source == "game":
+        if values is not None or not spec.is_drawn:
             return values
-    return None if layer.values is None else layer.values(moment, camera, size_px)
+    assert layer.values is not None, "what cannot be drawn is taken"
+    return layer.values(moment, camera, size_px)

@@ -138,13 +138,14 @@ def greenness(picture: Picture) -> float:
         ("auto", (14, 16), 1, True),
         ("auto", (25, 16), 1, False),
         ("drawn", (14, 16), 1, False),
+        (None, (14, 16), 1, False),
     ],
 )
 def test_the_games_own_pixels_are_taken_where_they_are_wanted_and_there(
     show: Show,
     snapshot: Snap,
     battle: list[raw_pb2.Unit],
-    source: str,
+    source: str | None,
     camera: tuple[float, float],
     count: int,
     is_green: bool,
@@ -195,6 +196,7 @@ def test_the_game_renders_only_for_those_who_ask_for_it(task: Callable[..., Task
         return config.model_copy(update={"agents": (config.agents[0].model_copy(update={"images": specs}),)}).render_px
 
     assert rendered(ImageSpec(what="screen"), ImageSpec(what="layer:creep", source="game")) is None
+    assert rendered(ImageSpec(what="screen", source="auto")) == 512
     assert (
         rendered(ImageSpec(what="screen", source="game", size_px=300), ImageSpec(what="minimap", source="game")) == 512
     )
