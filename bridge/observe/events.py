@@ -7,7 +7,7 @@ enemy that is neither in sight nor among the dead has walked out of sight, which
 from __future__ import annotations
 
 from itertools import chain
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 from protocol.messages import Event
 
@@ -22,6 +22,14 @@ MIN_CHANGE = 1.0
 """Health and shield that make an event; Protoss shields regain less than that between two quick observations."""
 
 
+class Witnessed(NamedTuple):
+    """Tags of the units in a team's view, in its order; views are many, and slower to go through."""
+
+    own: tuple[str, ...] = ()
+    allies: tuple[str, ...] = ()
+    enemies: tuple[str, ...] = ()
+
+
 class Events:
     """The events of one moment; one that several teams witness is made once."""
 
@@ -34,35 +42,30 @@ class Events:
         """Health and shield gained or lost, by tag, as far as they make an event."""
         self._changed: dict[Alliance, dict[str, Event]] = {}
 
-    def of_team(self, before: TeamView | None, now: TeamView) -> tuple[Event, ...]:
-        """Events of a team in the order of its units; () for a team that is seen for the first time.
+    def of_team(self, before: TeamView, saw: Witnessed, now: Witnessed) -> tuple[Event, ...]:
+        """Events of a team in the order of its units.
 
         Args:
-            before: the team's view at the observation before, None if it had none.
-            now: its view now; its own events are not looked at.
+            before: the team's view at the observation before.
+            saw: tags of the units in that view.
+            now: tags of the units that it sees now.
         """
-        if before is None:
-            return ()
-        old = {unit.tag: unit for unit in _all(before)}
-        mine = {unit.tag for unit in before.units}
-        found = self._of(now.units, mine, "joined", "own")
+        old = {*saw.own, *saw.allies, *saw.enemies}
+        found = self._of(now.own, frozenset(saw.own), "joined", "own")
         found += self._of(now.allies, old, "appeared", "ally")
         found += self._of(now.enemies, old, "appeared", "enemy")
-        still = {unit.tag for unit in _all(now)}
-        gone = (unit for tag, unit in old.items() if tag not in still)
-        found += [event("died" if unit.tag in self.dead else "disappeared", unit, unit.alliance) for unit in gone]
+        if gone := old.difference(now.own, now.allies, now.enemies):
+            units = (unit for unit in chain(before.units, before.allies, before.enemies) if unit.tag in gone)
+            found += [event("died" if unit.tag in self.dead else "disappeared", unit, unit.alliance) for unit in units]
         return tuple(found)
 
-    def _of(
-        self, units: Iterable[UnitView], old: Container[str], arrival: EventKind, alliance: Alliance
-    ) -> list[Event]:
+    def _of(self, tags: Iterable[str], old: Container[str], arrival: EventKind, alliance: Alliance) -> list[Event]:
         """Who came, and who was hurt or healed, of some units."""
         changed = self._changed_as(alliance)
         found = []
-        for unit in units:
-            tag = unit.tag
+        for tag in tags:
             if tag not in old:
-                found.append(event(arrival, unit, alliance))
+                found.append(event(arrival, self._now[tag], alliance))
             elif tag in changed:
                 found.append(changed[tag])
         return found
@@ -81,7 +84,3 @@ class Events:
 def event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
     """What happened to a unit."""
     return Event(what=what, tag=unit.tag, type=unit.type, alliance=alliance, amount=amount)
-
-
-def _all(view: TeamView) -> Iterable[UnitView]:
-    return chain(view.units, view.allies, view.enemies)

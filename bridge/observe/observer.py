@@ -99,7 +99,7 @@ class Observer:
     def _agent(self, scene: Scene, agent: AgentConfig) -> AgentSight:
         episode, parts = self._episode, self._parts[agent.name]
         before = episode.sight.agents.get(agent.name) if episode.sight else None
-        earlier = {team.view.name: team.view for team in before.teams} if before else {}
+        earlier = {team.view.name: team for team in before.teams} if before else {}
         builds = "resources" in parts and agent.kind == "builder"
         teams = []
         for team in episode.roster.teams(agent.name):

@@ -23,7 +23,7 @@ from bridge.frames import CAMERA_WIDTH, Camera, MapFrame
 from bridge.knowledge import knowledge
 from bridge.names import upgrade_name
 from bridge.observe.body import body, rounded
-from bridge.observe.events import Events
+from bridge.observe.events import Events, Witnessed
 from bridge.observe.possible import Possible
 from bridge.observe.sight import TeamSight
 from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
@@ -74,6 +74,7 @@ class Scene:
         """Puts the bodies in order as arrays: one row a body, in ascending order of tags."""
         order = self._order = tuple(self.bodies.values())
         self._index = {b.tag: index for index, b in enumerate(order)}
+        self._tags = [b.view.tag for b in order]
         self._x = np.array([b.x for b in order], dtype=float)  # world
         self._y = np.array([b.y for b in order], dtype=float)
         ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
@@ -104,7 +105,7 @@ class Scene:
             upgrades=self.upgrades,
         )
 
-    def team(self, agent: AgentConfig, team: Team, before: TeamView | None, *, resources: bool = False) -> TeamSight:
+    def team(self, agent: AgentConfig, team: Team, before: TeamSight | None, *, resources: bool = False) -> TeamSight:
         """What one team sees.
 
         Args:
@@ -132,7 +133,12 @@ class Scene:
             resources=self._resources_on(camera) if resources else (),
             bounds=_edges(camera.bounds(self.world)),
         )
-        return TeamSight(team, camera, view.but(events=self.events.of_team(before, view)))
+        tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
+        events = self.events.of_team(before.view, before.tags, tags) if before else ()
+        return TeamSight(team, camera, view.but(events=events), tags)
+
+    def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
+        return tuple([self._tags[row] for row in rows.tolist()])
 
     def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Alliance) -> tuple[UnitView, ...]:
         points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)

@@ -6,9 +6,10 @@ Cameras, tags and the snapshot stay on the host; no world coordinate is in a vie
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from bridge.observe.events import Witnessed
 from bridge.observe.possible import unmet
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ class TeamSight:
     camera: Camera | None
     """None for a team without units, which orders those of the whole side."""
     view: TeamView
+    tags: Witnessed = field(default_factory=Witnessed)
+    """Tags of the units in the view."""
 
 
 @dataclass(frozen=True, slots=True)
