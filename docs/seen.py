@@ -1,0 +1,208 @@
+"""Writes down what one agent of each kind sees at a moment of a game: `python -m docs.seen`.
+
+Two games on the simulator from a fixed seed, played by the scripted player `skilled` from the texts alone; at a chosen
+decision the observations are kept as they go over the bus. Pictures go to docs/images/seen, and they and the texts to
+docs/design/four-observations.md.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from agents.llm.vision import ANTHROPIC, OPENAI
+from agents.scripted.players import PLAYERS
+from bridge.imagespec import ImageSpec
+from khala.local import one_side
+from orchestrator.config import MatchConfig, load_task
+from orchestrator.host import assemble
+from orchestrator.roster import Seat
+from orchestrator.turn import Answer, Answers
+from protocol.messages import Message, Reply
+from protocol.speech import parse
+from simulator.install import install
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from bridge.task import TaskConfig
+    from orchestrator.turn import Question
+    from protocol.messages import Briefing, ImageRef, Report, Result
+
+DOCS = Path(__file__).parent
+OUT = DOCS / "images" / "seen"
+PAGE = DOCS / "design" / "four-observations.md"
+PREFACE = """# Four observations, with their pictures
+
+What one agent of each kind is sent at one moment of a game, word for word, with the pictures that the paper gives to
+the kind. `python -m docs.seen` makes this page from two games on the simulator, which the scripted player `skilled`
+plays from these texts alone. How texts are composed is told in [what an agent sees](observation.md), how pictures are
+switched on and what is on them in [images](../how-to/images.md). Sizes are of the bytes that go over the bus; tokens
+are estimates, for Anthropic's and for OpenAI's models.
+"""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One observation: whose it is, and which pictures go with it."""
+
+    game: str
+    agent: str
+    title: str
+    about: str
+    images: tuple[str, ...]
+
+
+GAMES = {"pvz_task6_level1": 20, "simple64_eceb": 130}
+"""Task → the decision at which its agents are looked at."""
+SCENES = {
+    "combat_group": Scene(
+        "pvz_task6_level1",
+        "CombatGroup6",
+        "CombatGroup",
+        "Four Sentries at the ramp of their base. Force fields have cut a swarm in two, and storms fall on its wings.",
+        ("screen", "minimap"),
+    ),
+    "commander": Scene(
+        "simple64_eceb",
+        "Commander",
+        "Commander",
+        "A full game after four minutes. It orders the army as a whole.",
+        ("minimap",),
+    ),
+    "developer": Scene(
+        "simple64_eceb",
+        "Developer",
+        "Developer",
+        "The same moment. It trains, researches and builds, and the host finds producers and places.",
+        ("minimap",),
+    ),
+    "builder": Scene(
+        "simple64_eceb",
+        "Builder",
+        "Builder",
+        "The same moment, seen by the Builder of `simple64_ecsb`: one Probe that places structures by hand.",
+        ("screen", "minimap", "layer:power", "layer:pathable", "layer:buildable"),
+    ),
+}
+"""By kind of agent; the pictures are those that the paper gives to the kind."""
+
+
+class Stop(Exception):  # no error
+    """The moment has come."""
+
+
+class Played:
+    """Agents that answer at once, by a script; at a chosen step what they are asked is kept."""
+
+    def __init__(self, step: int) -> None:
+        self.questions: dict[str, Question] = {}
+        self._step = step
+
+    async def ask(self, questions: Iterable[Question]) -> Answers:
+        """The answers of one step."""
+        asked = list(questions)
+        self.questions = {question.observation.agent: question for question in asked}
+        if asked[0].observation.step >= self._step:
+            raise Stop
+        answers: dict[Seat, Answer] = {}
+        messages: list[Message] = []
+        for seen, _ in asked:
+            text = PLAYERS["skilled"](seen.text, random.Random(seen.step))
+            place = {"run": seen.run, "agent": seen.agent, "side": seen.side, "episode": 0, "step": seen.step}
+            answers[Seat(seen.side, seen.agent)] = Answer("ok", Reply.model_validate({**place, "text": text}))
+            messages += (
+                Message.model_validate({**place, "recipient": said.recipient, "text": said.text})
+                for said in parse(text).messages
+            )
+        return Answers(answers, tuple(messages))
+
+
+class Nobody:
+    """Who is told nothing."""
+
+    async def brief(self, briefing: Briefing) -> None:
+        """Is not told."""
+
+    async def report(self, report: Report) -> None:
+        """Is not told."""
+
+    async def result(self, result: Result) -> None:
+        """Is not told."""
+
+
+async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Question]:
+    """What each agent of a task is asked at a step, by its name.
+
+    Args:
+        task: what is played.
+        step: a number of decisions.
+        sc2path: where the simulator is.
+    """
+    config = MatchConfig(task=task, run="seen")
+    asking = Played(step)
+    async with one_side(config, sc2path) as game:
+        try:
+            async for _ in assemble(config, game, asking, Nobody()).play():
+                pass
+        except Stop:
+            pass
+    return asking.questions
+
+
+def task_of(game: str) -> TaskConfig:
+    """The task of a game, with the pictures of its scenes; a Builder joins the one that has none."""
+    task = load_task(game)
+    agents = {agent.name: agent for agent in task.agents}
+    for scene in SCENES.values():
+        if scene.game == game:
+            agent = agents.get(scene.agent) or load_task("simple64_ecsb").agent(scene.agent)
+            images = tuple(ImageSpec(what=what, format="webp", max_teams=1) for what in scene.images)
+            agents[agent.name] = agent.model_copy(update={"images": images})
+    return task.model_copy(update={"agents": tuple(agents.values())})
+
+
+def page(questions: Mapping[str, Question]) -> Iterator[str]:
+    """The page of what agents were asked, by scene, line by line."""
+    yield PREFACE
+    for kind, scene in SCENES.items():
+        seen = questions[kind].observation
+        yield f"## {scene.title}\n"
+        yield f"{scene.about} Agent `{scene.agent}` of `{scene.game}`, decision {GAMES[scene.game]}.\n"
+        for place, image in enumerate(seen.images, 1):
+            yield f"> {image.title} ({_size(image)})\n"
+            yield f"![{scene.title}, picture {place}](../images/seen/{kind}-{place}.webp)\n"
+        yield f"```text\n{seen.text.rstrip()}\n```\n"
+
+
+def _size(image: ImageRef) -> str:
+    tokens = f"{ANTHROPIC.tokens(image.width, image.height)} or {OPENAI.tokens(image.width, image.height)} tokens"
+    return f"{image.width} x {image.height}, {image.bytes / 1000:.0f} kB, {tokens}"
+
+
+def main() -> None:
+    """Plays both games and writes the page with its pictures."""
+    questions: dict[str, Question] = {}
+    with tempfile.TemporaryDirectory() as directory:
+        sc2path = install(Path(directory) / "sc2")
+        for game, step in GAMES.items():
+            asked = asyncio.run(play(task_of(game), step, sc2path))
+            questions |= {kind: asked[scene.agent] for kind, scene in SCENES.items() if scene.game == game}
+    OUT.mkdir(parents=True, exist_ok=True)
+    for old in OUT.iterdir():
+        old.unlink()
+    for kind, question in questions.items():
+        for place, picture in enumerate(question.pictures, 1):
+            (OUT / f"{kind}-{place}.webp").write_bytes(picture)
+        size = len(question.observation.text) / 1000
+        sys.stdout.write(f"{kind}: {size:.1f} kB of text, {len(question.pictures)} picture(s)\n")
+    PAGE.write_text("\n".join(page(questions)).rstrip() + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

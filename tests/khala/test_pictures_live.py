@@ -1,0 +1,95 @@
+"""A battle on the simulator with pictures: sent, recorded, and the same again in a replay."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+import pytest
+
+from agents.pictures import Pictures
+from agents.worker import run_worker
+from bridge.imagespec import ImageSpec
+from khala.local import one_side
+from orchestrator.config import MatchConfig, change, load_task
+from orchestrator.host import host
+from orchestrator.replay import replay
+from protocol.bus.memory import MemoryBroker
+from protocol.messages import Observation
+from protocol.recording import Recording
+from simulator.install import install
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bridge.task import TaskConfig
+    from protocol.messages import Briefing
+
+pytestmark = pytest.mark.game
+
+STEPS = 3
+SPECS = {
+    "Stalkers": (
+        ImageSpec(what="screen", format="png"),
+        ImageSpec(what="screen", source="game", size_px=256, format="png"),
+        ImageSpec(what="features", source="auto"),
+    ),
+    "Zealots": (
+        ImageSpec(what="minimap", source="game", size_px=256),
+        ImageSpec(what="minimap:camera", size_px=256),
+    ),
+}
+
+
+def task_with_pictures() -> TaskConfig:
+    task = change(load_task("2s3z_pair"), max_wait_s=20.0, max_steps=STEPS)
+    agents = tuple(agent.model_copy(update={"images": SPECS[agent.name]}) for agent in task.agents)
+    return task.model_copy(update={"agents": agents})
+
+
+class Looking:
+    """A policy that charges, and keeps what it sees."""
+
+    def __init__(self) -> None:
+        self.pictures = Pictures()
+        self.seen: dict[str, bytes] = {}
+
+    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+        self.seen |= await self.pictures.get(observation.images)
+        teams = "\n".join(f"Team {team.name}:\n<Move_Screen([16, 12])>" for team in observation.view.teams)
+        return f"Actions:\n{teams}"
+
+
+async def test_a_battle_with_pictures_is_recorded_and_replayed_to_the_pixel(tmp_path: Path) -> None:
+    config = MatchConfig(task=task_with_pictures(), run="live", record=tmp_path / "r.mcap")
+    assert config.task.render_px == 256
+    broker, policies, stop = MemoryBroker(), {name: Looking() for name in SPECS}, asyncio.Event()
+    workers = [
+        asyncio.create_task(run_worker(broker.session(), "live", "blue", name, policy, stop=stop))
+        for name, policy in policies.items()
+    ]
+    sc2path = install(tmp_path / "sc2")
+    async with one_side(config, sc2path) as game:
+        await host(config, game, broker.session())
+    stop.set()
+    await asyncio.gather(*workers)
+
+    recording = Recording.open(tmp_path / "r.mcap")
+    named = {ref.sha256: ref for seen in recording.of(Observation) for ref in seen.images}
+    held = dict(recording.images())
+    assert held.keys() == named.keys() == policies["Stalkers"].seen.keys() | policies["Zealots"].seen.keys()
+    for digest, data in held.items():
+        assert hashlib.sha256(data).hexdigest() == digest
+        decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        assert decoded is not None
+        assert decoded.shape[:2] == (named[digest].height, named[digest].width)
+    names = [[ref.name for ref in seen.images] for seen in recording.observations("Zealots")]
+    assert names == [["minimap", "minimap-camera"]] * STEPS
+    rendered = [ref.title for ref in named.values() if "rendered by the game" in ref.title]
+    assert rendered, "the simulator renders"
+
+    async with one_side(config.model_copy(update={"record": None}), sc2path) as game:
+        assert await replay(recording, game) == []
