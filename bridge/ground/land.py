@@ -55,6 +55,8 @@ class Land:
         self._bodies: list[raw_pb2.Unit] = []
         for unit in self._raw.units:
             found = stands_on(unit.unit_type)
+            if unit.display_type == raw_pb2.Placeholder:
+                continue  # what is only ordered is known by the order of its builder
             if found is not None:
                 self._standing.append((found[0], found[1], unit))
             elif unit.alliance != raw_pb2.Self and not unit.is_flying:

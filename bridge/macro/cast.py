@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def cast(ask: Ask) -> list[Order]:
-    """Lets one unit that can now use an ability, at what the words name: that with the most energy, then the nearest.
+    """Lets one unit that can now use an ability, at what the words name.
+
+    If it has to go there, the nearest one; if the whole map is in reach, that with the most energy.
 
     Raises:
         Impossible: no unit can.
@@ -98,7 +100,7 @@ def note(ask: Ask, unit: Unit) -> None:
 
 
 def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
-    """Every unit that can use the action's ability now: the most energy first, then the nearest; never none."""
+    """Every unit that can use the action's ability now, that which should first; never none."""
     named = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
     units = finished(named or of_types(ask.snapshot, ask.action.units))
     if not units:
@@ -119,8 +121,11 @@ def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
     if not ready:
         raise never(ask, f"the game does not take it from your {name(able[0])} at this moment; try again later.")
 
+    goes = facts is not None and facts.range is not None
+
     def rank(unit: Unit) -> tuple[float, float, int]:
-        return -int(_energy(ask, unit)), 0.0 if where is None else math.dist(place(unit), where), unit.tag
+        away, energy = 0.0 if where is None else math.dist(place(unit), where), -float(int(_energy(ask, unit)))
+        return (away, energy, unit.tag) if goes else (energy, away, unit.tag)
 
     return sorted(ready, key=rank)
 

@@ -111,8 +111,10 @@ def free_base(ask: Ask, land: Land, structure: str) -> WorldPoint:
 
 
 def _is_held(land: Land, place_: WorldPoint) -> bool:
-    """Whether somebody's town hall stands at a place, though not on its very cells."""
-    return any(math.dist(place(hall), place_) < OWN_GAS for hall in land.halls)
+    """Whether somebody's town hall stands at a place or near it, or one of an enemy who began there is likely to."""
+    unseen = not land.sight[int(place_.x), int(place_.y)]
+    begun = unseen and any(math.dist(start, place_) < OWN_GAS for start in land.ground.starts)
+    return begun or any(math.dist(place(hall), place_) < OWN_GAS for hall in land.halls)
 
 
 def free_geyser(ask: Ask, geysers: list[Unit]) -> Unit:

@@ -157,9 +157,7 @@ def test_when_all_was_seen_places_out_of_sight_take_turns(make_game: Callable[..
     game.play(2)
     game.client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.show_map))
     game.play(2)
-    land = land_of(game.snapshot)
-    if not land.sight.all():
-        pytest.skip("this game forgets what its cheat showed")
+    assert land_of(game.snapshot).sight.all()
     first = goal(game.say("Worker_Scan"))
     game.play(1400)
     assert goal(game.say("Worker_Scan")) != first

@@ -186,11 +186,15 @@ def test_a_base_is_founded_where_nobody_looked_yet(make_game: Callable[..., Game
     hall = {"protoss": "Nexus", "terran": "CommandCenter", "zerg": "Hatchery"}[race]
     game = make_game(name, race)
     game.cheat(*FREE)
-    if len(land_of(game.snapshot).bases) == 2:  # the other one is the enemy's, which cannot be known
+    land = land_of(game.snapshot)
+    if len(land.bases) == 2:
+        said = "every place for a town hall that can be walked to is taken."  # one own, one where the enemy begins
+        assert game.refusal(f"Build_{hall}").message == f"Build_{hall} is not possible now: {said}"
         return
     orders = game.say(f"Build_{hall}")
     place = built(orders)
     assert isinstance(place, WorldPoint)
+    assert place not in land.ground.starts
     assert game.may_stand(f"Build_{hall}_screen", place) == "Success"
     assert set(game.do(orders)) == {"Success"}
 
