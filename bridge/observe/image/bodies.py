@@ -86,7 +86,7 @@ def direction_of(facing: float, shape: Shape) -> int:
     return round(facing / (2 * math.pi) * DIRECTIONS) % DIRECTIONS if shape in _TURNED else 0
 
 
-@functools.lru_cache(8192)
+@functools.lru_cache(2048)
 def body(look: Look) -> Stamp:
     """The stamp of a look; the unit is in its middle."""
     half = math.ceil(look.radius_px * _REACH) + 3

@@ -1,5 +1,7 @@
 """Marks: the digits of a unit's tag beside it, so that what is seen can be named, put where they hide least.
 
+On large bodies they stand below the letters of the type, beside all others.
+
     0x1_0014_0001    the mark is `014`
 
 A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before);
@@ -33,6 +35,8 @@ _WORST = 0.5
 """A mark of which more than this share would lie over other marks is left out."""
 _OVER_MARK, _OVER_BODY, _FAR = 4.0, 1.0, 0.15
 """What it costs to lie over a mark or a body, as shares of the mark, and to be a ring further away."""
+_ROOMY_PX = 30
+"""Radius of a body that has room for its mark."""
 _RINGS_PX = (2, 13, 24)
 """Free pixels between a body and its mark; from the second ring on a line leads to it."""
 
@@ -130,6 +134,10 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
     right_most, lowest = hidden.width - width, hidden.height - height
     bits, count = hidden.bits(width, height)
     marks, bodies = hidden.taken, covered.taken
+    if one.radius >= _ROOMY_PX:
+        left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
+        if 0 <= left <= right_most and 0 <= top <= lowest and not marks >> hidden.at(left, top) & bits:
+            return _Spot(left, top, 0, (one.x, one.y))
     best, lowest_cost = None, math.inf
     for ring, gap in enumerate(_RINGS_PX):
         if lowest_cost < _FAR * ring:

@@ -33,7 +33,7 @@ def of_screen(team: str, extent: float, legend: Legend) -> str:
         parts.append("letters: " + ", ".join(f"{code} {name}" for code, name in legend.codes.items()))
     if legend.example:
         mark, tag = legend.example
-        parts.append(f"a mark beside a unit is the part of its tag before the last four digits, {mark} is {hex(tag)}")
+        parts.append(f"a mark at a unit is the part of its tag before the last four digits, {mark} is {hex(tag)}")
     if legend.unmarked:
         parts.append(f"{legend.unmarked} unit{'s have' if legend.unmarked > 1 else ' has'} no mark for want of room")
     return "; ".join(part for part in parts if part) + "."

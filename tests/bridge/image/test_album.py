@@ -107,7 +107,7 @@ def test_quality_makes_files_smaller(show: Show) -> None:
 def test_without_marks_there_are_neither_letters_nor_digits(show: Show) -> None:
     plain, marked = (show({"what": "screen", "marks": marks, "max_teams": 1})[0] for marks in (False, True))
     assert "letters" in marked.title
-    assert "a mark beside a unit" in marked.title
+    assert "a mark at a unit" in marked.title
     assert "letters" not in plain.title
     assert "mark" not in plain.title
 
@@ -216,7 +216,7 @@ TITLES = [
             "Screen of team Stalker-1, from [0, 0] at the top left to [24, 24]",
             "blue: this team, red: enemies",
             "letters: ST Stalker, ZE Zealot",
-            "a mark beside a unit is the part of its tag before the last four digits, 014 is 0x100140001",
+            "a mark at a unit is the part of its tag before the last four digits, 014 is 0x100140001",
             "2 units have no mark for want of room.",
         ],
     ),

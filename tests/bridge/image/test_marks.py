@@ -48,6 +48,16 @@ def test_marks_of_units_apart_stand_to_the_right_of_their_bodies() -> None:
         assert (rows.min() + rows.max()) / 2 == pytest.approx(20, abs=height / 2)
 
 
+def test_a_mark_of_a_large_body_stands_on_it() -> None:
+    image = np.zeros((200, 200, 3), np.uint8)
+    (placed,) = place(image, [Marked("014", "own", 100, 100, 50)], [], 8)
+    rows, columns = np.nonzero(image.any(axis=2))
+    assert placed.text == "014"
+    assert (columns.min() + columns.max()) / 2 == pytest.approx(100, abs=1)
+    assert rows.min() > 110
+    assert rows.max() < 150
+
+
 def test_no_two_marks_cover_each_other_by_more_than_half() -> None:
     image = np.zeros((400, 400, 3), np.uint8)
     units = [Marked(f"{k:03x}", "enemy", 150 + 14 * (k % 8), 150 + 14 * (k // 8), 7) for k in range(64)]
