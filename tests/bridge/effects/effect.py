@@ -38,6 +38,15 @@ _TRAITS: dict[str, Callable[[raw_pb2.Unit], object]] = {
     "other target": lambda unit: [(o.target_unit_tag, _rounded(o.target_world_space_pos)) for o in unit.orders],
 }
 _SHOWN = (raw_pb2.Visible, raw_pb2.Hidden, raw_pb2.Placeholder)
+_PURSE = ("minerals", "vespene", "food_used")
+_OF_THE_MOMENT = (
+    *(f" {gauge}" for gauge in _GAUGES),
+    " moved",
+    " can ",
+    " other target",
+    " passengers",
+    " dropped an order",
+)
 
 
 class Seen(NamedTuple):
@@ -57,6 +66,11 @@ def changes(idle: Seen, told: Seen) -> frozenset[str]:
     found |= {f"gone {name}" for name in _more(before, after)} | {f"new {name}" for name in _more(after, before)}
     found |= set(_of_player(idle.snapshot.response, told.snapshot.response))
     return frozenset(found)
+
+
+def kinds(words: frozenset[str]) -> frozenset[str]:
+    """The words that do not depend on the very moment: orders, types, buffs, traits, who comes and who goes."""
+    return frozenset(word for word in words if not (word in _PURSE or any(g in word for g in _OF_THE_MOMENT)))
 
 
 def _units(seen: Seen) -> dict[int, raw_pb2.Unit]:
@@ -111,7 +125,7 @@ def _of_card(name: str, tag: int, idle: Seen, told: Seen) -> Iterator[str]:
 
 
 def _of_player(idle: sc.ResponseObservation, told: sc.ResponseObservation) -> Iterator[str]:
-    for gauge in ("minerals", "vespene", "food_used"):
+    for gauge in _PURSE:
         if getattr(told.observation.player_common, gauge) != getattr(idle.observation.player_common, gauge):
             yield gauge
     upgrades = set(told.observation.raw_data.player.upgrade_ids) - set(idle.observation.raw_data.player.upgrade_ids)

@@ -38,13 +38,13 @@ class Performance(NamedTuple):
     """Whether the last reply was an action of the catalogue that may be done."""
 
 
-def perform(case: Case, stage: Stage, executor: Executor) -> Performance:
-    """Says it in the ways that the stage offers, until one of them has an effect."""
+def perform(case: Case, stage: Stage, executor: Executor, said: str | None = None) -> Performance:
+    """Says it in the ways that the stage offers, until one of them has an effect; or only as it was `said` before."""
     task, seen = task_of(case), stage.again()
     sight = Observer(task).observe(seen.snapshot)
     refusals: list[str] = []
     text, accepted, played = "", False, 0
-    for text in islice(replies(case, stage, sight), SAID):
+    for text in islice(replies(case, stage, sight), SAID) if said is None else (said,):
         joint = Actor(task).joint(sight, {AGENT: parse(text)})
         refusals += [rejection.message for rejection in joint.rejections[AGENT]]
         accepted = bool(joint.accepted[AGENT])

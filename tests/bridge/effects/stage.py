@@ -40,7 +40,7 @@ OWN = (
     ("Pylon", 38, 28), ("SupplyDepot", 27, 42), ("Barracks", 22.5, 40.5), ("CyberneticsCore", 34.5, 24.5),
     ("ShieldBattery", 36, 38),
     ("Marine", 34, 35), ("Stalker", 35.5, 35.5), ("SiegeTank", 34, 29), ("VikingFighter", 31, 36),
-    ("Zergling", 29, 30), ("HighTemplar", 34, 37), ("Roach", 28, 32), ("Medivac", 29, 28), ("Queen", 27, 27),
+    ("Zergling", 31.5, 28), ("HighTemplar", 34, 37), ("Roach", 28, 36.5), ("Medivac", 29, 28), ("Queen", 27, 27),
     ("Overlord", 26, 33),
 )  # fmt: skip
 """What the player has around the unit that is told to do something."""

@@ -11,6 +11,7 @@ SPRAY = "paints the ground, which changes nothing in the game; the simulator has
 SHOOTERS_CHOOSE = (
     "told a point and no unit, those in a Bunker choose for themselves whom to shoot at, as they did before"
 )
+NEEDS_NO_POINT = "PySC2 offers a function of the screen only for what must have a point, and an add-on need not"
 SINGLE = "Select_Unit_"
 
 BY_RAW: dict[str, str] = {
@@ -30,6 +31,15 @@ BY_RAW: dict[str, str] = {
     "Effect_Spray_Zerg_Minimap": SPRAY,
 }
 """Through the raw interface."""
+BY_SCREEN: dict[str, str] = BY_RAW | dict.fromkeys(
+    (
+        f"Build_{addon}{at}_Screen"
+        for addon in ("TechLab", "Reactor")
+        for at in ("", "_Barracks", "_Factory", "_Starport")
+    ),
+    NEEDS_NO_POINT,
+)
+"""Through camera, selection and screen."""
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:
