@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from bridge.act.addressee import Addressees
 from bridge.act.raw import RawExecutor
 from bridge.act.recognise import recognise
 from bridge.act.screen import ScreenExecutor
@@ -78,11 +79,12 @@ class Actor:
         self, translator: Translator, agent: AgentSight, speech: Speech
     ) -> tuple[list[Command], list[str], list[Rejection]]:
         words = self._words[agent.agent.name]
+        addressees = Addressees(agent, words)
         commands: list[Command] = []
         accepted: list[str] = []
         faults: list[Rejection] = []
         for call in speech.calls:
-            recognised = recognise(call, agent, words)
+            recognised = recognise(call, words, addressees)
             if isinstance(recognised, Rejection):
                 faults.append(recognised)
                 continue

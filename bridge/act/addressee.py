@@ -40,76 +40,83 @@ _BETWEEN = re.compile(r"\s*[,;&/+、]\s*(?:and\b)?\s*|\s+(?:and|und|et|y|e|и)\s
 _TEAM_WORD = re.compile(r"(?:the\s+)?teams?\s+", re.IGNORECASE)
 
 
-def addressed(
-    heading: str | None, action: Action, tags: Sequence[int], agent: AgentSight, words: Vocabulary
-) -> Sequence[TeamSight]:
-    """The teams that a call speaks to, at least one.
+class Addressees:
+    """The teams of one agent, as the calls of a reply may speak to them."""
 
-    Args:
-        heading: the team as written above the call; None if there was none.
-        action: what they are to do.
-        tags: the tags among its arguments.
-        agent: whose teams they are.
-        words: the names that the agent may say.
+    def __init__(self, agent: AgentSight, words: Vocabulary) -> None:
+        """Takes what the agent sees now, which names its teams, and the names that it may say."""
+        self._agent = agent
+        self._words = words
+        self._by_name = {squashed(team.view.name): team for team in agent.teams}
 
-    Raises:
-        Refused: no team is meant, or one that is not there, or more than one may be.
-    """
-    if not agent.teams:
-        raise Refused("unknown_team", "You have no units left, so no team can act.")
-    able = [team for team in agent.teams if words.has(team, action)]
-    if heading is None:
-        return [_unnamed(action, tags, agent, able)]
-    named = _named(heading, agent, able)
-    of_side = [team for team in able if not team.team.tags]
-    if action.subject == "side" and len(of_side) == 1 and not any(team in able for team in named):
-        return of_side
-    return named
+    def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamSight]:
+        """The teams that a call speaks to, at least one.
 
+        Args:
+            heading: the team as written above the call; None if there was none.
+            action: what they are to do.
+            tags: the tags among its arguments.
 
-def _unnamed(action: Action, tags: Sequence[int], agent: AgentSight, able: Sequence[TeamSight]) -> TeamSight:
-    """The team that is meant where none is named."""
-    if len(agent.teams) == 1:
-        return agent.teams[0]
-    if action.named:
-        owners = [team for team in agent.teams if tags[0] in team.team.tags]
-        if len(owners) == 1:
-            return owners[0]
-    if len(able) == 1:
-        return able[0]
-    ask = 'write "Team <name>:" above the action'
-    raise Refused("unknown_team", f"No team is named: {ask}; {_your_teams(agent)}")
+        Raises:
+            Refused: no team is meant, or one that is not there, or more than one may be.
+        """
+        if not self._agent.teams:
+            raise Refused("unknown_team", "You have no units left, so no team can act.")
+        if heading is None:
+            return [self._unnamed(action, tags)]
+        named = self._named(heading, action)
+        if action.subject == "side" and not any(self._words.has(team, action) for team in named):
+            of_side = [team for team in self._able(action) if not team.team.tags]
+            return of_side if len(of_side) == 1 else named
+        return named
 
+    def listening(self, heading: str | None) -> Sequence[TeamSight]:
+        """The team of a heading, or all of them."""
+        team = None if heading is None else self._one(heading)
+        return self._agent.teams if team is None else [team]
 
-def _named(heading: str, agent: AgentSight, able: Sequence[TeamSight]) -> Sequence[TeamSight]:
-    """The teams that a heading names."""
-    plain = squashed(heading)
-    if team := _one(heading, agent):
-        return [team]
-    if plain in ALL or (plain in BOTH and len(agent.teams) == len("AB")):
-        return able or agent.teams
-    several = [_one(_TEAM_WORD.sub("", part), agent) for part in _BETWEEN.split(heading) if part.strip()]
-    if len(several) > 1 and None not in several:
-        return list({team.view.name: team for team in several if team is not None}.values())
-    if plain in map(squashed, agent.idle_teams):
-        raise Refused("unknown_team", f"Team {heading} has no units left; {_your_teams(agent)}")
-    by_name = {squashed(team.view.name): team.view.name for team in agent.teams}
-    close = difflib.get_close_matches(plain, by_name, n=1, cutoff=0.75)
-    meant = f"did you mean {by_name[close[0]]}? Your" if close else "your"
-    raise Refused("unknown_team", f"You have no team {heading}; {_your_teams(agent, meant)}")
+    def _able(self, action: Action) -> list[TeamSight]:
+        """The teams that may ever be told to do it."""
+        return [team for team in self._agent.teams if self._words.has(team, action)]
 
+    def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamSight:
+        """The team that is meant where none is named."""
+        teams = self._agent.teams
+        if len(teams) == 1:
+            return teams[0]
+        owners = [team for team in teams if tags[0] in team.team.tags] if action.named else []
+        for candidates in (owners, self._able(action)):
+            if len(candidates) == 1:
+                return candidates[0]
+        ask = 'write "Team <name>:" above the action'
+        raise Refused("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
 
-def _one(name: str, agent: AgentSight) -> TeamSight | None:
-    """The one team that a name can mean."""
-    plain = squashed(name)
-    by_name = {squashed(team.view.name): team for team in agent.teams}
-    if found := by_name.get(plain):
-        return found
-    if plain == squashed(agent.agent.name) and len(agent.teams) == 1:
-        return agent.teams[0]
-    kinds = [team for written, team in by_name.items() if written.rstrip("0123456789") in (plain, plain.rstrip("s"))]
-    return kinds[0] if len(kinds) == 1 else None
+    def _named(self, heading: str, action: Action) -> Sequence[TeamSight]:
+        """The teams that a heading names."""
+        plain = squashed(heading)
+        if team := self._one(heading):
+            return [team]
+        if plain in ALL or (plain in BOTH and len(self._agent.teams) == len("AB")):
+            return self._able(action) or self._agent.teams
+        several = [self._one(_TEAM_WORD.sub("", part)) for part in _BETWEEN.split(heading) if part.strip()]
+        if len(several) > 1 and None not in several:
+            return list({team.view.name: team for team in several if team is not None}.values())
+        if plain in map(squashed, self._agent.idle_teams):
+            raise Refused("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
+        close = difflib.get_close_matches(plain, self._by_name, n=1, cutoff=0.75)
+        meant = f"did you mean {self._by_name[close[0]].view.name}? Your" if close else "your"
+        raise Refused("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
 
+    def _one(self, name: str) -> TeamSight | None:
+        """The one team that a name can mean."""
+        plain = squashed(name)
+        if found := self._by_name.get(plain):
+            return found
+        if plain == squashed(self._agent.agent.name) and len(self._agent.teams) == 1:
+            return self._agent.teams[0]
+        forms = (plain, plain.rstrip("s"))
+        kinds = [team for written, team in self._by_name.items() if written.rstrip("0123456789") in forms]
+        return kinds[0] if len(kinds) == 1 else None
 
-def _your_teams(agent: AgentSight, your: str = "your") -> str:
-    return f"{your} teams are {', '.join(team.view.name for team in agent.teams)}."
+    def _your_teams(self, your: str = "your") -> str:
+        return f"{your} teams are {', '.join(team.view.name for team in self._agent.teams)}."

@@ -12,9 +12,9 @@ The last two are inferred: the game shows neither the cooldown of an ability nor
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from bridge.knowledge import is_armed, knowledge, stand_ins
+from bridge.knowledge import ability_of, is_armed, knowledge, stand_ins
 from bridge.names import unit_name, upgrade_name
 
 if TYPE_CHECKING:
@@ -34,6 +34,14 @@ QUEUE_LENGTH = 5
 WITH_REACTOR = 8
 FINISHED = 1.0
 """Build progress of what is finished."""
+
+
+class Cost(NamedTuple):
+    """What a use takes from the accounts."""
+
+    minerals: float
+    vespene: float
+    supply: float
 
 
 class Means:
@@ -100,15 +108,17 @@ def energy(_: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str 
 
 def price(means: Means, facts: AbilityFacts, _: raw_pb2.Unit, name: str) -> str | None:
     """Minerals, vespene or supply do not suffice, after what earlier calls of the turn took."""
-    prices = (
-        ("minerals", facts.minerals, means.ledger.minerals),
-        ("vespene", facts.vespene, means.ledger.vespene),
-        ("supply", supply(facts, name), means.ledger.supply),
-    )
-    for what, cost, account in prices:
+    cost = cost_of(facts.id, name)
+    return None if cost is None else too_dear(means.ledger, cost)
+
+
+def too_dear(ledger: Ledger, cost: Cost) -> str | None:
+    """What a ledger lacks for a price, as the end of a sentence; None if it is there."""
+    accounts = ("minerals", ledger.minerals), ("vespene", ledger.vespene), ("supply", ledger.supply)
+    for (what, account), amount in zip(accounts, cost, strict=True):
         left = max(account, 0.0)
-        if cost > left:
-            return f"it takes {cost:g} {what} and {left:g} {'are' if what == 'minerals' else 'is'} left"
+        if amount > left:
+            return f"it takes {amount:g} {what} and {left:g} {'are' if what == 'minerals' else 'is'} left"
     return None
 
 
@@ -150,15 +160,23 @@ def incapable(function: Function, name: str) -> str:
     return f"{name} has no weapon" if is_attack(function) and not is_armed(name) else f"{name} has no such ability"
 
 
-def supply(facts: AbilityFacts, name: str) -> float:
-    """Supply that a use adds: what a unit becomes counts only above its own."""
-    return _supply(facts.produces, facts.supply, name)
+@functools.cache
+def facts_of(ability: int, name: str) -> AbilityFacts | None:
+    """What is known of an ability for a type of unit."""
+    return ability_of(ability, name)
 
 
 @functools.cache
-def _supply(produces: str | None, whole: float, name: str) -> float:
-    made, before = knowledge().get(produces or ""), knowledge().get(name)
-    if made is None or made.structure:
-        return 0.0
+def cost_of(ability: int, name: str) -> Cost | None:
+    """What the use of an ability by a type of unit costs; None if it is free.
+
+    What a unit becomes takes supply only above its own.
+    """
+    facts, before = facts_of(ability, name), knowledge().get(name)
+    if facts is None:
+        return None
+    made = knowledge().get(facts.produces or "")
     own = before.supply if before is not None and not before.structure else 0.0
-    return max(whole - own, 0.0)
+    supply = 0.0 if made is None or made.structure else max(facts.supply - own, 0.0)
+    cost = Cost(facts.minerals, facts.vespene, supply)
+    return cost if any(cost) else None

@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bridge.act.addressee import addressed
 from bridge.act.refused import Refused, reject
-from protocol.speech import render
+from protocol.speech import written
 
 if TYPE_CHECKING:
+    from bridge.act.addressee import Addressees
     from bridge.act.vocabulary import Vocabulary
     from bridge.action import Action, ArgKind
-    from bridge.observe.sight import AgentSight, TeamSight
+    from bridge.observe.sight import TeamSight
     from protocol.messages import Call, Point, Rejection
 
 __all__ = ["Recognised", "Refused", "recognise", "reject"]
@@ -57,37 +57,31 @@ class Recognised:
     @property
     def written(self) -> str:
         """The call alone, as the catalogue would have it written: `<Attack_Unit(0x1)>`."""
-        tags = tuple(hex(tag) for tag in self.tags)
-        point = () if self.point is None else (self.point,)
-        return render(self.call.but(name=self.action.name, args=(*tags, *point)))
+        tags = tuple(map(hex, self.tags))
+        return written(self.action.name, tags if self.point is None else (*tags, self.point))
 
 
-def recognise(call: Call, agent: AgentSight, words: Vocabulary) -> list[Recognised] | Rejection:
+def recognise(call: Call, words: Vocabulary, addressees: Addressees) -> list[Recognised] | Rejection:
     """What a call means: one action, or one for each team if it speaks to several.
 
     Args:
         call: as read in the reply.
-        agent: what the agent sees now; it names its teams.
         words: the names that the agent may say.
+        addressees: the teams that it may speak to.
     """
     try:
-        action = _action(call, agent, words)
+        action = _action(call, words, addressees)
         tags, point = _arguments(call, action)
-        teams = addressed(call.team, action, tags, agent, words)
+        teams = addressees.meant(call.team, action, tags)
     except Refused as refused:
         return reject(call, refused)
     return [Recognised(call, action, team, tags, point) for team in teams]
 
 
-def _action(call: Call, agent: AgentSight, words: Vocabulary) -> Action:
+def _action(call: Call, words: Vocabulary, addressees: Addressees) -> Action:
     if action := words.find(call.name):
         return action
-    teams = [team for team in agent.teams if team.view.name == call.team] or agent.teams
-    meant, nearest = words.near(call.name, teams)
-    if meant:
-        hint = f"did you mean {nearest[0].form}?"
-    else:
-        hint = f"the nearest that you have are {', '.join(action.form for action in nearest)}."
+    hint = words.hint(call.name, addressees.listening(call.team))
     raise Refused("unknown_action", f"There is no action {call.name}; {hint}")
 
 

@@ -7,7 +7,6 @@ wrong target may be the worst one. Knows no ability of the units that are to do 
 
 from __future__ import annotations
 
-import difflib
 import functools
 from typing import TYPE_CHECKING
 
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 
 _SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
 _WHOSE = {raw_pb2.Self: "your own", raw_pb2.Ally: "your ally's", raw_pb2.Enemy: "an enemy", raw_pb2.Neutral: "nobody's"}
-SIMILAR = 0.8
-"""Similarity of two tags, 0 to 1, above which one may be a slip of the other; a digit of nine makes 0.9."""
+MOST_SLIPS = 2
+"""Wrong digits up to which a tag may be a slip of another one."""
 SHORTEST = 6
 """Characters that a tag which was cut needs to be known by: `0x1008`."""
 
@@ -156,19 +155,33 @@ class Targets:
 
     def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
         """The tag that was most likely meant, as the end of a sentence; None if none is like it."""
-        wanted, known = hex(tag), list(map(hex, tags))
-        cut = [one for one in known if len(wanted) >= SHORTEST and one.startswith(wanted)]
-        close = cut or difflib.get_close_matches(wanted, known, n=1, cutoff=SIMILAR)
-        if not close:
+        wanted = hex(tag)
+        slips = ((_slips(wanted, hex(known)), known) for known in tags)
+        _slip, meant = min(((slip, known) for slip, known in slips if slip is not None), default=(0, None))
+        if meant is None:
             return None
-        unit = self._units[int(close[0], 16)]
-        return f"did you mean {close[0]} ({unit_name(unit.unit_type)})?"
+        return f"did you mean {hex(meant)} ({unit_name(self._units[meant].unit_type)})?"
 
     def _out_of_sight(self, said: Recognised, unit: raw_pb2.Unit) -> Refused:
         x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
         what = f"{_SIDES[unit.alliance]} {unit_name(unit.unit_type)} {hex(unit.tag)}"
         away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
         return Refused("unknown_target", f"The {what} {away}; move there first.")
+
+
+def _slips(wanted: str, known: str) -> int | None:
+    """Slips between a tag as written and one that is there, if they are few: 0 for a tag that was only cut.
+
+    One digit too many or too few is one slip, up to two may be others. Two tags of units differ in two or three.
+    """
+    if known.startswith(wanted) and len(wanted) >= SHORTEST:
+        return 0
+    if len(wanted) == len(known):
+        wrong = sum(one != other for one, other in zip(wanted, known, strict=True))
+        return wrong if wrong <= MOST_SLIPS else None
+    shorter, longer = sorted((wanted, known), key=len)
+    dropped = (longer[:place] + longer[place + 1 :] for place in range(2, len(longer)))
+    return 1 if len(longer) == len(shorter) + 1 and shorter in dropped else None
 
 
 def _shows(camera: Camera | None, unit: raw_pb2.Unit) -> bool:

@@ -15,15 +15,16 @@ cancel a skill of the same reply, since here all commands of a turn reach the ga
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bridge.act.reasons import is_attack
+from bridge.act.reasons import facts_of, is_attack
 from bridge.act.refused import Refused, reject
 from bridge.act.targets import Targets
 from bridge.act.validity import Obstacle, Validity
 from bridge.frames import WorldPoint
-from bridge.knowledge import ability_of, knowledge
+from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger, Order
 from bridge.names import unit_name
 
@@ -169,7 +170,7 @@ class Translator:
             raise self._cannot(said, [nearest.text])
         if said.action.subject == "two_units" and len(able) < len(tags):
             raise self._cannot(said, [one.text for one in obstacles.values() if one])
-        facts = ability_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
+        facts = facts_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
         return able[:1] if facts is not None and facts.does in MAKERS else able
 
     @staticmethod
@@ -200,11 +201,16 @@ class Translator:
     @staticmethod
     def _hits(unit: raw_pb2.Unit, target: raw_pb2.Unit) -> bool:
         """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
-        mine, other = (knowledge().get(unit_name(one.unit_type)) for one in (unit, target))
-        if mine is None or other is None or not mine.weapons:
-            return True
-        planes = {*other.planes, "air"} - {"ground"} if target.is_flying else {*other.planes, "ground"}
-        return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
+        return _reaches(unit_name(unit.unit_type), unit_name(target.unit_type), target.is_flying)
+
+
+@functools.cache
+def _reaches(unit_type: str, target_type: str, is_flying: bool) -> bool:  # a key of the cache
+    mine, other = knowledge().get(unit_type), knowledge().get(target_type)
+    if mine is None or other is None or not mine.weapons:
+        return True
+    planes = {*other.planes, "air"} - {"ground"} if is_flying else {*other.planes, "ground"}
+    return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
 
 
 def _nearness(obstacle: Obstacle) -> tuple[int, float]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from bridge.act.reasons import REASONS, Means, incapable, is_attack, price, supply
-from bridge.knowledge import ability_of, is_armed, upgrades
+from bridge.act.reasons import REASONS, Means, cost_of, facts_of, incapable, is_attack, price, too_dear
+from bridge.knowledge import is_armed, upgrades
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
@@ -48,14 +48,15 @@ class Validity:
     def obstacle(self, action: Action, function: Function, unit: raw_pb2.Unit) -> Obstacle | None:
         """What stands in the way of a unit's doing an action with this function now; None if nothing does."""
         name = unit_name(unit.unit_type)
-        facts = ability_of(function.ability_id, name)
         able = None if self._abilities is None else self._abilities.get(unit.tag)
+        if able is not None and function.ability_id in able:
+            cost = cost_of(function.ability_id, name)
+            dear = None if cost is None else too_dear(self._means.ledger, cost)
+            return None if dear is None else Obstacle(REASONS.index(price) + 1, unit.energy, dear)
+        facts = facts_of(function.ability_id, name)
         if able is None or function.kind == "autocast":  # the game is not asked about switches
             reason = self._surely_not(action, function, name, facts)
             return None if reason is None else Obstacle(0, unit.energy, reason)
-        if function.ability_id in able:
-            dear = price(self._means, facts, unit, name) if facts else None
-            return None if dear is None else Obstacle(REASONS.index(price) + 1, unit.energy, dear)
         if facts is None:
             return Obstacle(0, unit.energy, incapable(function, name))
         found = ((rank, reason(self._means, facts, unit, name)) for rank, reason in enumerate(REASONS, start=1))
@@ -63,9 +64,8 @@ class Validity:
 
     def pay(self, function: Function, unit: raw_pb2.Unit) -> None:
         """Takes what a unit's use of a function costs from the accounts of the turn."""
-        name = unit_name(unit.unit_type)
-        if facts := ability_of(function.ability_id, name):
-            self._means.ledger.pay(facts.minerals, facts.vespene, supply(facts, name))
+        if cost := cost_of(function.ability_id, unit_name(unit.unit_type)):
+            self._means.ledger.pay(*cost)
 
     def _surely_not(self, action: Action, function: Function, name: str, facts: AbilityFacts | None) -> str | None:
         """What is sure without the game's word."""

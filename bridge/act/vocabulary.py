@@ -7,6 +7,8 @@ actions differ in nothing else; aliases of the catalogue count as names. Above i
 from __future__ import annotations
 
 import difflib
+import functools
+import itertools
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,8 +20,10 @@ if TYPE_CHECKING:
 
 CLOSE = 0.8
 """Similarity of two names, 0 to 1, above which one is taken for a slip of the other."""
+ALIKE = 0.7
+"""Likeness of two names, 0 to 2, above which one is worth mentioning where the other was said."""
 NEAREST = 3
-"""Actions that a refusal names when none is that close."""
+"""Actions that a refusal names at most."""
 
 
 class Vocabulary:
@@ -29,9 +33,10 @@ class Vocabulary:
         """Takes the names of all actions of its teams."""
         self._agent = agent
         self._actions: dict[str, Action] = {}
-        for action in agent.catalogue():
+        self._catalogue = agent.catalogue()
+        for action in self._catalogue:
             self._actions[squashed(action.name)] = action
-        for action in agent.catalogue():
+        for action in self._catalogue:
             for alias in action.aliases:
                 self._actions.setdefault(squashed(alias), action)
 
@@ -42,42 +47,51 @@ class Vocabulary:
     def has(self, team: TeamSight, action: Action) -> bool:
         """Whether a team may ever be told to do an action, with the units that it has now."""
         return action.name in team.team.config.actions or any(
-            action.name in self._agent.actions.get(unit_type, ()) for unit_type in _types(team)
+            action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
         )
 
-    def near(self, name: str, teams: Iterable[TeamSight]) -> tuple[bool, list[Action]]:
-        """Actions of some teams, or of all, whose names are most like a wrong one, the likest first.
+    def hint(self, name: str, teams: Iterable[TeamSight]) -> str:
+        """What some teams may be told instead of a wrong name, as the end of a sentence."""
+        wanted, words = squashed(name), _words(name)
+        known = list(self._sayable(list(teams)))
+        likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
+        ranked = sorted(known, key=lambda action: -likeness[action.name])[:NEAREST]
+        if ranked and difflib.SequenceMatcher(None, wanted, squashed(ranked[0].name)).ratio() >= CLOSE:
+            return f"did you mean {ranked[0].form}?"
+        alike = [action.form for action in ranked if likeness[action.name] >= ALIKE]
+        if alike:
+            return f"like it {'is' if len(alike) == 1 else 'are'} {', '.join(alike)}."
+        others = f" and {len(known) - NEAREST} others" if len(known) > NEAREST else ""
+        return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
 
-        Returns:
-            Whether the first one is most likely what was meant, and the actions, at most `NEAREST`.
-        """
-        teams = list(teams)
-        known = [a for a in self._agent.catalogue() if not teams or any(self.has(team, a) for team in teams)]
-        wanted = squashed(name)
-        ranked = sorted(known, key=lambda action: -_likeness(wanted, name, action))[:NEAREST]
-        meant = bool(ranked) and _ratio(wanted, squashed(ranked[0].name)) >= CLOSE
-        return meant, ranked
+    def _sayable(self, teams: list[TeamSight]) -> Iterable[Action]:
+        """What some teams may be told, in the order of the agent's catalogue; everything if there are none."""
+        if not teams:
+            return self._catalogue
+        names = {name for team in teams for name in team.team.config.actions}
+        types = {unit.type for team in teams for unit in team.view.units}
+        names.update(name for unit_type in types for name in self._agent.actions.get(unit_type, ()))
+        return [action for action in self._catalogue if action.name in names]
 
 
+@functools.lru_cache(maxsize=8192)
 def squashed(name: str) -> str:
     """A name without what models vary in it: case, underscores, blanks, hyphens."""
     return "".join(filter(str.isalnum, name)).casefold()
 
 
-def _likeness(wanted: str, name: str, action: Action) -> float:
-    """How like a name an action's is: by its letters, and by the words that both have."""
-    words, its_words = _words(name), _words(action.name)
-    shared = len(words & its_words) / max(len(words), 1)
-    return _ratio(wanted, squashed(action.name)) + shared
+def _likeness(pairs: frozenset[str], words: frozenset[str], known: str) -> float:
+    """How like a name another one is: by pairs of letters (Dice's coefficient), and by the words that both have."""
+    its_pairs = _pairs(squashed(known))
+    letters = 2 * len(pairs & its_pairs) / max(len(pairs) + len(its_pairs), 1)
+    return letters + len(words & _words(known)) / max(len(words), 1)
 
 
-def _words(name: str) -> set[str]:
-    return {word.casefold() for word in name.replace("-", "_").split("_")}
+@functools.lru_cache(maxsize=8192)
+def _pairs(name: str) -> frozenset[str]:
+    return frozenset(map("".join, itertools.pairwise(name)))
 
 
-def _ratio(one: str, other: str) -> float:
-    return difflib.SequenceMatcher(None, one, other).ratio()
-
-
-def _types(team: TeamSight) -> list[str]:
-    return list(dict.fromkeys(unit.type for unit in team.view.units))
+@functools.lru_cache(maxsize=8192)
+def _words(name: str) -> frozenset[str]:
+    return frozenset(name.replace("-", "_").casefold().split("_"))

@@ -55,8 +55,8 @@ say. The rules of tolerance, beside those of headings (H, `protocol.speech.headi
 | S33 | a message without angle brackets, as an element, with three quotes and `>` | `MessageTo(A, 'go')` |
 """
 
-from protocol.speech.arguments import render
+from protocol.speech.arguments import render, written
 from protocol.speech.reader import parse
 from protocol.speech.said import ListenTo, MessageTo, Speech
 
-__all__ = ["ListenTo", "MessageTo", "Speech", "parse", "render"]
+__all__ = ["ListenTo", "MessageTo", "Speech", "parse", "render", "written"]

@@ -12,7 +12,7 @@ Above it: `protocol.speech.reader`, which finds the calls.
 | A3 | a keyword in front of a value is dropped | `tag=0x1`, `Stalker 0x1` | `"0x1"` |
 | A4 | brackets around a lone tag are dropped | `[0x1]` | `"0x1"` |
 | A5 | two numbers in brackets of any kind are a point | `(3, 4)`, `[ 3 , 4 ]`, `[[3, 4]]`, `[3 4]` | `(3.0, 4.0)` |
-| A6 | two neighbouring numbers below 1000 without brackets are a point | `3, 4` | `(3.0, 4.0)` |
+| A6 | two neighbouring numbers below 1000 without brackets are a point | `3, 4`, `3 4` | `(3.0, 4.0)` |
 | A7 | fractions, exponents and signs are kept | `[-0.5, 1e1]` | `(-0.5, 10.0)` |
 | A8 | a comma (or semicolon) too many at the end is dropped | `0x1,` | `"0x1"` |
 | A9 | everything else is text, as written | `4295229441`, `[1, 2, 3]`, `0xZZ` | itself |
@@ -33,11 +33,11 @@ from typing import TYPE_CHECKING
 from protocol.speech.marks import QUOTES, Malformed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from protocol.messages import Call, Point
 
-_PADDING = " \t\n*$" + QUOTES
+_PADDING = " \t\n*$#" + QUOTES
 _NUMBER = r"[+-]?+(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+"
 _AXIS = r"[\"']?(?P<{0}>[xyXY])[\"']?\s*+[=:]\s*+"
 _APART = r"(?:\s*+[,;]\s*+|\s++)"
@@ -48,6 +48,7 @@ _POINT = re.compile(
 _AXES = re.compile(
     rf"(?<!\w){_AXIS.format('first')}(?P<one>{_NUMBER}){_APART}{_AXIS.format('second')}(?P<other>{_NUMBER})"
 )
+_TWO_NUMBERS = re.compile(r"([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?+)\s++([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?+)")
 _LONE_NUMBER = re.compile(_NUMBER)
 _HEX = r"0[xX]0*+[0-9a-fA-F]*+(?<=[0-9a-fA-F])"
 _TAG = re.compile(r"0[xX]0*+([0-9a-fA-F]*+)(?<=[0-9a-fA-F])")
@@ -65,7 +66,9 @@ def read_arguments(text: str) -> tuple[str | Point, ...]:
     Raises:
         Malformed: an argument other than the last is empty.
     """
-    plain = _AXES.sub(_in_order, text.replace("\\", " "))
+    plain = text.replace("\\", " ")
+    if "=" in plain or ":" in plain:
+        plain = _AXES.sub(_in_order, plain)
     pieces = [value for piece in _split(plain) for value in _apart(_strip(piece))]
     while pieces and not pieces[-1]:
         pieces.pop()
@@ -79,7 +82,12 @@ def render(call: Call) -> str:
 
     `protocol.speech.parse` reads it as the same name and arguments, for every call that it returned.
     """
-    return f"<{call.name}({', '.join(_write(argument) for argument in call.args)})>"
+    return written(call.name, call.args)
+
+
+def written(name: str, args: Iterable[str | Point]) -> str:
+    """The canonical text of a name and arguments."""
+    return f"<{name}({', '.join(map(_write, args))})>"
 
 
 def _split(text: str) -> Iterator[str]:
@@ -102,7 +110,7 @@ def _strip(piece: str) -> str:
 
 def _apart(piece: str) -> list[str]:
     """Rule A13: the tags and points of a piece that has several and nothing else."""
-    values = list(_VALUES.finditer(piece))
+    values = list(_VALUES.finditer(piece)) if " " in piece or '"' in piece else []
     if len(values) < len("AB"):
         return [piece]
     edges = [0, *(edge for value in values for edge in value.span()), len(piece)]
@@ -122,6 +130,8 @@ def _read_one(piece: str) -> str | Point:
             return found
     if remark := _REMARK.fullmatch(value):
         return _read_one(remark[1])
+    if two := _TWO_NUMBERS.fullmatch(value):
+        return float(two[1]), float(two[2])
     number = value.rstrip("])} \t")  # A12
     return number if _LONE_NUMBER.fullmatch(number) else piece
 

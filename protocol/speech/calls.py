@@ -16,12 +16,12 @@ from protocol.speech.marks import SHORT, Malformed
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
 _NAME = re.compile(r"<(?P<blank>\s*+)(?P<name>[A-Za-z](?:\\?+[\w-])*+)(?P<open>\s*+\\?+\()?")
 _SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4}+)\s*+\\?+\(")
-_CLOSE = re.compile(r"[\s\\)\]}]*+/?+\s*+\\?+>")
+_CLOSE = re.compile(r"[\s\\)\]}]*+[-=/]?+\s*+\\?+>")
 _CLOSE_BARE = re.compile(r"\s*+\\?+/?+\s*+\\?+>")
 _LOOSE = re.compile(r"(?:\s*+[:=]\s*+|\s++|(?=[\[{]))(?P<inside>[^<>\n]{1,200}?)\s*+/?+\s*+>")
 _ELEMENT = re.compile(r"(?P<inside>[^<>]{1,200}+)</\s*+(?P<name>[\w-]++)\s*+>")
 _LINE_ENDS = re.compile(r"[ \t]*+(?:$|[\n<,;.|#]|//|--|- |\()")
-_STANDS_ALONE = re.compile(r"[ \t`*_\"'\]})>|,;.]*+(?:$|\n|</|#|//|/\*|[-–—:(]|[A-Z]\w*+\()")  # noqa: RUF001  # dashes
+_STANDS_ALONE = re.compile(r"[ \t`*_\"'”’»」\]})>|,;.]*+(?:$|\n|</|#|//|/\*|[-–—:(]|[A-Z]\w*+\()")  # noqa: RUF001  # dashes
 _BRACKET = re.compile(r"[()\[\]{}<>]")
 _OPENED_BY = {")": "(", "]": "[", "}": "{"}
 _SEGMENT = re.compile(r"[^<>\n]*+>?")

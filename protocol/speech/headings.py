@@ -25,7 +25,7 @@ known to the bridge only.
 | H17 | sections and teams in other languages, also two at once | `Aktionen:`, `动作/Actions:`, `小队 A:` |
 | H18 | actions that are only spoken of, and actions that replace earlier ones | `Valid actions:`, `Final actions:` |
 | H19 | an explanation behind the actions belongs to the analysis | `Explanation:` |
-| H20 | a team that is named in a sentence right before a call | `Team A should <Stop()>` |
+| H20 | a team that is named in a sentence right before a call | `Team A should <Stop()>`, `A-1 will now <Stop()>` |
 | H21 | a team as a value of JSON | `"team": "Stalker-1"` |
 """
 
@@ -90,10 +90,11 @@ _SECTION = (
 )
 _GAP = r"(?:(?=[^\w\n<:,&/+]*+[,&/+])[^\w\n<:]*+|[^\w\n<:]++and[^\w\n<:]++)(?:teams?[ \t]+)?+"
 _SEVERAL = rf"{_WORD}(?:{_GAP}{_WORD}){{1,8}}+"
-_SHALL = r"[ \t]+(?:should|shall|will|must|can|to|needs?[ \t]+to)[ \t]*+(?=<)"
+_SHALL = r"[ \t]+(?:should|shall|will|must|can|to|needs?[ \t]+to)(?:[ \t]+(?:now|then|also|first))?[ \t]*+(?=<)"
 _TEAM = (
     rf"(?P<every>{words.EVERY_TEAM}){_CLOSE}:"
-    rf"|(?:for[ \t]+)?{_TEAM_WORD}(?:[^\w\n<]*+(?:(?P<team>{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}}){_CLOSE}:"
+    rf"|(?:for[ \t]+)?{_TEAM_WORD}(?:[^\w\n<]*+"
+    rf"(?:(?P<team>(?!teams?\b)(?:{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}})){_CLOSE}:"
     rf"|(?P<short>{_WORD}){_CLOSE}{_TO_EDGE}|(?P<shall>{_WORD}){_SHALL})|[^\w\n<:]*+:{_TO_EDGE})"
     rf"|(?!(?:my|our|the|this|your)\b)(?P<behind>{_LATIN})(?:{words.TEAM_BEHIND}){_CLOSE}:"
 )
@@ -101,11 +102,12 @@ _BARE = (
     rf"(?P<bare>[A-Za-z]\w*+(?:[.+-]\w++)*+){_CLOSE}:{_TO_EDGE}"
     rf"|(?P<numbered>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<]*+(?=<)"
     rf"|(?P<cell>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<|]*+\|(?=[^\n<]*+<)"
-    rf"|(?P<alone>[A-Za-z]\w*-[0-9]++)[^\w\n<:]*+$"
+    rf"|(?P<alone>[A-Za-z]\w*-[0-9]++)(?:[^\w\n<:]*+|[ \t*]*[-—–]+[ \t][^\n<:]*+)$"  # noqa: RUF001  # dashes
+    rf"|(?P<acts>[A-Za-z]\w*-[0-9]++){_SHALL}"
     rf"|(?P<several>(?=[^\n<:]*[0-9]){_SEVERAL}){_CLOSE}:{_TO_EDGE}"
 )
 _EXPLAINS = r"(?P<explains>explanations?|rationale|justification|erklärung|explicación|解释|说明)(?![^\W_])[^\w\n<:]*+:"
-_NAMED_BY = ("team", "short", "shall", "every", "behind", "bare", "numbered", "cell", "alone", "several", "of")
+_NAMED_BY = ("team", "short", "shall", "every", "behind", "bare", "numbered", "cell", "alone", "acts", "several", "of")
 _FLAGS = re.IGNORECASE | re.MULTILINE
 _LINE = re.compile(rf"{_BULLET}(?:{_SECTION}|{_EXPLAINS}|{_TEAM}|{_BARE})", _FLAGS)
 _TAG = re.compile(
@@ -118,7 +120,7 @@ _JSON = re.compile(r"\"teams?\"\s*+:\s*+\"(?P<team>[^\"\n<>]{1,60}+)\"", re.IGNO
 _JSON_AHEAD = re.compile(r"[\s{\[,]*+(?=\"teams?\"\s*+:\s*+\"[^\"\n<>]{1,60}+\")", re.IGNORECASE)
 _NO_TEAM = re.compile(
     "also|answer|because|commands?|comments?|decisions?|do|final|finally|first|goal|ideas?|lastly|next|notes?|now|optional|or|orders?|"
-    "output|plan|priority|reason(?:s|ing)?|reply|response|result|second|so|steps?|strategy|summary|tactics?|targets?|"
+    "never|output|plan|priority|reason(?:s|ing)?|reply|response|result|second|so|steps?|strategy|summary|tactics?|targets?|"
     "tasks?|then|therefore|thoughts?|thus|warning|why|assistant",
     re.IGNORECASE,
 )

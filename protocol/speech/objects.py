@@ -1,7 +1,8 @@
-"""Calls that are written as JSON: an object that names an action, its arguments and perhaps a team.
+"""Calls and messages that are written as JSON: an object that names an action, its arguments and perhaps a team.
 
     {"team": "Stalker-1", "action": "Attack_Unit", "args": ["0x1008c0001"]}
     {"name": "Move_Screen", "arguments": {"screen": [3, 4]}}
+    {"to": "Commander", "text": "two Roaches"}
 
 Models that were trained on tool calls fall into it. An object counts only if the value for the action is a name, or a
 call without angle brackets; whatever else stands in JSON is read as text. Above it: `protocol.speech.reader`.
@@ -23,9 +24,13 @@ if TYPE_CHECKING:
 NAMES = ("action", "name", "function", "command", "tool")
 ARGUMENTS = ("args", "arguments", "parameters", "params", "input")
 TEAMS = ("team", "team_name", "group")
+RECIPIENTS = ("to", "recipient")
+TEXTS = ("text", "message", "content")
 LONGEST = 2_000
 """Characters of an object that are looked at."""
-_LOOKS_LIKE_ONE = re.compile(rf"\{{[^{{}}]{{0,200}}?\"(?:{'|'.join(NAMES)})\"\s*+:\s*+[\"{{]", re.IGNORECASE)
+_LOOKS_LIKE_ONE = re.compile(
+    rf"\{{[^{{}}]{{0,200}}?\"(?:{'|'.join((*NAMES, *RECIPIENTS))})\"\s*+:\s*+[\"{{]", re.IGNORECASE
+)
 _CALL = re.compile(r"(?P<name>[A-Za-z]\w{0,80}+)(?:\((?P<inside>[^<>]*)\))?")
 _DECODER = json.JSONDecoder()
 
@@ -40,16 +45,32 @@ class ObjectCall:
     end: int
 
 
-def object_call_at(text: str, at: int) -> ObjectCall | None:
-    """The call that the object at this `{` stands for; None if it stands for none."""
+@dataclass(frozen=True, slots=True)
+class ObjectMessage:
+    """A message as an object."""
+
+    recipient: str
+    text: str
+    end: int
+
+
+def object_at(text: str, at: int) -> ObjectCall | ObjectMessage | None:
+    """What the object at this `{` stands for; None if it is neither a call nor a message."""
     if not _LOOKS_LIKE_ONE.match(text, at):
         return None
     try:
         found, length = _DECODER.raw_decode(text[at : at + LONGEST])
     except (ValueError, RecursionError):
         return None
+    to, words = _first(found, RECIPIENTS), _first(found, TEXTS)
+    if isinstance(to, str) and isinstance(words, str) and to.strip() and words.strip():
+        return ObjectMessage(to.strip(), words.strip(), at + length)
+    return _call(found, at + length)
+
+
+def _call(found: object, end: int) -> ObjectCall | None:
     named = _first(found, NAMES)
-    if isinstance(named, dict):  # {"function": {"name": …, "arguments": …}}
+    if isinstance(found, dict) and isinstance(named, dict):  # {"function": {"name": …, "arguments": …}}
         found, named = {**found, **named}, _first(named, NAMES)
     call = _CALL.fullmatch(named.strip()) if isinstance(named, str) else None
     if call is None or not (call["inside"] is not None or "_" in call["name"] or _has(found, ARGUMENTS)):
@@ -59,11 +80,11 @@ def object_call_at(text: str, at: int) -> ObjectCall | None:
         args = read_arguments(call["inside"]) if call["inside"] else tuple(_values(_first(found, ARGUMENTS)))
     except Malformed:
         return None
-    return ObjectCall(call["name"], args, team if isinstance(team, str) else None, at + length)
+    return ObjectCall(call["name"], args, team if isinstance(team, str) else None, end)
 
 
-def _has(found: dict[str, object], keys: tuple[str, ...]) -> bool:
-    return any(key in found for key in keys)
+def _has(found: object, keys: tuple[str, ...]) -> bool:
+    return isinstance(found, dict) and any(key in found for key in keys)
 
 
 def _first(found: object, keys: tuple[str, ...]) -> object:

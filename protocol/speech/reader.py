@@ -33,12 +33,14 @@ from protocol.speech.calls import (
 )
 from protocol.speech.headings import SENTENCE_END, Heading, Section, Tone, heading_at, json_heading_at, tag_heading_at
 from protocol.speech.marks import SHORT, Malformed, to_ascii, unescaped
-from protocol.speech.objects import object_call_at
+from protocol.speech.objects import ObjectMessage, object_at
 from protocol.speech.quoting import MessageReader
 from protocol.speech.said import Gathering, ListenTo, MessageTo, Speech
 from protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from protocol.messages import Point
     from protocol.speech.quoting import Addressed
 
@@ -70,6 +72,7 @@ _GENERIC = re.compile(r"[A-Za-z0-9]<")
 _NEGATED = re.compile(rf"(?:{NEGATION})[\s`*\"'_]*+$", re.IGNORECASE)
 _STRUCK = re.compile(r"~~[\s`*]*+$")
 _STRUCK_BEHIND = re.compile(r"[ \t`*]*+~~")
+_NO_HEADING = ("<", "\n", "")
 _LOOKED_BACK = 24
 _DIRECTLY_ABOVE = 80
 
@@ -91,28 +94,35 @@ class _Walk:
     def run(self) -> None:
         at = self._line(0)
         while mark := _NEXT.search(self._plain, at):
-            at = self._at(mark)
-
-    def _at(self, mark: re.Match[str]) -> int:
-        read = {
-            "line": lambda: self._line(mark.end()),
-            "sentence": lambda: self._headings(mark.end(), line_start=False),
-            "thought": lambda: self._end_of_thoughts(mark),
-            "think": lambda: self._skip_thoughts(mark),
-            "comment": lambda: max(mark.end(), self._plain.find("-->", mark.end())),  # S24
-            "speaker": lambda: len(self._plain) if self.gathering else mark.end(),  # S26
-            "object": lambda: self._object(mark.start()) or mark.end(),
-            "team": lambda: self._json_team(mark),
-            "quoted": lambda: self._naked(mark.end()) or mark.end(),
-            "angle": lambda: self._angle(mark.start()),
-        }
-        return read[str(mark.lastgroup)]()
+            at = _READS[str(mark.lastgroup)](self, mark)
 
     @cached_property
     def _closing_tags(self) -> frozenset[str]:
         return closing_tags(self._plain)
 
     # Each of the following takes what stands at one place and returns the offset behind it.
+
+    def comment(self, mark: re.Match[str]) -> int:  # S24
+        return max(mark.end(), self._plain.find("-->", mark.end()))
+
+    def speaker(self, mark: re.Match[str]) -> int:  # S26
+        return len(self._plain) if self.gathering else mark.end()
+
+    def line(self, mark: re.Match[str]) -> int:
+        return self._line(mark.end())
+
+    def sentence(self, mark: re.Match[str]) -> int:
+        return self._headings(mark.end(), line_start=False)
+
+    def object(self, mark: re.Match[str]) -> int:
+        end = self._object(mark.start())
+        return mark.end() if end is None else self._headings(end, line_start=False)
+
+    def quoted(self, mark: re.Match[str]) -> int:
+        return self._naked(mark.end()) or mark.end()
+
+    def angle(self, mark: re.Match[str]) -> int:
+        return self._angle(mark.start())
 
     def _line(self, at: int) -> int:
         if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
@@ -125,7 +135,7 @@ class _Walk:
         return at
 
     def _headings(self, at: int, *, line_start: bool) -> int:
-        while True:
+        while self._plain[at : at + 1] not in _NO_HEADING:
             brace = _OBJECT_AHEAD.match(self._plain, at)
             if brace and (end := self._object(brace.end() - 1)):
                 at = end
@@ -135,7 +145,7 @@ class _Walk:
             else:
                 break
             line_start = False
-        while naked := self._naked(at):
+        while self._plain[at : at + 1] not in _NO_HEADING and (naked := self._naked(at)):
             at = naked
         return at
 
@@ -146,7 +156,7 @@ class _Walk:
             self._section = Section.ANALYSIS
         if heading.section:
             self.gathering.open_block(self._plain[at : heading.end])
-            if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip("#*_> \t\n"):
+            if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip('#*_> \t\n",{['):
                 self._team_above_section = self._team  # S14
             elif (self._section, heading.section) != (Section.ANALYSIS, Section.ACTIONS):
                 self._team_above_section = None
@@ -160,11 +170,11 @@ class _Walk:
             self._team = heading.team
             self._team_end = heading.end
 
-    def _end_of_thoughts(self, end: re.Match[str]) -> int:  # S9
+    def end_of_thoughts(self, end: re.Match[str]) -> int:  # S9
         self._start_over()
         return self._line(end.end())
 
-    def _skip_thoughts(self, begin: re.Match[str]) -> int:
+    def thoughts(self, begin: re.Match[str]) -> int:
         end = _THINK_ENDS.search(self._plain, begin.end())
         if end is not None:
             return self._line(end.end())
@@ -173,7 +183,7 @@ class _Walk:
         self._fault(begin.start(), begin.end(), "", reason)
         return len(self._text)
 
-    def _json_team(self, mark: re.Match[str]) -> int:
+    def team(self, mark: re.Match[str]) -> int:
         heading = json_heading_at(self._plain, mark.start())
         if heading is None:
             return mark.end()
@@ -181,10 +191,13 @@ class _Walk:
         return heading.end
 
     def _object(self, start: int) -> int | None:
-        """A call as an object of JSON; None if there is none at this `{`."""
-        found = object_call_at(self._plain, start)
+        """A call or a message as an object of JSON; None if there is none at this `{`."""
+        found = object_at(self._plain, start)
         if found is None:
             return None
+        if isinstance(found, ObjectMessage):
+            self._add(MessageTo(found.recipient, found.text, start, found.end), Section.COMMUNICATIONS, start)
+            return found.end
         self._add_call(found.name, found.args, start, found.end, team=found.team)
         return found.end
 
@@ -290,6 +303,23 @@ class _Walk:
     def _add(self, item: Call | MessageTo | ListenTo, kind: Section, start: int) -> None:
         before = self._plain[max(0, start - _LOOKED_BACK) : start]
         before = before[before.rfind("\n") + 1 :]
-        struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
-        taken_back = bool(struck or _NEGATED.search(before))
+        taken_back = False
+        if before and not before.isspace():
+            struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
+            taken_back = bool(struck or _NEGATED.search(before))
         self.gathering.add(item, kind, self._section, taken_back=taken_back)
+
+
+_READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {
+    "line": _Walk.line,
+    "sentence": _Walk.sentence,
+    "thought": _Walk.end_of_thoughts,
+    "think": _Walk.thoughts,
+    "comment": _Walk.comment,
+    "speaker": _Walk.speaker,
+    "object": _Walk.object,
+    "team": _Walk.team,
+    "quoted": _Walk.quoted,
+    "angle": _Walk.angle,
+}
+"""What reads on at each kind of mark; each returns the offset behind what it read."""

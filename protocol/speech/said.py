@@ -135,6 +135,8 @@ class Gathering:
 
     def _repeated(self) -> set[tuple[Section, int]]:
         """Blocks that say under the same heading what an earlier one says (rule S27)."""
+        if len(set(self._titles)) == len(self._titles):
+            return set()
         blocks: dict[tuple[Section, int], list[tuple[object, ...]]] = {}
         for found in self._found:
             if not (found.taken_back or found.in_prose):

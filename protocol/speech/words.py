@@ -40,6 +40,7 @@ INSTEAD = "final|revised|corrected|updated|definitive|definite|actual"
 NEGATION = (
     r"\b(?:do(?:es)?[ \t]++not|don['’´`]t|doesn['’´`]t|must[ \t]++not|should[ \t]++not|won['’´`]t|not|never|avoid|"  # noqa: RUF001  # apostrophes as they are written
     r"instead[ \t]++of|rather[ \t]++than|without|no|nicht|kein[en]?|statt|ohne|ne[ \t]++pas|pas[ \t]++de|"
-    r"en[ \t]++lugar[ \t]++de|sin|nunca|não|non|не|вместо)|不要|不用|不能|别|請勿|请勿|而不是"
+    r"en[ \t]++lugar[ \t]++de|sin|nunca|não|non|не|вместо|"
+    r"not[ \t]++yet:?+|(?:never|avoid|do[ \t]++not|don't):)|不要|不用|不能|别|請勿|请勿|而不是"
 )
 """What takes back the call right behind it."""

@@ -197,9 +197,19 @@ REFUSED = [
     (
         "<Build_Nexus()>",
         "unknown_action",
+        "There is no action Build_Nexus; you can say <No_Operation()>, <Hold_Position()>, <Stop()> and 8 others.",
+    ),
+    (
+        "<Attack(0x1)>",
+        "unknown_action",
+        "There is no action Attack; like it are <Attack_Unit(tag)>, <Select_Unit_Attack_Unit(tag, tag)>.",
+    ),
+    (
+        "<Use_Blink([3, 4])>",
+        "unknown_action",
         (
-            "There is no action Build_Nexus; the nearest that you have are <Ability_Blink_Screen(screen)>, "
-            "<Hold_Position()>, <Select_Unit_Blink_Screen(tag, screen)>."
+            "There is no action Use_Blink; like it are <Select_Unit_Blink_Screen(tag, screen)>, "
+            "<Ability_Blink_Screen(screen)>."
         ),
     ),
     ("<Stop(0x1)>", "wrong_arguments", "Stop takes no arguments: write <Stop()>."),
@@ -330,7 +340,7 @@ def test_an_agent_without_units_is_told_so(task: Callable[..., TaskConfig], snap
     config = task("2s3z")
     joint = Actor(config).joint(Observer(config).observe(snapshot([])), {"CombatGroupSmac": parse(team("<Stop()>"))})
     assert [r.message for r in joint.rejections["CombatGroupSmac"]] == [
-        "There is no action Stop; the nearest that you have are <Attack_Unit(tag)>, <Move_Screen(screen)>."
+        "There is no action Stop; you can say <Attack_Unit(tag)>, <Move_Screen(screen)>."
     ]
     joint = Actor(config).joint(
         Observer(config).observe(snapshot([])), {"CombatGroupSmac": parse("<Attack_Unit(0x1)>")}

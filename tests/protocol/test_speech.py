@@ -91,6 +91,8 @@ ARGUMENTS = [
     ("A8", "0x1,", ["0x1"]),
     ("A8", "0x1; ", ["0x1"]),
     ("A8", " , ", []),
+    ("A6", "'3 4'", [(3, 4)]),
+    ("A2", "#0x1", ["0x1"]),
     ("A9", "4295229441", ["4295229441"]),
     ("A9", "[1, 2, 3]", ["[1, 2, 3]"]),
     ("A9", "[1]", ["[1]"]),
@@ -217,6 +219,8 @@ HEADINGS += [
     ("H19", "Actions:\n<Go()>\nExplanation: <Stop()> is worse", ["<Go()>", "? <Stop()>"]),
     ("H19", "Explanation: weak\nActions:\n<Go()>", ["<Go()>"]),
     ("H20", "Team A should <Go()>", ["A: <Go()>"]),
+    ("H20", "A-1 will now <Stop()>. B-1 must <Go()>", ["A-1: <Stop()>", "B-1: <Go()>"]),
+    ("H15", "### A-1 — kite\n<Go()>", ["A-1: <Go()>"]),
     ("H21", '{"team": "A-1", "do": "<Go()>"}', ["A-1: <Go()>"]),
 ]  # fmt: skip
 RULES = [
@@ -332,6 +336,7 @@ RULES = [
     ("S25", "<Go()> instead of `<Stop()>`", ["<Go()>", "? <Stop()>"]),
     ("S25", "nicht <Stop()>, не <Hold()>, 不要<Wait()>", ["? <Stop()>", "? <Hold()>", "? <Wait()>"]),
     ("S25", "They do not see us: <Go()>\nI know\n<Stop()>", ["<Go()>", "<Stop()>"]),
+    ("S25", "Never: <Stop()>\nnot yet: <Hold()>\nRetreat? No: <Go()>", ["? <Stop()>", "? <Hold()>", "<Go()>"]),
     ("S25", "Do not <MessageTo(A, 'x')>", []),
     ("S26", "<Go()>\nUser: next\n<Stop()>", ["<Go()>"]),
     ("S26", "<Go()><|im_end|><|im_start|>user\n<Stop()>", ["<Go()>"]),
@@ -342,6 +347,7 @@ RULES = [
     ("S28", '{"action": "Attack_Unit", "args": ["0x1"]}', ["<Attack_Unit(0x1)>"]),
     ("S28", '[{"team": "A", "name": "Move_Screen", "arguments": {"screen": [3, 4]}}]', ["A: <Move_Screen([3, 4])>"]),
     ("S28", '{"function": {"name": "Move_Screen", "arguments": {"x": 3, "y": 4}}}', ["<Move_Screen([3, 4])>"]),
+    ("S28", '{"to": "A", "text": "go"} {"to": 3}', ["to A: go"]),
     ("S28", '{"name": "Zealot", "health": 20} {"name": 3} {"action": "', []),
     ("S29", "<Attack_Unit>0x1</Attack_Unit>", ["<Attack_Unit(0x1)>"]),
     ("S29", '<Attack_Unit tag="0x1"/>', ["<Attack_Unit(0x1)>"]),
