@@ -74,8 +74,8 @@ class Ground:
     def ways_from(self, point: WorldPoint) -> Floats:
         """(w, h) how far ground units walk from a point to each cell; infinite where they cannot come.
 
-        Around cliffs but through structures. Walked on the grid in turn with and without diagonal steps, which is at
-        most a tenth longer or shorter than the way itself.
+        Around cliffs but through structures. Walked on the grid in turn with and without diagonal steps: up to a ninth
+        shorter than the way itself, and without the first `SEED_REACH` cells.
         """
         return _ways(self, (int(point.x), int(point.y)))
 

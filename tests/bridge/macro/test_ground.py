@@ -13,6 +13,7 @@ from bridge.frames import WorldPoint
 from bridge.ground import Ground, footprint_of, grid, land_of, sites
 from bridge.ground.land import built_by
 from bridge.ground.resources import base_places
+from bridge.ground.terrain import SEED_REACH
 from bridge.knowledge import knowledge
 from simulator.catalog import load_catalog
 from simulator.maps import find_map, load_map
@@ -72,12 +73,19 @@ def test_the_ground_of_a_map_is_one_object(make_game: Callable[..., Game]) -> No
     assert Ground.of(make_game(seed=1).info) is Ground.of(make_game(seed=1).info)
 
 
-def test_ways_go_round_cliffs_and_are_almost_as_long_as_the_games(make_game: Callable[..., Game]) -> None:
-    game = make_game()
-    land = land_of(game.snapshot)
-    start, goal = (base.place for base in (land.bases[1], land.bases[2]))
-    way = float(land.ground.ways_from(start)[int(goal.x), int(goal.y)])
-    assert way > math.dist(start, goal) - 8
+def test_on_level_ground_a_way_is_a_ninth_shorter_than_the_line_at_most(make_game: Callable[..., Game]) -> None:
+    ground = Ground.of(make_game("Flat64").info)
+    far = ground.ways_from(WorldPoint(12.5, 12.5))
+    x, y = np.nonzero(np.isfinite(far) & (far > 0))
+    line = np.hypot(x - 12, y - 12)
+    assert (far[x, y] <= line + 1).all()
+    assert (far[x, y] >= line * 8 / 9 - SEED_REACH * 2**0.5).all()
+
+
+def test_a_way_round_a_cliff_is_longer_than_the_line(make_game: Callable[..., Game]) -> None:
+    land = land_of(make_game().snapshot)
+    start, goal = land.bases[0].place, land.bases[1].place
+    assert float(land.ground.ways_from(start)[int(goal.x), int(goal.y)]) > 1.5 * math.dist(start, goal)
     assert np.isinf(land.ground.ways_from(start)[~land.ground.walkable]).all()
 
 
