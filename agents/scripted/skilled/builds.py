@@ -44,7 +44,7 @@ class Build:
 
 
 PROTOSS = Build(
-    signs=("Train_Probe", "Build_Pylon", "Train_Zealot", "Train_Stalker", "Warp_Zealot", "Warp_Stalker"),
+    signs=("Train_Probe", "Build_Pylon", "Train_Zealot", "Train_Stalker", "Build_Gateway"),
     supply=Want("Build_Pylon", "Pylon"),
     supply_minerals=100,
     wants=(

@@ -108,7 +108,8 @@ def fight(plan: Plan, prey: str = "") -> bool:
     foes = threats(team)
     if target is None and not foes:
         return False
-    save_the_hurt(plan, foes)
+    if prey != "hall":  # who destroys a base does not come back
+        save_the_hurt(plan, foes)
     if target is None:
         return bool(prey) or _keep_off(plan, foes)
     return (not prey and step_back(plan, foes)) or shoot(plan, target)

@@ -61,9 +61,9 @@ def warp_to_the_front(plan: Plan) -> None:
     if not fields:
         return
     for name in ("Warp_Zealot_Near", "Warp_Stalker_Near"):
-        while plan.left > 0 and plan.team.can(name):
-            if not plan.give(name, fields[len(plan.calls) % len(fields)]):
-                break
+        price = plan.situation.prices.get(name, Price())
+        for _ in range(min(plan.left, price.times)):
+            plan.give(name, fields[len(plan.calls) % len(fields)])
 
 
 @dataclass(slots=True)
