@@ -143,10 +143,11 @@ class AgentConfig(Frozen):
     kind: AgentKind = "combat_group"
     """What it is for; decides what its observations speak of unless `sections` says it."""
     sections: tuple[str, ...] = ()
-    """Names of the sections of its observations, in their order; () for those of its kind."""
+    """Names of the [sections](observations.md) of its observations, in their order; () for those of its kind.
+    `my_module:mine` is one that a module of yours registers."""
     images: tuple[ImageSpec, ...] = ()
     text_tokens: int | None = Field(default=None, ge=100)
-    """About how long its observations may be; None for no limit."""
+    """About how many tokens its observations may have; None for no limit. Longer ones leave things out and say so."""
     talks_to: tuple[KeyName, ...] | None = None
     """Agents that it may write to; None for all."""
     admits: Admission = "combat"
