@@ -139,6 +139,14 @@ def test_the_army_of_2s3z_is_grouped_as_in_the_paper(
     }
 
 
+def test_a_side_team_has_no_units_and_is_always_there() -> None:
+    side = {"name": "Base", "kind": "side", "actions": ["All_Units_Attack"]}
+    roster = Roster([agent("D", side, team("Z", "Zealot"))])
+    roster.update([], sc_pb.PlayerCommon())
+    assert [(t.name, t.kind, t.tags) for t in roster.teams("D")] == [("Base", "side", ())]
+    assert roster.idle_teams("D") == ("Z",)
+
+
 # --- units that change their type -----------------------------------------------------------------------------
 
 NUMBERS = {
@@ -147,9 +155,10 @@ NUMBERS = {
 """Unit types as the game counts them, forms among them that `knowledge` need not know."""
 
 
-def followed(agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None) -> list[object]:
+def followed(agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None) -> list[dict[int, str]]:
     """Agent and team of every unit at each moment; a moment says of what type the units are then."""
-    roster, found = Roster(agents), []
+    roster = Roster(agents)
+    found: list[dict[int, str]] = []
     for moment in moments:
         own = [raw_pb2.Unit(tag=tag, unit_type=NUMBERS[name], build_progress=1) for tag, name in sorted(moment.items())]
         for unit in own:

@@ -57,7 +57,8 @@ def army(situation: Situation) -> int:
 
 def warp_to_the_front(plan: Plan) -> None:
     """Warps in at a phasing Warp Prism, if there is one: it went there for that."""
-    fields = [tag for kind, tag, _ in plan.situation.power if kind == "WarpPrismPhasing"]
+    full = " ".join(plan.situation.rejected)
+    fields = [tag for kind, tag, _ in plan.situation.power if kind == "WarpPrismPhasing" and tag not in full]
     if not fields:
         return
     for name in ("Warp_Zealot_Near", "Warp_Stalker_Near"):

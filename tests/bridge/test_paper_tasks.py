@@ -1,0 +1,111 @@
+"""The shipped tasks of the paper: who plays the 33 maps and the full games, and who may talk to whom."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+
+from bridge.maps import known_maps
+from orchestrator.config import load_task
+
+CASTS = {  # of each task: agents, and the types of units that they lead, besides what later levels of a game bring
+    1: {"CombatGroup7": {"Adept"}},
+    2: {"CombatGroup8": {"Phoenix"}},
+    3: {"CombatGroup1": {"Stalker"}},
+    4: {"CombatGroup1": {"Stalker"}},
+    5: {
+        "Commander": set(),
+        "CombatGroup1": {"Stalker"},
+        "CombatGroup2": {"Colossus"},
+        "CombatGroup5": {"Disruptor"},
+        "CombatGroup6": {"Sentry"},
+    },
+    6: {
+        "Commander": set(),
+        "CombatGroup1": {"Stalker"},
+        "CombatGroup2": {"Archon"},
+        "CombatGroup5": {"HighTemplar"},
+        "CombatGroup6": {"Sentry"},
+    },
+    7: {
+        "Commander": set(),
+        "CombatGroup1": {"Stalker"},
+        "CombatGroup3": {"VoidRay", "Carrier", "Tempest"},
+        "CombatGroup6": {"Mothership"},
+    },
+    8: {
+        "Commander": set(),
+        "Developer": set(),
+        "Airborne": {"Zealot"},
+        "CombatGroup0": {"Zealot"},
+        "CombatGroup1": {"Stalker"},
+        "CombatGroup9": {"WarpPrism", "WarpPrismPhasing"},
+    },
+}
+TASKS = [f"pvz_task{number}_level{level}" for number, level in product(CASTS, (1, 2, 3))]
+FULL_GAMES = {
+    "simple64_eceb": ("protoss", ["Commander", "Developer"]),
+    "simple64_sceb": ("protoss", ["Commander", "Developer", *(f"CombatGroup{n}" for n in range(10))]),
+    "simple64_ecsb": ("protoss", ["Commander", "Developer", "Builder"]),
+    "simple64_terran": ("terran", ["Commander", "Developer"]),
+    "simple64_zerg": ("zerg", ["Commander", "Developer"]),
+}
+STRANGERS = [("commander", "builder"), ("developer", "combat_group"), ("builder", "combat_group")]
+"""Kinds of agents that do not write to each other in the paper's later code."""
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_task_of_llm_pysc2_has_the_agents_of_the_paper(name: str) -> None:
+    task = load_task(name)
+    assert (task.name, task.map, task.clock.rule) == (name, name, "frozen")
+    led = {agent.name: {kind for team in agent.teams for kind in team.unit_types} for agent in task.agents}
+    cast = CASTS[int(name[8])]
+    assert list(led) == list(cast)
+    assert all(types <= led[agent] for agent, types in cast.items())
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_everything_that_the_map_gives_has_an_agent(name: str) -> None:
+    listed = {kind for agent in load_task(name).agents for team in agent.teams for kind in team.unit_types}
+    assert set(known_maps()[name].units) <= listed
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_casters_may_use_their_skills_one_by_one(name: str) -> None:
+    task = load_task(name)
+    said = {action.name for agent in task.agents for action in agent.catalogue()}
+    single = {
+        "Stalker": "Select_Unit_Blink_Screen",
+        "HighTemplar": "Select_Unit_Ability_PsiStorm_Screen",
+        "Disruptor": "Select_Unit_Ability_PurificationNova_Attack",
+        "Sentry": "Select_Unit_Ability_ForceField_Screen",
+        "Phoenix": "Select_Phoenix_Ability_GravitonBeam_Unit",
+        "Adept": "Select_Unit_Ability_AdeptPhaseShift_Minimap",
+    }
+    listed = {kind for agent in task.agents for team in agent.teams for kind in team.unit_types}
+    assert {action for kind, action in single.items() if kind in listed} <= said
+
+
+@pytest.mark.parametrize(("name", "race", "agents"), [(name, *given) for name, given in FULL_GAMES.items()])
+def test_a_full_game_has_its_race_and_its_agents(name: str, race: str, agents: list[str]) -> None:
+    task = load_task(name)
+    assert (task.map, task.map_spec.race, [agent.name for agent in task.agents]) == ("Simple64", race, agents)
+    orders = {action.name for agent in task.agents for action in agent.catalogue()}
+    army = {"protoss": "Train_Stalker", "terran": "Train_Marine", "zerg": "Train_Roach"}
+    assert army[race] in orders
+    assert not (set(army.values()) - {army[race]}) & orders
+
+
+@pytest.mark.parametrize("name", ["pvz_task8_level1", *FULL_GAMES])
+def test_only_those_write_to_each_other_who_do_in_the_paper(name: str) -> None:
+    task = load_task(name)
+    pairs = {(agent.kind, other.kind) for agent in task.agents for other in task.correspondents(agent)}
+    assert pairs
+    assert not pairs & {*STRANGERS, *((b, a) for a, b in STRANGERS)}
+
+
+def test_levels_share_their_cast_with_the_first_one() -> None:
+    first, second = load_task("pvz_task6_level1"), load_task("pvz_task6_level2")
+    assert first.agents == second.agents
+    assert first.description != second.description
