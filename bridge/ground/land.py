@@ -51,16 +51,20 @@ class Land:
     def __init__(self, snapshot: Snapshot) -> None:
         self.ground = Ground.of(snapshot.info)
         self._raw = snapshot.response.observation.raw_data
-        self._standing: list[tuple[str, Footprint, raw_pb2.Unit]] = []
-        self._bodies: list[raw_pb2.Unit] = []
-        for unit in self._raw.units:
-            found = stands_on(unit.unit_type)
-            if unit.display_type == raw_pb2.Placeholder:
-                continue  # what is only ordered is known by the order of its builder
-            if found is not None:
-                self._standing.append((found[0], found[1], unit))
-            elif unit.alliance != raw_pb2.Self and not unit.is_flying:
-                self._bodies.append(unit)
+        self._own = snapshot.own
+
+    @functools.cached_property
+    def _standing(self) -> list[tuple[str, Footprint, raw_pb2.Unit]]:
+        """What takes ground, with its footprint; what is only ordered is known by the order of its builder."""
+        found = ((stands_on(unit.unit_type), unit) for unit in self._raw.units)
+        shown = ((kind, unit) for kind, unit in found if kind and unit.display_type != raw_pb2.Placeholder)
+        return [(name, footprint, unit) for (name, footprint), unit in shown]
+
+    @functools.cached_property
+    def _bodies(self) -> list[raw_pb2.Unit]:
+        """Units of others that are on the ground and in the way of who builds."""
+        others = (unit for unit in self._raw.units if unit.alliance != raw_pb2.Self and not unit.is_flying)
+        return [unit for unit in others if stands_on(unit.unit_type) is None]
 
     def unit(self, tag: int) -> raw_pb2.Unit | None:
         """A unit that is seen or remembered, by its tag."""
@@ -106,15 +110,15 @@ class Land:
 
         The game takes the price when it is begun, so that these are not paid for.
         """
-        return tuple(plan for unit in self._raw.units if unit.alliance == raw_pb2.Self for plan in self._plans_of(unit))
+        return tuple(plan for unit in self._own for plan in self._plans_of(unit))
 
     def _plans_of(self, unit: raw_pb2.Unit) -> Iterator[tuple[str, WorldPoint]]:
         for order in unit.orders:
             structure = built_by(order.ability_id)
-            target = self.unit(order.target_unit_tag)
             footprint = footprint_of(structure) if structure is not None else None
             if structure is None or footprint is None:
                 continue
+            target = self.unit(order.target_unit_tag)
             if target is not None:
                 middle, begun = WorldPoint(target.pos.x, target.pos.y), target.alliance == raw_pb2.Self
             else:
