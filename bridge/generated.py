@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 GROUP: Final = "generated"
 WITHOUT_WORDS: Final = "functions_without_words.yaml"
+UNFINISHED: Final = "cancel_building"
+"""Rule for what is still in the making, which belongs to no team that could be told."""
 _AT_ONCE: Final = ("Cancel", "Halt", "Stop")
 """Beginnings of functions that end orders, and so never wait for them."""
 _LEVEL: Final = re.compile(r"(\w+)Level(\d)")
@@ -86,8 +88,9 @@ def forms(function: Function) -> tuple[Form, ...]:
 
 def _of_functions(curated: Mapping[str, Action]) -> Iterator[Action]:
     spoken = {_sense(action): action for action in curated.values() if action.subject == "team"}
+    of_no_team = {action.function for action in curated.values() if action.rule == UNFINISHED}
     for function in functions().values():
-        for form in forms(function) if function.name not in without_words() else ():
+        for form in forms(function) if function.name not in without_words().keys() | of_no_team else ():
             if (function.name, _kind(form), "unit") in spoken or (function.name, _kind(form), "place") in spoken:
                 continue
             yield _of_function(function, form, spoken.get((_general(function), _kind(form), "unit")))

@@ -18,8 +18,6 @@ BY_RAW: dict[str, str] = {
     "Rally_Morphing_Unit_Screen": IN_THE_MAKING,
     "Rally_Morphing_Unit_Unit": IN_THE_MAKING,
     "Rally_Morphing_Unit_Minimap": IN_THE_MAKING,
-    "Cancel_BuildInProgress": IN_THE_MAKING,
-    "Halt_Building": IN_THE_MAKING,
     "Attack_Redirect_Screen": SHOOTERS_CHOOSE,
     "Effect_Spray_Screen": SPRAY,
     "Effect_Spray_Minimap": SPRAY,
