@@ -136,6 +136,13 @@ def _units_first(name: str) -> tuple[bool, str]:
 
 
 @functools.cache
+def is_worker(name: str) -> bool:
+    """Whether a type of unit gathers; a type that is not known does not."""
+    known = knowledge().get(name)
+    return known is not None and known.worker
+
+
+@functools.cache
 def is_structure(name: str) -> bool:
     """Whether a type of unit is a structure; a type that is not known is none."""
     known = knowledge().get(name)

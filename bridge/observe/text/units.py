@@ -10,7 +10,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from bridge.observe.chronicle import is_structure
+from bridge.observe.chronicle import is_structure, is_worker
 from bridge.observe.text.page import section, shorter
 from bridge.observe.text.words import INDENT, INDENT2, n, percent, point, whole
 
@@ -82,9 +82,11 @@ def _listed(heading: str, lines: list[str]) -> list[str]:
 def _all_units(page: Page, team: TeamView) -> list[str]:
     if page.sight.agent.kind == "builder":
         return _near(page, team, team.enemies)
+    workers = [unit for unit in team.allies if is_worker(unit.type)]
     return [
         *_listed("Your units:", _own_lines(page, team)),
-        *_listed("Allied units:", _lines(page, team.allies)),
+        *_listed("Allied units:", _lines(page, _without(team.allies, workers) if workers else team.allies)),
+        *_listed("Allied workers:", _group_lines(workers)),
         *_listed("Enemy units:", _lines(page, team.enemies)),
     ]
 
@@ -259,8 +261,9 @@ def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
 
 
 def _passing_by(what: str, alliance: str, name: str) -> bool:
-    """Whether it only says that the team has passed an own structure."""
-    return alliance == "ally" and what in {"appeared", "disappeared"} and is_structure(name)
+    """Whether it only says that the team has passed what stays or works there."""
+    passed = alliance == "ally" and what in {"appeared", "disappeared"}
+    return passed and (is_structure(name) or is_worker(name))
 
 
 def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -130,11 +131,19 @@ def test_small_words(made: str, text: str) -> None:
 
 def test_what_a_team_passes_of_its_own_side_is_no_event_if_it_stands_still(unit: Any, snapshot: Any, task: Any) -> None:
     observer = Observer(task("3s_vs_3z"))
-    standing = [unit(2, "Pylon", 26, 16), unit(3, "Zealot", 26, 17)]
+    standing = [unit(2, "Pylon", 26, 16), unit(3, "Zealot", 26, 17), unit(4, "Probe", 26, 18)]
     sights = [observer.observe(snapshot([unit(1, "Stalker", x, 16), *standing])) for x in (16, 4)]
     text = sights[-1].agents["CombatGroupSmac"].text
     assert "ally Zealot went out of sight: 0x3" in text
     assert "Pylon" not in text
+    assert "Probe" not in text
+
+
+def test_workers_of_the_own_side_are_told_by_number(unit: Any, snapshot: Any, task: Any) -> None:
+    units = [unit(1, "Stalker", 16, 16), unit(2, "Probe", 12, 16), unit(3, "Probe", 13, 18), unit(4, "Zealot", 14, 16)]
+    text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text
+    assert re.findall(r"    Allied (.*):\n        (.*?)[ |]", text) == [("units", "Zealot"), ("workers", "2")]
+    assert "        2 Probe around screen [8.5, 11]\n" in text
 
 
 def test_a_team_without_any_unit_leaves_an_agent_with_words_only(base_task: Any, look: Any) -> None:
