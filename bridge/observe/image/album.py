@@ -105,7 +105,10 @@ def _minimap(
     sites = [Site(team.name, team.camera) for team in teams]
     tags = frozenset(tag for team in teams for tag in team.tags)
     alerts = [alert.minimap for alert in seen.view.alerts]
-    image, legend = minimap.draw(moment, world, sites, tags, alerts, spec.size_px, grid=spec.grid, pixels=pixels)
+    others = [(other.name, other.minimap) for other in seen.view.others]
+    image, legend = minimap.draw(
+        moment, world, sites, tags, alerts, spec.size_px, others=others, grid=spec.grid, pixels=pixels
+    )
     yield Drawing(image, "minimap", titles.of_minimap(world.minimap_size, legend))
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from protocol.messages import Point
 
 ALERT: Colour = (60, 236, 255)
+_CROSS_PX = 5
 _FRAMES_AT_MOST = 6
 """Teams beyond these get no frame but a cross: more of them would be a net over the map."""
 _DOTS: dict[str, Colour] = {
@@ -56,6 +57,7 @@ def draw(
     alerts: Iterable[Point],
     size_px: int,
     *,
+    others: Sequence[tuple[str, Point]] = (),
     grid: bool = True,
     pixels: Image | None = None,
 ) -> tuple[Image, Legend]:
@@ -68,6 +70,7 @@ def draw(
         own: tags of their units.
         alerts: points of the minimap where something was lost.
         size_px: of the picture on both axes, margins included.
+        others: names and points of teams of other agents, for crosses and names.
         grid: whether grid lines are drawn.
         pixels: the game's own minimap, `inner_px` large, on which units are drawn already; None draws it.
     """
@@ -90,7 +93,7 @@ def draw(
     for alert in alerts:
         cv2.circle(image, canvas.pixel(*alert), 9, palette.INK, 4, cv2.LINE_AA)
         cv2.circle(image, canvas.pixel(*alert), 9, ALERT, 2, cv2.LINE_AA)
-    _name_teams(canvas, teams, world, scale)
+    _name_teams(canvas, teams, others, world, scale)
     if pixels is not None:
         return canvas.image, Legend(("team",) if own else (), rendered=True)
     return canvas.image, Legend(tuple(sorted(sides, key=RANK.__getitem__)))
@@ -139,7 +142,9 @@ def _dot(image: Image, one: Subject, side: Side, at: tuple[int, int], scale: flo
     cv2.circle(image, at, size, livery.body, -1)
 
 
-def _name_teams(canvas: Canvas, teams: Sequence[Site], world: MapFrame, scale: float) -> None:
+def _name_teams(
+    canvas: Canvas, teams: Sequence[Site], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
+) -> None:
     """Frames around what the teams see, crosses at their heads, and their names."""
     image, half = canvas.inner, round(CAMERA_WIDTH / 2 * scale)
     marked = []
@@ -148,8 +153,11 @@ def _name_teams(canvas: Canvas, teams: Sequence[Site], world: MapFrame, scale: f
         if number < _FRAMES_AT_MOST:
             cv2.rectangle(image, (x - half, y - half), (x + half, y + half), palette.INK, 3)
             cv2.rectangle(image, (x - half, y - half), (x + half, y + half), palette.LINE, 1)
-        for right, down in ((5, 0), (0, 5)):
-            cv2.line(image, (x - right, y - down), (x + right, y + down), palette.INK, 3)
-            cv2.line(image, (x - right, y - down), (x + right, y + down), palette.LINE, 1)
-        marked.append(Marked(team.name, "neutral", x, y, 5))
+        marked.append(Marked(team.name, "neutral", x, y, _CROSS_PX))
+    marked += (Marked(name, "own", *canvas.pixel(*point), _CROSS_PX) for name, point in others)
+    for one in marked:
+        colour = palette.LINE if one.side == "neutral" else LIVERIES[one.side].mark
+        for right, down in ((_CROSS_PX, 0), (0, _CROSS_PX)):
+            cv2.line(image, (one.x - right, one.y - down), (one.x + right, one.y + down), palette.INK, 3)
+            cv2.line(image, (one.x - right, one.y - down), (one.x + right, one.y + down), colour, 1)
     place(image, marked, marked, 7 if canvas.image.shape[0] < SMALL_PX else 9)

@@ -46,7 +46,7 @@ def of_minimap(extent: float, legend: Legend) -> str:
         "rendered by the game" if legend.rendered else "",
         _colours(legend, _ON_MINIMAP),
         "" if legend.rendered else "squares are structures and resources",
-        "white frames are what your teams see, yellow rings where your side was hurt",
+        "crosses are teams, white frames what yours see, yellow rings where your side was hurt",
     ]
     return "; ".join(part for part in parts if part) + "."
 

@@ -234,7 +234,7 @@ TITLES = [
             "Minimap, from [0, 0] at the top left to [64, 64]",
             "blue: your units, green: your side's other units, yellow: allied players, red: enemies",
             "squares are structures and resources",
-            "white frames are what your teams see, yellow rings where your side was hurt.",
+            "crosses are teams, white frames what yours see, yellow rings where your side was hurt.",
         ],
     ),
     (

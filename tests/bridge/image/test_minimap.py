@@ -96,6 +96,20 @@ def test_teams_beyond_six_get_no_frame_but_all_get_a_name(snapshot: Snap) -> Non
     assert lines[0] == lines[1]
 
 
+def test_a_commander_sees_where_the_teams_of_others_are(snapshot: Snap) -> None:
+    shown = snapshot([], size=(64, 64))
+    world = MapFrame.of(shown.info, Frames())
+    bare, named = (
+        minimap.draw(Moment(shown), world, (), frozenset(), (), SIZE, others=others)[0]
+        for others in ((), (("Zealot-1", (40.0, 12.0)),))
+    )
+    column, row = (round(value) for value in pixel_of(40, 12))
+    assert tuple(named[row, column].tolist()) == LIVERIES["own"].mark
+    changed = np.nonzero((named != bare).any(axis=2))[1]
+    assert changed.min() < column
+    assert changed.max() > column + 30  # its name stands beside it
+
+
 def test_a_wide_map_leaves_the_rest_of_the_frame_void(snapshot: Snap) -> None:
     image = draw(snapshot([], size=(64, 32)))
     column, row = (round(value) for value in pixel_of(32, 48))

@@ -58,6 +58,19 @@ def test_a_body_is_where_its_screen_coordinate_says(
     assert column == pytest.approx(disc[0] + (disc[3] - disc[2]) / 2, abs=1.5)
 
 
+def test_frames_of_other_sizes_have_their_units_at_the_same_places(snapshot: Snap, unit: Unit) -> None:
+    moment = Moment(snapshot([unit(1, "Marine", 12, 20, alliance="enemy", radius=0.9)]))
+    middles = []
+    for extent in (24.0, 128.0):
+        camera = Camera(16, 16, extent)
+        image, _ = screen.draw(moment, camera, frozenset(), SIZE, marks=False, grid=False)
+        body = found(image, LIVERIES["enemy"].body)
+        _, row = pixel_of(*camera.screen(12, 20), SIZE, extent)
+        assert (body[:, 1].min() + body[:, 1].max()) / 2 == pytest.approx(row, abs=1)
+        middles.append(row)
+    assert middles[0] == pytest.approx(middles[1], abs=8)  # the labels of 128 take a little more room
+
+
 def test_a_unit_that_faces_up_has_its_nose_above(snapshot: Snap, unit: Unit) -> None:
     moment = Moment(snapshot([unit(1, "Marine", 16, 16, alliance="enemy", radius=1.0, facing=math.pi / 2)]))
     image, _ = screen.draw(moment, Camera(16, 16), frozenset(), SIZE, marks=False, grid=False)
