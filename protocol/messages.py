@@ -264,6 +264,8 @@ class Resources(Frozen):
     vespene: int = 0
     supply_used: float = 0.0
     supply_cap: float = 0.0
+    promised: tuple[int, int] = (0, 0)
+    """Of the minerals and the vespene, what structures will cost that workers are on their way to build."""
 
 
 class TypeCount(Frozen):

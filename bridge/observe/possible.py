@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.catalog import catalogue
 from bridge.knowledge import ability_of, is_armed, knowledge, stand_ins
+from bridge.macro.ledger import Ledger
 from protocol.messages import Barred, Offer
 
 if TYPE_CHECKING:
@@ -41,7 +42,13 @@ class Possible:
         common = snapshot.response.observation.player_common
         self._abilities = snapshot.abilities
         self._upgrades = frozenset(upgrades)
-        self._purse = common.minerals, common.vespene, float(common.food_cap) - float(common.food_used)
+        self.promised = _promised(snapshot, bodies)
+        """Minerals and vespene that are set aside for what workers are on their way to build."""
+        self._purse = (
+            max(0, common.minerals - self.promised[0]),
+            max(0, common.vespene - self.promised[1]),
+            float(common.food_cap) - float(common.food_used),
+        )
         self._own: dict[str, list[Body]] = {}
         for body in bodies.values():
             if body.is_own:
@@ -111,9 +118,11 @@ class Possible:
         unit_type = units[0].name
         reason = unmet(action, unit_type, self._upgrades)
         function = action.pysc2
-        if reason is not None or able is None or function is None or function.ability_id in able:
+        if reason is not None or able is None or function is None:
             return reason
         facts = _facts(action.name, unit_type)
+        if function.ability_id in able:
+            return self._promised_away(facts)
         if facts is None:
             return f"{unit_type} cannot"
         return self._lacking(facts) or _not_ready(facts, units) or "not in its present state"
@@ -130,9 +139,9 @@ class Possible:
         if function is None:
             return None
         able = self._able(ready or (body for there in self._own.values() for body in there))
-        if able is not None and function.ability_id in able:
-            return None
         facts = _facts(action.name, ready[0].name if ready else "")
+        if able is not None and function.ability_id in able:
+            return self._promised_away(facts)
         if facts is None:
             return None if able is None else "nobody can now"
         reason = self._lacking(facts)
@@ -156,10 +165,22 @@ class Possible:
                 return f"no {name}"
         return self._short_of(facts)
 
+    def _promised_away(self, facts: AbilityFacts | None) -> str | None:
+        """What is too few for an action that the game would take, since it knows nothing of promises."""
+        return None if facts is None or not any(self.promised) else self._short_of(facts)
+
     def _short_of(self, facts: AbilityFacts) -> str | None:
         prices = facts.minerals, facts.vespene, facts.supply
         missing = zip(("minerals", "vespene", "supply"), prices, self._purse, strict=True)
         return ", ".join(f"{price - purse:g} {what} too few" for what, price, purse in missing if price > purse) or None
+
+
+def _promised(snapshot: Snapshot, bodies: Mapping[int, Body]) -> tuple[int, int]:
+    orders = (order.name for body in bodies.values() if body.is_own for order in body.view.orders)
+    if not any(name.startswith("Build_") for name in orders):
+        return 0, 0
+    minerals, vespene = Ledger.of(snapshot).aside
+    return round(minerals), round(vespene)
 
 
 def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None:

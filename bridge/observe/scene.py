@@ -101,6 +101,7 @@ class Scene:
                 vespene=common.vespene,
                 supply_used=common.food_used,
                 supply_cap=common.food_cap,
+                promised=self.possible.promised,
             ),
             upgrades=self.upgrades,
         )

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bridge.observe.text.page import Page
+    from protocol.messages import Resources
 
 
 @section("game")
@@ -21,12 +22,18 @@ def game(page: Page) -> Iterator[str]:
     minutes, seconds = divmod(int(view.time_s), 60)
     yield f"{INDENT}Time: {minutes}:{seconds:02}"
     if used.minerals or used.vespene or page.sight.agent.kind != "combat_group":
-        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}"
+        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promised(used)}"
         yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
     if view.upgrades:
         yield f"{INDENT}Upgrades: {', '.join(view.upgrades)}"
     if page.sight.idle_teams:
         yield f"{INDENT}Teams without units: {', '.join(page.sight.idle_teams)}"
+
+
+def _promised(resources: Resources) -> str:
+    amounts = zip(resources.promised, ("minerals", "vespene"), strict=True)
+    parts = [f"{amount} {what}" for amount, what in amounts if amount]
+    return f" ({' and '.join(parts)} of it for what workers are on their way to build)" if parts else ""
 
 
 @section("task")

@@ -172,3 +172,19 @@ def test_research_is_done_once_however_rich_one_is(unit: Any, team: Any) -> None
     council = unit(1, "TwilightCouncil", 16, 16, is_powered=True)
     view = team([council], "Research_Blink", abilities={1: able("Research_Blink_quick")}, player=RICH)
     assert [offer.times for offer in view.offers] == [1]
+
+
+def test_what_a_worker_is_on_its_way_to_build_is_promised(unit: Any, look: Any, base_task: Any) -> None:
+    probe = unit(0x100110001, "Probe", 16, 16)
+    place = probe.orders.add(ability_id=functions()["Build_Gateway_screen"].ability_id).target_world_space_pos
+    place.x, place.y = 40.5, 40.5
+    nexus = unit(2, "Nexus", 30.5, 16.5, is_powered=True)
+    given = {2: able("Train_Probe_quick")}
+    sight = Observer(base_task).observe(look([probe, nexus], abilities=given))
+    developer = sight.agents["Developer"]
+    price = round(abilities()[functions()["Build_Gateway_screen"].ability_id].minerals)
+    assert price == 150
+    assert developer.view.resources.promised == (150, 0)
+    line = "    Minerals: 150, vespene: 75 (150 minerals of it for what workers are on their way to build)\n"
+    assert line in developer.text
+    assert reasons(developer.view.teams[0])["Train_Probe"] == "50 minerals too few"
