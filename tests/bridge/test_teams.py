@@ -16,9 +16,11 @@ from bridge.task import AgentConfig, TaskConfig
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-TYPES = ("Zealot", "Stalker", "Probe", "Observer", "WarpPrism", "Gateway", "WarpGate", "HighTemplar", "Archon")
-TYPES += ("Roach", "Zergling", "Baneling", "SiegeTank", "PhotonCannon")
-ORDERS = dict.fromkeys(TYPES, ("Stop",))
+TYPES = (
+    "Zealot Stalker Probe Observer WarpPrism Gateway WarpGate HighTemplar Archon "
+    "Roach Zergling Baneling SiegeTank PhotonCannon"
+)
+ORDERS = dict.fromkeys(TYPES.split(), ("Stop",))
 
 
 def agent(name: str, *teams: dict[str, Any], admits: str = "combat") -> AgentConfig:
