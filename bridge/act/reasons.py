@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from bridge.knowledge import ability_of, is_armed, knowledge, stand_ins
+from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
 from bridge.names import unit_name, upgrade_name
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 ATTACK = 3674
 """The general ability to attack."""
+SCAN_MOVE = 19
+"""What units without a weapon do when they are told to attack: they walk there."""
 QUEUE_LENGTH = 5
 """Orders that a structure can hold, the one at work among them; with a Reactor 8."""
 WITH_REACTOR = 8
@@ -99,11 +101,10 @@ def tech(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> st
     return None
 
 
-def energy(_: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
-    """It has too little energy."""
-    if facts.energy <= unit.energy:
-        return None
-    return f"{name} has {int(unit.energy)} energy and it takes {facts.energy:g}"
+def energy(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+    """It has too little energy, after what earlier calls of the turn took."""
+    left = unit.energy - means.ledger.energy[unit.tag]
+    return None if facts.energy <= left else f"{name} has {int(left)} energy and it takes {facts.energy:g}"
 
 
 def price(means: Means, facts: AbilityFacts, _: raw_pb2.Unit, name: str) -> str | None:
@@ -114,11 +115,16 @@ def price(means: Means, facts: AbilityFacts, _: raw_pb2.Unit, name: str) -> str 
 
 def too_dear(ledger: Ledger, cost: Cost) -> str | None:
     """What a ledger lacks for a price, as the end of a sentence; None if it is there."""
-    accounts = ("minerals", ledger.minerals), ("vespene", ledger.vespene), ("supply", ledger.supply)
-    for (what, account), amount in zip(accounts, cost, strict=True):
+    accounts = (
+        ("minerals", cost.minerals, ledger.minerals, ledger.aside[0]),
+        ("vespene", cost.vespene, ledger.vespene, ledger.aside[1]),
+        ("supply", cost.supply, ledger.supply, 0.0),
+    )
+    for what, amount, account, aside in accounts:
         left = max(account, 0.0)
         if amount > left:
-            return f"it takes {amount:g} {what} and {left:g} {'are' if what == 'minerals' else 'is'} left"
+            waits = f", {aside:g} more are for what workers are on their way to build" if aside else ""
+            return f"it takes {amount:g} {what} and {left:g} {'are' if what == 'minerals' else 'is'} left{waits}"
     return None
 
 
@@ -143,7 +149,7 @@ def cooldown(_: Means, facts: AbilityFacts, __: raw_pb2.Unit, name: str) -> str 
 def otherwise(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
     """Nothing that is known speaks against it, but the game does."""
     doing = f" while it has {len(unit.orders)} orders" if len(unit.orders) > 1 else ""
-    return f"the game does not allow it to {name} now{doing}"
+    return f"the game does not let {name} do it now{doing}"
 
 
 REASONS: tuple[Reason, ...] = (under_construction, tech, energy, price, queue, power, cooldown, otherwise)
@@ -153,6 +159,20 @@ REASONS: tuple[Reason, ...] = (under_construction, tech, energy, price, queue, p
 def is_attack(function: Function) -> bool:
     """Whether a function attacks."""
     return ATTACK in (function.ability_id, function.general_id)
+
+
+def can_shoot(name: str, able: frozenset[int]) -> bool:
+    """Whether a unit that the game lets attack has a weapon now.
+
+    Those without one scan on the same order: they go where others would shoot. Bunkers, and Oracles with their beam,
+    shoot though their type has no weapon of its own.
+    """
+    return is_armed(name) or not able.isdisjoint(_shots())
+
+
+@functools.cache
+def _shots() -> frozenset[int]:
+    return frozenset(abilities()[ATTACK].special) - {SCAN_MOVE}
 
 
 def incapable(function: Function, name: str) -> str:

@@ -76,6 +76,16 @@ class Targets:
         """
         return self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
 
+    def instead(self, said: Recognised, place: WorldPoint) -> str:
+        """A place that would do, as the end of a sentence: on the team's screen if it is there, else on the minimap."""
+        camera = said.team.camera
+        if camera is not None:
+            x, y = camera.screen(place.x, place.y)
+            if 0 <= x < camera.size and 0 <= y < camera.size:
+                return f"; the nearest free place is [{x:g}, {y:g}]"
+        x, y = self._sight.map.minimap(place.x, place.y)
+        return f"; the nearest free place is at [{x:.1f}, {y:.1f}] of the minimap"
+
     # --- points -----------------------------------------------------------------------------------------------
 
     def _screen_point(self, said: Recognised) -> WorldPoint:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from bridge.observe.sight import Sight
     from protocol.messages import Rejection
 
-MAKERS = frozenset({"build", "build_gas"})
+MAKERS = frozenset({"build", "warp_in", "research"})
 """Kinds of abilities that one unit of a team is enough for."""
 
 
@@ -112,8 +112,7 @@ class Translator:
         """Takes from the ledger what orders cost and whom they keep busy; rules do so themselves."""
         for order in orders:
             self.ledger.busy.update(order.units)
-            for tag in order.units:
-                self._validity.pay(order.function, self._snapshot.units[tag])
+            self._validity.pay(order.function, [self._snapshot.units[tag] for tag in order.units])
 
     def _may_say(self, count: tuple[str, str]) -> bool:
         return self._count.get(count, 0) < self._max_actions[count[0]]
@@ -126,7 +125,8 @@ class Translator:
         try:
             return RULES[rule](Ask(said.action, self._snapshot, self.ledger, units, tag, point))
         except Impossible as impossible:
-            raise Refused(impossible.reason, impossible.message) from None
+            better = "" if impossible.place is None else self._targets.instead(said, impossible.place)
+            raise Refused(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
 
     def _as_said(self, said: Recognised) -> list[Order]:
         """The order of a call whose words say it all."""
@@ -171,7 +171,9 @@ class Translator:
         if said.action.subject == "two_units" and len(able) < len(tags):
             raise self._cannot(said, [one.text for one in obstacles.values() if one])
         facts = facts_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
-        return able[:1] if facts is not None and facts.does in MAKERS else able
+        if facts is not None and facts.does in MAKERS:
+            return able[:1]
+        return self._validity.affordable(function, [self._snapshot.units[tag] for tag in able])
 
     @staticmethod
     def _cannot(said: Recognised, reasons: list[str]) -> Refused:
@@ -188,8 +190,8 @@ class Translator:
         aiming = tuple(tag for tag in able if tag != unit.tag)
         if is_attack(function):
             aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
-            where = "air" if unit.is_flying else "ground"
-            what = f"{hex(unit.tag)} is a {unit_name(unit.unit_type)} in the {where}"
+            where = "in the air" if unit.is_flying else "on the ground"
+            what = f"{hex(unit.tag)} is a {unit_name(unit.unit_type)} {where}"
             if not aiming:
                 raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
         if not aiming:

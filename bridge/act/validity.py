@@ -12,11 +12,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from bridge.act.reasons import REASONS, Means, cost_of, facts_of, incapable, is_attack, price, too_dear
+from bridge.act.reasons import (
+    REASONS,
+    Means,
+    can_shoot,
+    cost_of,
+    energy,
+    facts_of,
+    incapable,
+    is_attack,
+    price,
+    too_dear,
+)
 from bridge.knowledge import is_armed, upgrades
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from s2clientprotocol import raw_pb2
 
     from bridge.action import Action
@@ -50,22 +63,51 @@ class Validity:
         name = unit_name(unit.unit_type)
         able = None if self._abilities is None else self._abilities.get(unit.tag)
         if able is not None and function.ability_id in able:
-            cost = cost_of(function.ability_id, name)
-            dear = None if cost is None else too_dear(self._means.ledger, cost)
-            return None if dear is None else Obstacle(REASONS.index(price) + 1, unit.energy, dear)
+            if is_attack(function) and action.target_kind == "tag" and not can_shoot(name, able):
+                return Obstacle(0, unit.energy, incapable(function, name))
+            return self._spent(function, unit, name)
         facts = facts_of(function.ability_id, name)
         if able is None or function.kind == "autocast":  # the game is not asked about switches
             reason = self._surely_not(action, function, name, facts)
             return None if reason is None else Obstacle(0, unit.energy, reason)
-        if facts is None:
+        if facts is None or (is_attack(function) and not is_armed(name)):
             return Obstacle(0, unit.energy, incapable(function, name))
         found = ((rank, reason(self._means, facts, unit, name)) for rank, reason in enumerate(REASONS, start=1))
         return next(Obstacle(rank, unit.energy, text) for rank, text in found if text is not None)
 
-    def pay(self, function: Function, unit: raw_pb2.Unit) -> None:
-        """Takes what a unit's use of a function costs from the accounts of the turn."""
-        if cost := cost_of(function.ability_id, unit_name(unit.unit_type)):
-            self._means.ledger.pay(*cost)
+    def affordable(self, function: Function, units: Sequence[raw_pb2.Unit]) -> tuple[int, ...]:
+        """Tags of those of some units, the first ones, for which the accounts suffice if each pays for itself."""
+        purse = self._means.ledger.minerals, self._means.ledger.vespene, self._means.ledger.supply
+        found = []
+        for unit in units:
+            cost = cost_of(function.ability_id, unit_name(unit.unit_type)) if self._abilities is not None else None
+            if cost is not None:
+                purse = purse[0] - cost.minerals, purse[1] - cost.vespene, purse[2] - cost.supply
+                if any(left < 0 < price for left, price in zip(purse, cost, strict=True)):
+                    break
+            found.append(unit.tag)
+        return tuple(found)
+
+    def pay(self, function: Function, units: Sequence[raw_pb2.Unit]) -> None:
+        """Takes what the use of a function by some units costs from the accounts of the turn.
+
+        Energy only of a single unit: of a group that casts at one target, the game chooses who does it.
+        """
+        for unit in units:
+            name = unit_name(unit.unit_type)
+            if cost := cost_of(function.ability_id, name):
+                self._means.ledger.pay(*cost)
+            if len(units) == 1 and (facts := facts_of(function.ability_id, name)) and facts.energy:
+                self._means.ledger.energy[unit.tag] += int(facts.energy)
+
+    def _spent(self, function: Function, unit: raw_pb2.Unit, name: str) -> Obstacle | None:
+        """What earlier calls of the turn took away of what the game would still allow."""
+        cost, facts = cost_of(function.ability_id, name), facts_of(function.ability_id, name)
+        if cost and (dear := too_dear(self._means.ledger, cost)):
+            return Obstacle(REASONS.index(price) + 1, unit.energy, dear)
+        if facts and facts.energy and (tired := energy(self._means, facts, unit, name)):
+            return Obstacle(REASONS.index(energy) + 1, unit.energy, tired)
+        return None
 
     def _surely_not(self, action: Action, function: Function, name: str, facts: AbilityFacts | None) -> str | None:
         """What is sure without the game's word."""
