@@ -51,6 +51,8 @@ class Table:
         self.selected: set[int] = set()
         self.groups: dict[int, set[int]] = {}
         self.steps: list[Step] = []
+        self.stuck = False
+        """Whether the camera stays where it is, as at the edge of a map."""
 
     def put(self, tag: int, kind: str, x: float, y: float, **traits: Any) -> int:
         """One more unit."""
@@ -98,7 +100,7 @@ class Table:
     def _carry_out(self, action: Any) -> None:
         if isinstance(action, sc_pb.Action):
             centre = action.action_raw.camera_move.center_world_space
-            self.camera = (centre.x, centre.y)
+            self.camera = self.camera if self.stuck else (centre.x, centre.y)
             return
         arguments = [list(map(int, a)) for a in action.arguments]
         match pysc2.FUNCTIONS[action.function].name:
@@ -188,6 +190,29 @@ def test_the_raw_executor_plays_a_joint_action_in_one_step(table: Any, joint: An
         "Move_pt(queued, [0x100080001], [11.0, 10.0])",
     )
     assert played.refusals == ()
+
+
+def test_what_units_do_without_being_told_is_switched_by_tags(table: Any, joint: Any) -> None:
+    game = table()
+    (stop,) = joint(game, "<Stop()>").commands
+    played = game.play(RawExecutor(), [replace(stop, function=functions()["Effect_Heal_autocast"])])
+    ((action,),) = (step.actions for step in game.steps)
+    toggle = action.action_raw.toggle_autocast
+    assert (toggle.ability_id, list(toggle.unit_tags)) == (386, [S1, S2])
+    assert not action.action_raw.HasField("unit_command")
+    assert played.functions == ("Effect_Heal_autocast([0x100040001, 0x100080001])",)
+
+
+def test_orders_of_the_host_come_last_and_nobody_is_told_of_their_refusal(table: Any, joint: Any) -> None:
+    game = table()
+    (stop,) = joint(game, "<Stop()>", control_group=None).commands
+    host = replace(stop, said=None, function=functions()["HoldPosition_quick"], units=(S2,))
+    lost = replace(host, units=(0x900000001,))
+    played = game.play(ScreenExecutor(), [lost, host, stop])
+    assert [name for name, _ in game.functions() if name.endswith("quick")] == ["Stop_quick", "HoldPosition_quick"]
+    assert played.refusals == ()
+    errors = (sc_pb.ActionError(unit_tag=S2, ability_id=3793, result=error_pb2.CantTargetThatUnit),)
+    assert table(errors=errors).play(RawExecutor(), [host]).refusals == ()
 
 
 def test_without_commands_both_executors_only_let_time_pass(table: Any) -> None:
@@ -442,6 +467,26 @@ def test_a_command_that_has_become_impossible_is_refused(
     played = game.play(ScreenExecutor(), wanted)
     assert [r.rejection.message for r in played.refusals] == [f"The game refused Attack_Unit: {message}."]
     assert "Attack_screen" not in [name for name, _ in game.functions()]
+
+
+def test_a_target_that_the_camera_does_not_reach_is_refused(table: Any, joint: Any) -> None:
+    game = table()
+    wanted = joint(game, "<Attack_Unit(0x100180001)>", control_group=None)
+    game.camera, game.stuck, game.places[FOE] = (10.0, 10.0), True, (31.0, 31.0)
+    played = game.play(ScreenExecutor(), wanted)
+    said = "The game refused Attack_Unit: the target is beyond the reach of the camera."
+    assert [refusal.rejection.message for refusal in played.refusals] == [said]
+
+
+def test_a_team_among_whom_others_stand_is_not_told_with_them(table: Any, joint: Any) -> None:
+    game = table()
+    wanted = joint(game, "<Stop()>", control_group=None)
+    game.put(STRANGER, "Stalker", 10, 10, build_progress=0.5)  # on top of a unit of the team, and hit in its place
+    game.put(0x100400001, "Stalker", 12, 11, build_progress=0.5)
+    played = game.play(ScreenExecutor(), wanted)
+    said = "The game refused Stop: its units could not be selected, something stands over them."
+    assert [refusal.rejection.message for refusal in played.refusals] == [said]
+    assert "Stop_quick" not in [name for name, _ in game.functions()]
 
 
 def test_a_task_chooses_its_executor(task: Callable[..., TaskConfig]) -> None:

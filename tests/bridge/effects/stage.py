@@ -136,16 +136,12 @@ class Stage:
         assert playing is not None
         shared = {id(part): part for part in bookmark._unchanging(playing)}
         kept = io.BytesIO()
-        pickler = pickle.Pickler(kept)
-        pickler.persistent_id = lambda part: id(part) if id(part) in shared else None  # type: ignore[method-assign]
-        pickler.dump(playing)
+        _Keeper(kept, shared).dump(playing)
         return kept.getvalue(), shared
 
     def _reopen(self) -> None:
         data, shared = self._kept
-        unpickler = pickle.Unpickler(io.BytesIO(data))
-        unpickler.persistent_load = shared.__getitem__  # type: ignore[method-assign]
-        self.client.session._process.playing = unpickler.load()
+        self.client.session._process.playing = _Opener(io.BytesIO(data), shared).load()
 
     def again(self) -> Seen:
         """Goes back to the moment of the order."""
@@ -197,6 +193,28 @@ class Stage:
             else:
                 assert self._eyes is not None, "there is no screen on this stage"
                 self.client.act(self._eyes.transform_action(seen, action))
+
+
+class _Keeper(pickle.Pickler):
+    """Keeps everything but the parts that are shared."""
+
+    def __init__(self, file: io.BytesIO, shared: dict[int, object]) -> None:
+        super().__init__(file)
+        self._shared = shared
+
+    def persistent_id(self, part: object) -> int | None:
+        return id(part) if id(part) in self._shared else None
+
+
+class _Opener(pickle.Unpickler):
+    """Puts the shared parts back in their places."""
+
+    def __init__(self, file: io.BytesIO, shared: dict[int, object]) -> None:
+        super().__init__(file)
+        self._shared = shared
+
+    def persistent_load(self, number: int) -> object:
+        return self._shared[number]
 
 
 def _grant_all(world: World) -> None:

@@ -1,0 +1,94 @@
+"""Asks a game what its units can do, as every observation does, and says how long that takes.
+
+    python bench/abilities.py            a table
+    python bench/abilities.py --json     one JSON object on stdout
+
+The simulator runs as a process of its own, and PySC2 asks it over its websocket, as in a match: the base and the
+workers that a game of Simple64 begins with, and 30 and 100 units of sixteen types beside them. The time is that of
+the question, its way, its answer, and of reading it into a snapshot.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from s2clientprotocol import debug_pb2
+
+from bridge.act.raw import RawExecutor
+from bridge.game import GameConfig
+from bridge.knowledge import knowledge
+from bridge.maps import known_maps
+from bridge.pysc2_game import PySC2Game
+from simulator.install import install
+
+if TYPE_CHECKING:
+    from bridge.snapshot import Snapshot
+
+ARMY = (
+    "Stalker", "Zealot", "Sentry", "HighTemplar", "Immortal", "Phoenix", "VoidRay", "Oracle", "Marine", "Marauder",
+    "Ghost", "Medivac", "Queen", "Ravager", "Infestor", "Roach",
+)  # fmt: skip
+SIZES = (0, 30, 100)
+ROUNDS = 100
+
+
+def measure(sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
+    """One row for each number of units besides those that a game begins with."""
+    with tempfile.TemporaryDirectory() as directory:
+        game = PySC2Game(GameConfig(sc2path=install(Path(directory) / "sc2"), map=known_maps()["Simple64"], seed=1))
+        try:
+            return [_row(game, size) for size in sizes]
+        finally:
+            game.close()
+
+
+def _row(game: PySC2Game, size: int) -> dict[str, Any]:
+    now = _with_army(game, size)
+    times, answer = [], now.abilities or {}
+    for _ in range(ROUNDS):
+        start = time.perf_counter()
+        game._with_abilities([now])  # noqa: SLF001  # the very thing that is to be measured
+        times.append((time.perf_counter() - start) * 1000)
+    return {
+        "units": len(answer),
+        "abilities": sum(map(len, answer.values())),
+        "median_ms": round(statistics.median(times), 2),
+        "p95_ms": round(sorted(times)[int(ROUNDS * 0.95)], 2),
+    }
+
+
+def _with_army(game: PySC2Game, size: int) -> Snapshot:
+    (now,) = game.reset()
+    place = now.own[0].pos
+    commands = []
+    for index in range(size):
+        unit = debug_pb2.DebugCreateUnit(unit_type=knowledge()[ARMY[index % len(ARMY)]].id, owner=1, quantity=1)
+        unit.pos.x, unit.pos.y = place.x, place.y
+        commands.append(debug_pb2.DebugCommand(create_unit=unit))
+    game._env._controllers[0].debug(commands)  # noqa: SLF001  # the only way to units that the map does not have
+    (turn,) = game.act([RawExecutor().plan([], now, 2)])
+    return turn.snapshot
+
+
+def main() -> None:
+    """Prints the measurements."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
+    arguments = parser.parse_args()
+    rows = measure()
+    if arguments.json:
+        print(json.dumps(rows))
+        return
+    print(f"{'own units':>10}{'abilities':>11}{'median ms':>11}{'p95 ms':>9}")
+    for row in rows:
+        print(f"{row['units']:>10}{row['abilities']:>11}{row['median_ms']:>11}{row['p95_ms']:>9}")
+
+
+if __name__ == "__main__":
+    main()
