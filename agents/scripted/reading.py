@@ -11,7 +11,10 @@ from __future__ import annotations
 import functools
 import re
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _SIGNED = r"(-?\d+(?:\.\d+)?)"
@@ -39,6 +42,10 @@ _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}", re.MULTILINE
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
+_RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
+_SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
+_FIELD = re.compile(rf"^ +Pylon 0x[0-9a-f]+ at minimap [^,]+,[^,]+, screen {_POINT}", re.MULTILINE | re.ASCII)
+_UNLISTED = re.compile(r"^ {8}[^:\n]+: (.*)", re.MULTILINE)
 _REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
 _TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
@@ -47,6 +54,8 @@ _PART = re.compile(rf"{_NUMBER}/{_NUMBER}", re.ASCII)
 _FIRST = re.compile(_NUMBER, re.ASCII)
 
 Point = tuple[float, float]
+POWERFUL = frozenset({"Pylon", "WarpPrismPhasing"})
+"""Types that give power."""
 
 
 class Unit(NamedTuple):
@@ -108,6 +117,8 @@ class Team:
     actions: list[Action] = field(default_factory=list)
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
+    resources: list[Point] = field(default_factory=list)
+    """Where minerals and geysers are on the screen."""
     minimap: Point | None = None
     """Where it is; None for a team without units."""
     task: str = ""
@@ -136,6 +147,12 @@ class Situation:
     """Structures under construction, by type."""
     producing: dict[str, int] = field(default_factory=dict)
     """How often something is being made or waits for it, by the name of its action."""
+    impossible: set[str] = field(default_factory=set)
+    """Names of actions that somebody here has, but not now."""
+    sites: list[tuple[str, str]] = field(default_factory=list)
+    """Type and tag of the resources by which a base or a gas structure may be built."""
+    fields: list[Point] = field(default_factory=list)
+    """Where fields of power are on the screen."""
     prices: dict[str, Price] = field(default_factory=dict)
     """By the name of the action; only of what can be paid now."""
     power: list[tuple[str, str, Point]] = field(default_factory=list)
@@ -161,28 +178,9 @@ def read(text: str) -> Situation:
         title, _, body = section.partition("\n")
         if found := _TEAM.fullmatch(title):
             _read_team(_team(situation, found[1]), body)
-        elif title == "Valid actions":
-            _read_valid_actions(situation, body)
-        elif title == "Game":
-            _read_game(situation, body)
-        elif title == "Task":
-            _read_task(situation, body)
-        elif title == "Unit counts":
-            _read_counts(situation, body)
-        elif title == "Alerts":
-            situation.alarm = True
-        elif title == "Answer" and (found := _MAX_ACTIONS.search(body)):
-            situation.max_actions = int(found[1])
-        if found := _WRITE_TO.search(body):
-            situation.correspondents = _NAME.findall(found[1])
-        situation.messages += _MESSAGE.findall(body)
-        situation.accepted += _ACCEPTED.findall(body)
-        situation.rejected += _REJECTED.findall(body)
-        situation.power += [
-            (kind, tag, (float(x), float(y)))
-            for kind, tag, x, y in _POWER.findall(body)
-            if kind in {"Pylon", "WarpPrismPhasing"}
-        ]
+        elif title in _READERS:
+            _READERS[title](situation, body)
+        _read_lines(situation, body)
     return situation
 
 
@@ -239,6 +237,7 @@ def _read_team(team: Team, body: str) -> None:
     if bounds := _SCREEN.search(body):
         x0, x1, y0, y1 = (float(number) for number in bounds.groups())
         team.bounds = (x0, x1, y0, y1)
+    team.resources = [(float(x), float(y)) for _, x, y in _RESOURCE.findall(body)]
     if place := _PLACE.search(body):
         team.minimap = float(place[1]), float(place[2])
 
@@ -288,3 +287,45 @@ def _read_valid_actions(situation: Situation, body: str) -> None:
     for name, price, times in _COSTS.findall(body):
         amounts = {what: int(amount) for amount, what in _PRICE.findall(price)}
         situation.prices[name] = Price(**amounts, times=int(times or 1))
+
+
+def _read_impossible(situation: Situation, body: str) -> None:
+    situation.impossible = {name for names in _UNLISTED.findall(body) for name in names.split(", ")}
+
+
+def _read_sites(situation: Situation, body: str) -> None:
+    situation.sites = [(kind, tag) for kind, tag in _SITE.findall(body) if kind != "Pylon"]
+    situation.fields = [(float(x), float(y)) for x, y in _FIELD.findall(body)]
+
+
+def _read_alerts(situation: Situation, body: str) -> None:
+    situation.alarm = bool(body)
+
+
+def _read_answer(situation: Situation, body: str) -> None:
+    if found := _MAX_ACTIONS.search(body):
+        situation.max_actions = int(found[1])
+
+
+def _read_lines(situation: Situation, body: str) -> None:
+    """What is told by its line, whatever the section."""
+    if found := _WRITE_TO.search(body):
+        situation.correspondents = _NAME.findall(found[1])
+    situation.messages += _MESSAGE.findall(body)
+    situation.accepted += _ACCEPTED.findall(body)
+    situation.rejected += _REJECTED.findall(body)
+    situation.power += [
+        (kind, tag, (float(x), float(y))) for kind, tag, x, y in _POWER.findall(body) if kind in POWERFUL
+    ]
+
+
+_READERS: dict[str, Callable[[Situation, str], None]] = {
+    "Game": _read_game,
+    "Unit counts": _read_counts,
+    "Alerts": _read_alerts,
+    "Places to build at": _read_sites,
+    "Valid actions": _read_valid_actions,
+    "Not possible now": _read_impossible,
+    "Task": _read_task,
+    "Answer": _read_answer,
+}

@@ -98,16 +98,17 @@ def produce(plan: Plan, build: Build) -> None:
     situation = plan.situation
     room = max(0.0, situation.supply_cap - situation.supply_used)
     purse = Purse(plan, situation.minerals, situation.vespene, room)
-    if _needs_supply(situation, build) and not _pending(situation, build.supply):
+    if needs_supply(situation, build) and not _pending(situation, build.supply):
         given = purse.buy(build.supply.action)
-        if not given and situation.minerals < 2 * build.supply_minerals:
+        mine = build.supply.action in situation.impossible
+        if not given and mine and situation.minerals < 2 * build.supply_minerals:
             return
     for want in build.wants:
         if plan.left <= 0:
             return
-        if _met(situation, want):
+        if met(situation, want):
             continue
-        if not purse.buy(want.action) and want.first:
+        if not purse.buy(want.action) and want.first and want.action in situation.impossible:
             return  # it is saved for
     free = _free_producers(situation, build)
     for action in build.army:
@@ -124,7 +125,8 @@ def _free_producers(situation: Situation, build: Build) -> int:
     return there - busy
 
 
-def _needs_supply(situation: Situation, build: Build) -> bool:
+def needs_supply(situation: Situation, build: Build) -> bool:
+    """Whether supply will soon be short, with what is in the making."""
     pending = 8 * (situation.begun.get(build.supply.makes, 0) + situation.producing.get(build.supply.action, 0))
     room = situation.supply_cap + pending - situation.supply_used
     return situation.supply_cap < 200 and room < 3 + situation.supply_used / 8
@@ -134,7 +136,8 @@ def _pending(situation: Situation, want: Want) -> bool:
     return any(name == want.action for _, name, _ in situation.accepted)
 
 
-def _met(situation: Situation, want: Want) -> bool:
+def met(situation: Situation, want: Want) -> bool:
+    """Whether there is enough of something, in the making or there, or its turn has not come yet."""
     halls = sum(situation.counts.get(kind, 0) for kind in HALLS)
     if any(situation.counts.get(kind, 0) < count for kind, count in want.after.items()):
         return True  # not yet its turn

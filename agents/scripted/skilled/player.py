@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from agents.scripted.reading import points, read
-from agents.scripted.skilled import combat, economy, journey, skills
+from agents.scripted.skilled import builder, combat, economy, journey, skills
 from agents.scripted.skilled.kinds import kind_of
 from agents.scripted.skilled.plan import Plan
 from agents.scripted.skilled.space import middle
@@ -44,6 +44,9 @@ def _lead(plan: Plan) -> None:
         return
     if any(unit.type.startswith("WarpPrism") for unit in team.own):
         prism(plan)
+        return
+    if builder.leads(plan):
+        builder.build(plan)
         return
     if all(unit.type == "AdeptPhaseShift" for unit in team.own):
         shade(plan)
