@@ -43,13 +43,16 @@ class Targets:
         """The units that the first arguments name.
 
         Raises:
-            Refused: one of them is no unit of the team.
+            Refused: one of them is no unit of the team, or named twice.
         """
         tags = said.tags[: said.action.named]
         for tag in tags:
             if tag not in said.team.team.tags:
                 raise self._not_of_team(said, tag)
-        return tuple(dict.fromkeys(tags))
+        if twice := [tag for place, tag in enumerate(tags) if tag in tags[:place]]:
+            what = f"{said.action.name} takes two different units, {hex(twice[0])} stands there twice."
+            raise Refused("wrong_arguments", what)
+        return tags
 
     def unit(self, said: Recognised) -> raw_pb2.Unit:
         """The unit that the last tag names.

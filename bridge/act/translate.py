@@ -130,7 +130,10 @@ class Translator:
 
     def _as_said(self, said: Recognised) -> list[Order]:
         """The order of a call whose words say it all."""
-        units, function = self._having(said, self._units(said)), said.action.pysc2
+        function = said.action.pysc2
+        if function is None and not said.team.team.tags:
+            return []
+        units = self._having(said, self._units(said))
         if function is None:
             return []
         able = self._able(said, function, units)
@@ -149,7 +152,7 @@ class Translator:
         tags = self._targets.named(said) if said.action.named else said.team.team.tags
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
-            raise self._cannot(said, ["it is gone"])
+            raise self._cannot(said, ["it has no units" if not tags else "it is gone"])
         return found
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
