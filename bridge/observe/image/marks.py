@@ -78,7 +78,7 @@ def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], heig
     spots = []
     for one in marked:
         stamp = written(one.text, height_px, LIVERIES[one.side].mark, palette.INK)
-        spot = _spot(one, stamp, hidden, covered)
+        spot = _on_body(one, stamp, hidden) or _spot(one, stamp, hidden, covered)
         if spot is not None:
             hidden.add(spot.left, spot.top, *stamp.size)
             spots.append((one, stamp, spot))
@@ -128,35 +128,66 @@ _WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 """Beside a body, right first: y downwards, so that bars above it stay free."""
 
 
+def _on_body(one: Marked, stamp: Stamp, hidden: _Plan) -> _Spot | None:
+    """Below the letters of a large body, if that is free."""
+    width, height = stamp.size
+    left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
+    is_inside = 0 <= left <= hidden.width - width and 0 <= top <= hidden.height - height
+    if one.radius < _ROOMY_PX or not is_inside or hidden.taken >> hidden.at(left, top) & hidden.bits(width, height)[0]:
+        return None
+    return _Spot(left, top, 0, (one.x, one.y))
+
+
+class _Try(NamedTuple):
+    """A place for a mark, from the middle of its body."""
+
+    left: int
+    top: int
+    ring: int
+    cost: float
+    """Of being there at all."""
+
+
+@functools.lru_cache(1024)
+def _tries(radius: int, width: int, height: int) -> tuple[_Try, ...]:
+    """Where a mark of this size may stand around a body of this radius, the handiest first."""
+    tries = []
+    for ring, gap in enumerate(_RINGS_PX):
+        beside, corner = radius + gap, round(0.72 * radius) + gap
+        for way, (right, down) in enumerate(_WAYS):
+            reach = corner if right and down else beside
+            x, y = right * (reach + width // 2), down * (reach + height // 2)
+            tries.append(_Try(x - width // 2, y - height // 2, ring, _FAR * ring + way / 100))
+    return tuple(tries)
+
+
 def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
     """Where a mark hides least; None if every place is over other marks."""
     width, height = stamp.size
-    right_most, lowest = hidden.width - width, hidden.height - height
     bits, count = hidden.bits(width, height)
-    marks, bodies = hidden.taken, covered.taken
-    if one.radius >= _ROOMY_PX:
-        left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
-        if 0 <= left <= right_most and 0 <= top <= lowest and not marks >> hidden.at(left, top) & bits:
-            return _Spot(left, top, 0, (one.x, one.y))
-    best, lowest_cost = None, math.inf
-    for ring, gap in enumerate(_RINGS_PX):
-        if lowest_cost < _FAR * ring:
-            break  # further away is no better
-        beside, corner = one.radius + gap, round(0.72 * one.radius) + gap
-        for way, (right, down) in enumerate(_WAYS):
-            reach = corner if right and down else beside
-            x, y = one.x + right * (reach + width // 2), one.y + down * (reach + height // 2)
-            left, top = x - width // 2, y - height // 2
-            if not (0 <= left <= right_most and 0 <= top <= lowest):
+    marks, bodies, stride = hidden.taken, covered.taken, hidden.stride
+    right_most, lowest = hidden.width - width, hidden.height - height
+    best, least = None, math.inf
+    for right, down, ring, cost in _tries(one.radius, width, height):
+        if cost >= least:
+            break  # all that follows is less handy than the best, whatever it hides
+        left, top = one.x + right, one.y + down
+        if not (0 <= left <= right_most and 0 <= top <= lowest):
+            continue
+        at = top // _CELL * stride + left // _CELL
+        over = marks >> at & bits
+        if over:
+            share = over.bit_count() / count
+            if share > _WORST:
                 continue
-            at = hidden.at(left, top)
-            over = (marks >> at & bits).bit_count() / count
-            cost = _OVER_MARK * over + _FAR * ring + way / 100
-            if over > _WORST or cost >= lowest_cost:
+            cost += _OVER_MARK * share  # noqa: PLW2901  # what it would cost here
+            if cost >= least:
                 continue
-            cost += _OVER_BODY * (bodies >> at & bits).bit_count() / count
-            if cost < lowest_cost:
-                best, lowest_cost = _Spot(left, top, ring, (x, y)), cost
+        under = bodies >> at & bits
+        if under:
+            cost += _OVER_BODY * under.bit_count() / count  # noqa: PLW2901  # and this, too
+        if cost < least:
+            best, least = _Spot(left, top, ring, (left + width // 2, top + height // 2)), cost
     return best
 
 
