@@ -195,7 +195,9 @@ def _why_not(ask: Ask, land: Land, cell: tuple[int, int]) -> str:
         return "a cliff, a ramp or the edge of the map is in its way."
     x, y = np.array(cells).T
     standing = land.standing_on(cells)
+    again = (_structure(ask), footprint.middle(cell)) in land.plans
     reasons = (
+        (again, f"a {_structure(ask)} is going to be built there already."),
         (land.taken[x, y].any(), f"a {name(standing) if standing else 'unit'} is in its way."),
         ((land.planned | promised(land, ask.ledger))[x, y].any(), "something else is going to be built there."),
         (site.ground == "creep" and not land.creep[x, y].all(), "it needs creep under all of it."),

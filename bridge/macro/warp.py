@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
 from bridge.ground.resources import coordinates, everywhere
+from bridge.macro.ledger import Ledger
 from bridge.macro.price import charge, check, require
 from bridge.macro.rule import Impossible, Order, never
 from bridge.macro.side import finished, is_structure, kind, name, of_types, place
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from bridge.ground.terrain import Bools
     from bridge.macro.rule import Ask
     from bridge.macro.side import Unit
+    from bridge.snapshot import Snapshot
 
 BODY: Final = 0.625
 """Radius of the widest unit that is warped in, a Stalker, in world units."""
@@ -33,6 +35,26 @@ FAST: Final = {"Nexus": 7.0, "Gateway": 6.5, "WarpGate": 6.5}
 """How near to one of these structures a Pylon warps in fast, in world units."""
 
 
+class PowerField(NamedTuple):
+    """What a model may want to know of one of its power fields before it warps in there."""
+
+    tag: int
+    """Of the Pylon or phasing WarpPrism."""
+    fast: bool
+    """Whether units are there soon after they are warped in."""
+    room: bool
+    """Whether one more unit has room."""
+
+
+def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
+    """The player's power fields, by ascending tags."""
+    ledger = Ledger.of(snapshot)
+    return tuple(
+        PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
+        for source in land_of(snapshot).power_sources
+    )
+
+
 def warp_near(ask: Ask) -> list[Order]:
     """Warps a unit in as near to a Pylon or phasing WarpPrism as there is room.
 
@@ -40,7 +62,7 @@ def warp_near(ask: Ask) -> list[Order]:
         Impossible: no gate is ready, the price is not there, or there is no room in that field.
     """
     land = land_of(ask.snapshot)
-    source = next((s for s in _sources(ask) if s.tag == ask.tag), None)
+    source = next((s for s in land.power_sources if s.tag == ask.tag), None)
     if source is None:
         unit = None if ask.tag is None else land.unit(ask.tag)
         what = "unit" if unit is None else name(unit)
@@ -49,7 +71,7 @@ def warp_near(ask: Ask) -> list[Order]:
             f"The {what} {hex(ask.tag or 0)} has no power field; name a finished Pylon or phasing WarpPrism of yours.",
         )
     gate = _gate(ask)
-    cell = _room(ask, land, source)
+    cell = _room(ask.snapshot, ask.ledger, source)
     if cell is None:
         raise Impossible(
             "invalid_target",
@@ -64,9 +86,9 @@ def warp_auto(ask: Ask) -> list[Order]:
     Raises:
         Impossible: no gate is ready, the price is not there, or no field has room.
     """
-    land, gate = land_of(ask.snapshot), _gate(ask)
-    for source in sorted(_sources(ask), key=lambda source: _crowded(ask, source)):
-        cell = _room(ask, land, source)
+    gate = _gate(ask)
+    for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _crowded(ask, source)):
+        cell = _room(ask.snapshot, ask.ledger, source)
         if cell is not None:
             return _warp(ask, gate, cell)
     raise never(ask, "no power field has room for it; build a Pylon first.")
@@ -107,42 +129,37 @@ def _gate(ask: Ask) -> Unit:
 # where ----------------------------------------------------------------------------------------------------------------
 
 
-def _sources(ask: Ask) -> tuple[raw_pb2.PowerSource, ...]:
-    """The player's power fields, by ascending tags."""
-    return land_of(ask.snapshot).power_sources
-
-
 def _crowded(ask: Ask, source: raw_pb2.PowerSource) -> tuple[bool, int, int]:
     """The less, the better a field is for the next unit."""
     middle = (source.pos.x, source.pos.y)
     units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]
-    return not _is_fast(ask, source), len(units) + len(ask.ledger.sites), source.tag
+    return not _is_fast(ask.snapshot, source), len(units) + len(ask.ledger.sites), source.tag
 
 
-def _is_fast(ask: Ask, source: raw_pb2.PowerSource) -> bool:
-    unit = ask.snapshot.units.get(source.tag)
+def _is_fast(snapshot: Snapshot, source: raw_pb2.PowerSource) -> bool:
+    unit = snapshot.units.get(source.tag)
     if unit is not None and name(unit) == "WarpPrismPhasing":
         return True
     middle = (source.pos.x, source.pos.y)
-    near_by = finished(of_types(ask.snapshot, FAST))
+    near_by = finished(of_types(snapshot, FAST))
     return any(math.dist(place(other), middle) <= FAST[name(other)] for other in near_by)
 
 
-def _room(ask: Ask, land: Land, source: raw_pb2.PowerSource) -> tuple[int, int] | None:
+def _room(snapshot: Snapshot, ledger: Ledger, source: raw_pb2.PowerSource) -> tuple[int, int] | None:
     """The cell nearest to a source where a unit touches nobody; one with free cells beside it before others."""
-    free = land.open & ~promised(land, ask.ledger) & land.powered(corner=False, by=source.tag)
-    free &= ~_bodies(ask, land, source)
-    middle = WorldPoint(source.pos.x, source.pos.y)
-    away = near(land, [middle])
-    airy = free & everywhere(land.open & ~promised(land, ask.ledger), BESIDE)
+    land = land_of(snapshot)
+    ground = land.open & ~promised(land, ledger)
+    free = ground & land.powered(corner=False, by=source.tag) & ~_bodies(snapshot, land, source)
+    away = near(land, [WorldPoint(source.pos.x, source.pos.y)])
+    airy = free & everywhere(ground, BESIDE)
     return best(airy & ~land.kept, away) or best(airy, away) or best(free, away)
 
 
-def _bodies(ask: Ask, land: Land, source: raw_pb2.PowerSource) -> Bools:
+def _bodies(snapshot: Snapshot, land: Land, source: raw_pb2.PowerSource) -> Bools:
     """(w, h) the cells in whose middle a unit would touch another one, around a power source."""
     result = np.zeros(land.ground.size, np.bool_)
     reach = source.radius + 2
-    for unit in ask.snapshot.units.values():
+    for unit in snapshot.units.values():
         offset = max(abs(unit.pos.x - source.pos.x), abs(unit.pos.y - source.pos.y))
         if offset > reach or unit.is_flying or is_structure(unit) or _is_neutral_ground(unit):
             continue

@@ -157,6 +157,16 @@ def test_a_second_structure_of_a_turn_does_not_stand_on_the_first(make_game: Cal
     assert said.place == (46, 20)
 
 
+def test_the_same_structure_once_more_is_said_to_be_under_way(make_game: Callable[..., Game]) -> None:
+    game = make_game("Flat64")
+    rich(game)
+    probe, point = (game.own("Probe")[0].tag,), WorldPoint(44, 20)
+    game.do(game.say("Build_Pylon_Screen", units=probe, point=point))
+    game.play(1)
+    said = game.refusal("Build_Pylon_Screen", units=probe, point=point)
+    assert said.message == "Pylon cannot stand there: a Pylon is going to be built there already."
+
+
 @pytest.mark.parametrize(
     ("structure", "point", "message"),
     [

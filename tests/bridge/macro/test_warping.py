@@ -9,6 +9,7 @@ import pytest
 from s2clientprotocol import debug_pb2
 
 from bridge.frames import WorldPoint
+from bridge.macro.warp import fields
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,3 +100,12 @@ def test_a_phasing_prism_is_a_place_to_warp_to_and_the_soonest(game: Game) -> No
     assert isinstance(order.target, WorldPoint)
     assert math.dist(order.target, (30, 45)) <= 3.75
     assert game.do([order]) == ["Success"]
+
+
+def test_fields_tell_whether_they_are_fast_and_have_room(game: Game) -> None:
+    near, away = sorted((unit.tag for unit in game.own("Pylon")), key=lambda tag: game.snapshot.units[tag].pos.y)
+    assert set(fields(game.snapshot)) == {(near, True, True), (away, False, True)}
+    for x in range(14, 27, 2):
+        for y in range(34, 47, 2):
+            game.put("Immortal", x, y)
+    assert {field.tag: field.room for field in fields(game.snapshot)}[away] is False
