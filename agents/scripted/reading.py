@@ -46,6 +46,7 @@ _RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
 _SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
 _FIELD = re.compile(rf"^ +Pylon 0x[0-9a-f]+ at minimap [^,]+,[^,]+, screen {_POINT}", re.MULTILINE | re.ASCII)
 _UNLISTED = re.compile(r"^ {8}[^:\n]+: (.*)", re.MULTILINE)
+_FRIENDS = re.compile(rf"^        \S+: \d+ .* at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
 _TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
@@ -159,6 +160,8 @@ class Situation:
     """Type, tag and place of what gives power."""
     known: list[tuple[str, Point]] = field(default_factory=list)
     """Types of enemies and where on the minimap one of them is."""
+    friends: list[Point] = field(default_factory=list)
+    """Where on the minimap the teams of other agents are."""
     alarm: bool = False
     """Whether own units are under attack."""
     rejected: list[str] = field(default_factory=list)
@@ -298,6 +301,10 @@ def _read_sites(situation: Situation, body: str) -> None:
     situation.fields = [(float(x), float(y)) for x, y in _FIELD.findall(body)]
 
 
+def _read_others(situation: Situation, body: str) -> None:
+    situation.friends = [(float(x), float(y)) for x, y in _FRIENDS.findall(body)]
+
+
 def _read_alerts(situation: Situation, body: str) -> None:
     situation.alarm = bool(body)
 
@@ -323,6 +330,7 @@ _READERS: dict[str, Callable[[Situation, str], None]] = {
     "Game": _read_game,
     "Unit counts": _read_counts,
     "Alerts": _read_alerts,
+    "Teams of other agents": _read_others,
     "Places to build at": _read_sites,
     "Valid actions": _read_valid_actions,
     "Not possible now": _read_impossible,

@@ -7,12 +7,14 @@ needs no memory, and mends by itself what was shot down.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from agents.scripted.reading import Price
+from agents.scripted.reading import Price, points
 from agents.scripted.skilled.builds import BUILDS, Build, Want
+from agents.scripted.writing import point
 
 if TYPE_CHECKING:
     from agents.scripted.reading import Situation
@@ -46,6 +48,16 @@ def command(plan: Plan) -> None:
         plan.give("All_Units_Attack")
     elif size and (situation.alarm or out):
         plan.give("All_Units_Defend")
+
+
+def marching_order(situation: Situation) -> str:
+    """What a commander without units tells all groups: where the enemy is, or where to gather."""
+    x, y = (sum(values) / len(situation.friends) for values in zip(*situation.friends, strict=True))
+    bases = sorted(points(situation.task), key=lambda base: math.dist(base, (x, y))) or [(x, y)]
+    known = [place for kind, place in situation.known if kind in _STRUCTURES]
+    if army(situation) >= STRONG:
+        return f"All groups attack at {point(known[0] if known else bases[-1])}, together."
+    return f"All groups gather at {point(bases[0])} and defend it."
 
 
 def army(situation: Situation) -> int:

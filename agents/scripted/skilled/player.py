@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 MESSAGE_SHARE = 0.2
 """Part of the replies in which something is said to others."""
+ORDERS_EVERY_S = 12
+"""How often a commander says where all go."""
 _RAID = re.compile(r"\b(raid|workers?|drones?|probes?|scvs?)\b", re.IGNORECASE)
 _HALL = re.compile(r"\b(hatchery|nexus|command center)\b", re.IGNORECASE)
 _ATTACK = re.compile(r"\b(raid|kill|destroy)\b", re.IGNORECASE)
@@ -107,6 +109,9 @@ def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     fighting = [team for team in situation.teams.values() if team.enemies and team.minimap]
     if fighting and rng.random() < MESSAGE_SHARE:
         return [(people[0], _report(fighting[0]))]
+    if situation.friends and "CombatGroup" in " ".join(people) and situation.time_s % ORDERS_EVERY_S < 2:
+        groups = [name for name in people if name.startswith("CombatGroup")]
+        return [(name, economy.marching_order(situation)) for name in groups]
     calls = [(sender, place) for sender, text in situation.messages for place in points(text)]
     if calls and not any(team.own for team in situation.teams.values()):
         sender, place = calls[-1]
