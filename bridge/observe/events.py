@@ -38,8 +38,9 @@ class Events:
         self.dead = dead
         self._now = now
         totals = ((tag, unit.health + unit.shield - before[tag]) for tag, unit in now.items() if tag in before)
-        self.changes = {tag: change for tag, change in totals if abs(change) >= MIN_CHANGE}
-        """Health and shield gained or lost, by tag, as far as they make an event."""
+        changes = {tag: change for tag, change in totals if abs(change) >= MIN_CHANGE}
+        self.changes = {tag: by for tag, by in changes.items() if by < 0 or now[tag].build_progress >= 1}
+        """Health and shield gained or lost, by tag, as far as they make an event; what is being built only grows."""
         self._changed: dict[Alliance, dict[str, Event]] = {}
 
     def of_team(self, before: TeamView, saw: Witnessed, now: Witnessed) -> tuple[Event, ...]:

@@ -162,7 +162,7 @@ class Possible:
                 if name not in self._upgrades:
                     return f"{name} is not researched"
             elif not stand_ins(name) & self._standing:
-                return f"no {name}"
+                return f"{name} is not finished" if stand_ins(name) & self._own.keys() else f"no {name}"
         return self._short_of(facts)
 
     def _promised_away(self, facts: AbilityFacts | None) -> str | None:

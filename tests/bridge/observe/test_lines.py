@@ -139,6 +139,17 @@ def test_what_a_team_passes_of_its_own_side_is_no_event_if_it_stands_still(unit:
     assert "Probe" not in text
 
 
+def test_what_is_being_built_does_not_recover_but_can_be_hit(unit: Any, snapshot: Any, task: Any) -> None:
+    observer = Observer(task("3s_vs_3z"))
+    head = unit(1, "Stalker", 16, 16)
+    texts = []
+    for health in (50, 90, 60):
+        pylon = unit(2, "Pylon", 18, 16, health=health, build_progress=0.5)
+        texts.append(observer.observe(snapshot([head, pylon])).agents["CombatGroupSmac"].text)
+    assert "Since the last observation" not in texts[1]
+    assert "        ally Pylon was hit: 0x2 -30\n" in texts[2]
+
+
 def test_workers_of_the_own_side_are_told_by_number(unit: Any, snapshot: Any, task: Any) -> None:
     units = [unit(1, "Stalker", 16, 16), unit(2, "Probe", 12, 16), unit(3, "Probe", 13, 18), unit(4, "Zealot", 14, 16)]
     text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text

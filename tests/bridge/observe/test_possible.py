@@ -139,6 +139,12 @@ def test_a_structure_that_is_required_is_named(unit: Any, team: Any) -> None:
     assert reasons(view) == {"Train_HighTemplar": "no TemplarArchive"}
 
 
+def test_a_required_structure_that_is_being_built_is_said_to_be(unit: Any, team: Any) -> None:
+    units = [unit(1, "Gateway", 16, 16, is_powered=True), unit(2, "TemplarArchive", 20, 16, build_progress=0.5)]
+    view = team(units, "Train_HighTemplar", abilities={}, player=RICH)
+    assert reasons(view) == {"Train_HighTemplar": "TemplarArchive is not finished"}
+
+
 def test_supply_that_is_used_up_is_named(unit: Any, team: Any) -> None:
     gateway = unit(1, "Gateway", 16, 16, is_powered=True)
     view = team([gateway], "Train_Zealot", abilities={}, player=RICH | {"food_used": 49})
