@@ -1,0 +1,268 @@
+"""What the skilled player does, by texts that show one thing each."""
+
+from __future__ import annotations
+
+import random
+from typing import TYPE_CHECKING
+
+import pytest
+
+from agents.scripted.reading import read
+from agents.scripted.skilled import skilled
+from agents.scripted.skilled.builds import BUILDS
+from agents.scripted.skilled.kinds import KINDS
+from protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+BASIC = ("Move_Screen(screen)", "Move_Minimap(minimap)", "Attack_Unit(tag)", "Select_Unit_Move_Screen(tag, screen)")
+
+
+def line(
+    tag: int, name: str, x: float, y: float, *fields: str, health: str = "100/100", far: float | None = None
+) -> str:
+    """A unit as an observation lists it; `far` is its distance, of enemies."""
+    distance = () if far is None else (f"distance {far}",)
+    return " | ".join((name, f"tag 0x{tag:x}", f"screen [{x}, {y}]", *distance, f"health {health}", *fields))
+
+
+def page(
+    *own: str,
+    enemies: Iterable[str] = (),
+    allies: Iterable[str] = (),
+    actions: Iterable[str] = BASIC,
+    task: str = "",
+    more: str = "",
+    minimap: str = "[30, 32]",
+) -> str:
+    """An observation of one team, T."""
+    lists = {"Your units": own, "Allied units": tuple(allies), "Enemy units": tuple(enemies)}
+    blocks = [
+        f"    {title}:\n" + "".join(f"        {unit}\n" for unit in units) for title, units in lists.items() if units
+    ]
+    valid = ", ".join(f"<{action}>" for action in actions)
+    return (
+        f"Game\n    Time: 0:20\n\nTeam T\n    Minimap position: {minimap}\n{''.join(blocks)}\n"
+        f"Valid actions\n    Team T: {valid}\n\nTask\n    Win.\n    Team T: {task}\n\n{more}"
+        "Answer\n    At most 3 actions per team.\n"
+    )
+
+
+def calls(text: str) -> list[str]:
+    """What it orders, `Attack_Unit 0x1`."""
+    speech = parse(skilled(text, random.Random(1)))
+    assert speech.faults == ()
+    return [" ".join((call.name, *(str(arg) for arg in call.args))) for call in speech.calls]
+
+
+def names(text: str) -> list[str]:
+    return [call.split(" ")[0] for call in calls(text)]
+
+
+STALKERS = [line(n, "Stalker", 12, 10 + n, "shield 80/80", "weapon ready", health="80/80") for n in (1, 2, 3)]
+COOLING = [text.replace("weapon ready", "weapon in 0.9 s") for text in STALKERS]
+ZEALOT = line(0x10, "Zealot", 14, 12, "shield 50/50", far=2.0)
+
+
+def test_it_shoots_while_weapons_are_ready() -> None:
+    assert calls(page(*STALKERS, enemies=[ZEALOT])) == ["Attack_Unit 0x10"]
+
+
+def test_it_steps_back_from_melee_units_while_weapons_cool_down() -> None:
+    (call,) = calls(page(*COOLING, enemies=[ZEALOT]))
+    x = float(call.split("(")[1].split(",")[0])
+    assert call.startswith("Move_Screen")
+    assert x < 12
+
+
+def test_it_does_not_step_back_from_who_is_faster() -> None:
+    assert names(page(*COOLING, enemies=[ZEALOT.replace("Zealot", "Broodling")])) == ["Attack_Unit"]
+
+
+def test_it_prefers_the_enemy_whose_loss_helps_most() -> None:
+    hurt = line(0x11, "Roach", 17, 12, health="20/145", far=5.0)
+    whole = line(0x12, "Roach", 16, 12, health="145/145", far=4.0)
+    assert calls(page(*STALKERS, enemies=[whole, hurt])) == ["Attack_Unit 0x11"]
+
+
+def test_it_shoots_at_what_its_weapons_can_hit() -> None:
+    zealots = [line(1, "Zealot", 12, 12, "shield 50/50")]
+    flyer, walker = line(0x11, "Mutalisk", 13, 12, far=1.0, health="1/120"), line(0x12, "Roach", 15, 12, far=3.0)
+    assert calls(page(*zealots, enemies=[flyer, walker])) == ["Attack_Unit 0x12"]
+
+
+BLINK = (*BASIC, "Select_Unit_Blink_Screen(tag, screen)")
+
+
+def test_the_nearly_dead_blink_out_of_reach_and_the_others_go_on() -> None:
+    hurt = line(9, "Stalker", 13, 12, "shield 0/80", "weapon ready", health="30/80")
+    first, second = calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK))
+    assert first.startswith("Select_Unit_Blink_Screen 0x9")
+    assert second == "Attack_Unit 0x10"
+
+
+def test_who_cannot_blink_again_yet_does_not_try() -> None:
+    hurt = line(9, "Stalker", 13, 12, "shield 0/80", "weapon ready", "not ready Blink", health="30/80")
+    assert "Select_Unit_Blink_Screen" not in names(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK))
+
+
+ROACHES = [line(0x20 + n, "Roach", 17, 8 + n, far=5.0) for n in range(5)]
+SWARM = [line(0x20 + n, "Zergling", 18 + n % 3 * 0.5, 12 + n // 3 * 0.5, far=6.0, health="35/35") for n in range(9)]
+LONE = [line(0x40, "Zergling", 18, 12, far=6.0, health="35/35")]
+
+
+def templar(energy: int, count: int = 1) -> list[str]:
+    return [line(n, "HighTemplar", 12, 10 + n, "shield 40/40", f"energy {energy}/200") for n in range(1, count + 1)]
+
+
+STORM = (*BASIC, "Select_Unit_Ability_PsiStorm_Screen(tag, screen)")
+
+
+@pytest.mark.parametrize(("energy", "enemies", "storms"), [(75, SWARM, 1), (74, SWARM, 0), (200, LONE, 0)])
+def test_storms_are_for_crowds(energy: int, enemies: list[str], storms: int) -> None:
+    said = names(page(*templar(energy), enemies=enemies, actions=STORM))
+    assert said.count("Select_Unit_Ability_PsiStorm_Screen") == storms
+
+
+def test_two_templar_storm_two_places_and_not_their_friends() -> None:
+    two = [*SWARM, *(line(0x60 + n, "Zergling", 18 + n % 3 * 0.5, 6 + n // 3 * 0.5, far=8.0) for n in range(9))]
+    said = [call for call in calls(page(*templar(100, 2), enemies=two, actions=STORM)) if "PsiStorm" in call]
+    assert len({call.split(" ", 2)[2] for call in said}) == len(said) == 2
+    friends = [line(0x70 + n, "Zealot", 18 + n % 3 * 0.5, 12 + n // 3 * 0.5) for n in range(9)]
+    assert not any(
+        "PsiStorm" in call for call in calls(page(*templar(100), enemies=SWARM, allies=friends, actions=STORM))
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "fields", "action", "enemies"),
+    [
+        ("Sentry", ("energy 100/200",), "Ability_GuardianShield()", ROACHES),
+        ("Sentry", ("energy 100/200",), "Select_Unit_Ability_ForceField_Screen(tag, screen)", SWARM),
+        ("Disruptor", (), "Select_Unit_Ability_PurificationNova_Attack(tag, tag)", SWARM),
+        ("VoidRay", (), "Ability_PrismaticAlignment()", SWARM),
+        ("Mothership", ("energy 150/200",), "Ability_TimeWarp_Screen(screen)", SWARM),
+        ("Oracle", ("energy 100/200",), "Ability_PulsarBeamOn()", [line(0x20, "Drone", 14, 12, far=3)]),
+        ("Infestor", ("energy 100/200",), "Effect_FungalGrowth_Screen(screen)", SWARM),
+        ("Marine", (), "Effect_Stim()", ROACHES),
+        ("SiegeTank", (), "Morph_SiegeMode()", SWARM),
+    ],
+)  # fmt: skip
+def test_a_skill_is_used_when_it_is_worth_it_and_not_without_enemies(
+    unit: str, fields: tuple[str, ...], action: str, enemies: list[str]
+) -> None:
+    own, name = line(1, unit, 12, 12, "shield 10/10", *fields), action.partition("(")[0]
+    assert name in names(page(own, enemies=enemies, actions=(*BASIC, action)))
+    assert name not in names(page(own, actions=(*BASIC, action)))
+
+
+def test_a_phoenix_lifts_while_others_are_there_to_shoot() -> None:
+    beam = (*BASIC, "Select_Phoenix_Ability_GravitonBeam_Unit(tag, tag)")
+    phoenixes = [line(n, "Phoenix", 12, 10 + n, "shield 60/60", "energy 100/200") for n in (1, 2)]
+    queen = line(0x20, "Queen", 16, 12, far=4.0)
+    assert "Select_Phoenix_Ability_GravitonBeam_Unit 0x1 0x20" in calls(page(*phoenixes, enemies=[queen], actions=beam))
+    assert "Select_Phoenix_Ability_GravitonBeam_Unit" not in names(page(phoenixes[0], enemies=[queen], actions=beam))
+    lifted = line(0x20, "Queen", 16, 12, "effects GravitonBeam", far=4.0)
+    assert calls(page(*phoenixes, enemies=[lifted], actions=beam)) == ["Attack_Unit 0x20"]
+
+
+ADEPTS = [line(n, "Adept", 12, 10 + n, "shield 70/70", "weapon ready", health="70/70") for n in (1, 2)]
+DRONE, QUEEN = (
+    line(0x20, "Drone", 16, 12, far=4.0, health="40/40"),
+    line(0x21, "Queen", 15, 12, far=3.0, health="5/175"),
+)
+
+
+def test_a_raid_goes_for_workers_and_a_battle_for_the_army() -> None:
+    assert calls(page(*ADEPTS, enemies=[DRONE, QUEEN], task="Kill as many workers as you can.")) == ["Attack_Unit 0x20"]
+    assert calls(page(*ADEPTS, enemies=[DRONE, QUEEN], task="Defeat the army.")) == ["Attack_Unit 0x21"]
+
+
+def test_who_shall_not_stop_on_the_way_passes_by() -> None:
+    text = page(*ADEPTS, enemies=[QUEEN], task="Get to [52, 32]; do not stop to fight on the way.")
+    assert calls(text) == ["Move_Minimap (52.0, 32.0)"]
+
+
+def test_a_team_goes_where_its_task_or_a_message_wants_it() -> None:
+    assert calls(page(*STALKERS, task="Wait at [20, 21].")) == ["Move_Minimap (20.0, 21.0)"]
+    message = "Messages\n    Message from Commander: '''All groups attack at [40.0, 46.0], together.'''\n\n"
+    assert calls(page(*STALKERS, task="Wait at [20, 21].", more=message)) == ["Move_Minimap (40.0, 46.0)"]
+    assert calls(page(*STALKERS, task="Wait at [20, 21].", minimap="[20, 22]")) == []
+
+
+def side(
+    valid: str, counts: str, *, minerals: int = 400, supply: str = "20 of 31", costs: str = "", more: str = ""
+) -> str:
+    return (
+        f"Game\n    Time: 2:00\n    Minerals: {minerals}, vespene: 100\n    Supply: {supply} used\n\n"
+        f"Unit counts\n    {counts}\n\n{more}Valid actions\n    Team Base: {valid}\n    What they do:\n{costs}\n"
+        "Answer\n    At most 5 actions per team.\n"
+    )
+
+
+def test_supply_is_built_before_it_is_short() -> None:
+    valid, counts = (
+        "<Build_Pylon()>, <Train_Zealot()>",
+        "Your units: 20 Probe (working)\n    Your structures: 1 Nexus, 1 Pylon",
+    )
+    assert names(side(valid, counts, supply="13 of 15"))[0] == "Build_Pylon"
+    assert "Build_Pylon" not in names(side(valid, counts, supply="20 of 31"))
+    building = f"{counts}\n    Under construction: 1 Pylon (20%)"
+    assert "Build_Pylon" not in names(side(valid, building, supply="13 of 15"))
+
+
+def test_no_more_is_ordered_than_can_be_paid() -> None:
+    costs = "        Train_Zealot: fights. Costs 100 minerals, 2 supply; enough for 2.\n"
+    counts = "Your units: 44 Probe (working)\n    Your structures: 1 Nexus, 3 Pylon, 8 Gateway, 1 CyberneticsCore"
+    assert names(side("<Train_Zealot()>", counts, minerals=250, costs=costs)) == ["Train_Zealot"] * 2
+
+
+@pytest.mark.parametrize(
+    ("army", "more", "order"),
+    [
+        ("20 Stalker", "", ["All_Units_Attack"]),
+        ("10 Stalker", "", []),
+        ("10 Stalker", "Alerts\n    Under attack at minimap [30, 47]\n\n", ["All_Units_Defend"]),
+        ("10 Stalker", "Your last actions\n    accepted: Base <All_Units_Attack()>\n\n", ["All_Units_Attack"]),
+        ("4 Stalker", "Your last actions\n    accepted: Base <All_Units_Attack()>\n\n", ["All_Units_Defend"]),
+    ],
+)
+def test_the_army_sets_out_when_it_is_strong_and_comes_home_when_it_is_not(
+    army: str, more: str, order: list[str]
+) -> None:
+    valid, counts = (
+        "<All_Units_Attack()>, <All_Units_Defend()>",
+        f"Your units: 20 Probe, {army}\n    Your structures: 1 Nexus",
+    )
+    assert names(side(valid, counts, more=more)) == order
+
+
+def test_units_are_warped_in_at_a_phasing_prism() -> None:
+    fields = "        Pylon 0x1 at minimap [10, 36]\n        WarpPrismPhasing 0x2 at minimap [52, 24]\n\n"
+    costs = "        Warp_Zealot_Near: warps. Costs 100 minerals, 2 supply; enough for 4.\n"
+    assert (
+        calls(side("<Warp_Zealot_Near(tag)>", "Your units: 12 Probe", costs=costs, more=f"Warping in\n{fields}"))
+        == ["Warp_Zealot_Near 0x2"] * 4
+    )
+
+
+def test_build_orders_name_types_that_the_player_knows() -> None:
+    made = {kind for build in BUILDS for want in build.wants if not want.upgrade for kind in want.makes.split("|")}
+    structures = {kind for build in BUILDS for kind in build.structures}
+    assert made - structures <= KINDS.keys() | {"Overlord"}
+    assert structures <= KINDS.keys()
+
+
+def test_what_an_observation_says_of_the_side_is_read() -> None:
+    counts = (
+        "Your units: 2 Probe (1 working, 1 idle), 1 Sentry\n    Your structures: 2 Gateway (1 working, 1 idle)\n"
+        "    Under construction: 1 Stargate (35%)\n"
+        "    In production: Train_Probe (1 at 40%), Train_Zealot (2 at 5%, 9%; 3 more queued)\n"
+        "    Enemies spotted so far:\n        1 Roach in sight at minimap [34, 47]"
+    )
+    seen = read(side("<Build_Pylon()>", counts))
+    assert seen.counts == {"Probe": 2, "Sentry": 1, "Gateway": 2}
+    assert (seen.begun, seen.producing) == ({"Stargate": 1}, {"Train_Probe": 1, "Train_Zealot": 5})
+    assert seen.known == [("Roach", (34, 47))]
+    assert (seen.minerals, seen.vespene, seen.supply_used, seen.supply_cap) == (400, 100, 20, 31)
