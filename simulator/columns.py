@@ -201,6 +201,7 @@ class UnitColumns:
     energy_max: Floats = trait(float)
     energy_regen: Floats = trait(float)  # per loop
     walled: Bools = trait(bool)  # it stands on a footprint, which blocks the ground for others
+    walls: Floats = trait(float, width=2)  # half the width and height of that footprint
 
     def __init__(self) -> None:
         self.capacity = 0

@@ -6,6 +6,8 @@ import math
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from simulator.armament import weapon_traits
 from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
@@ -63,7 +65,9 @@ def body_traits(world: World, slot: int) -> None:
     world.step_loss[slot] = _braking(unit)
     world.glides[slot] = unit.flying and math.isfinite(world.step_loss[slot])
     world.creep_factor[slot] = world.stats.creep_factor[at]
-    world.walled[slot] = len(world.footprint_cells(slot)) > 0
+    cells = world.footprint_cells(slot)
+    world.walled[slot] = len(cells) > 0
+    world.walls[slot] = (np.ptp(cells, axis=0) + 1) / 2.0 if len(cells) else 0.0
     world.priority[slot] = unit.priority
     world.targetable[slot] = not (unit.invulnerable or (unit.untargetable and not unit.weapons))
     world.cloaked[slot] = unit.cloaked

@@ -20,11 +20,15 @@ from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 
 if TYPE_CHECKING:
-    from simulator.columns import Bools, Ints
+    from simulator.columns import Bools, Floats, Ints
     from simulator.world import World
 
 EDGE_TOLERANCE = 1e-9
 ON_TARGET = 1e-9
+ARMS_LENGTH = 0.5
+"""Weapons that reach no farther hit structures at their walls."""
+BESIDE_WALLS = 0.5
+"""So far from a wall the ways of small units lead past it."""
 FOLLOW_GAP = 0.5
 HARVEST_OVERLAP = 0.05
 FOLLOW = int(OrderKind.FOLLOW)
@@ -74,6 +78,9 @@ def _close_in(world: World, slots: Ints) -> None:
     bodies = world.radius.take(slots) + world.radius.take(target)
     gap = np.where(on_target, 0.0, distance) - bodies
     reach = world.reach.take(slots)
+    close = world.walled.take(target) & (reach <= ARMS_LENGTH)
+    if some(close):
+        gap[close] = np.minimum(gap[close], _to_walls(world, slots[close], target[close]))
     swinging = world.windup.take(slots) >= 0.0
     kinds = census(world)
     if kinds.beams:
@@ -101,6 +108,12 @@ def _close_in(world: World, slots: Ints) -> None:
     world.goal[slots] = goal
     world.stop_at[slots] = bodies + np.maximum(reach - MECHANICS.chase_slack, 0.0)
     world.wants[slots] = beyond
+
+
+def _to_walls(world: World, slots: Ints, targets: Ints) -> Floats:
+    """(k,) from the edges of units to the walls of structures, which may keep them out of reach of the middle."""
+    beside = np.abs(world.pos.take(slots, 0) - world.pos.take(targets, 0)) - world.walls.take(targets, 0)
+    return geometry.length(np.maximum(beside, 0.0)) - np.maximum(world.radius.take(slots), BESIDE_WALLS)
 
 
 def inside_zone(world: World, slots: Ints, targets: Ints) -> Bools:

@@ -138,13 +138,13 @@ async def test_llm_says_where_it_is_answers_and_ends_when_told(start: Callable[.
     said = json.loads(await command.out.readline())
     assert said == json.loads(ready.read_text(encoding="utf-8"))
     assert said["pid"] == command.process.pid
-    assert said["base_url"] in await command.until_said("scripted models silent, random-legal, focus-fire at ")
+    assert said["base_url"] in await command.until_said("scripted models silent, random-legal, focus-fire, skilled at ")
 
     def ask() -> Any:
         with urllib.request.urlopen(said["base_url"] + "/models") as response:
             return json.load(response)
 
-    assert len((await asyncio.to_thread(ask))["data"]) == 3
+    assert len((await asyncio.to_thread(ask))["data"]) == 4
     code, _, err = await command.end(signal.SIGINT)
     assert (code, err) == (0, "0 requests were answered\n")
 

@@ -1,4 +1,4 @@
-"""Whoever touches a unit reaches it: bodies that keep others off farther than their edges are hit by melee as well."""
+"""Whoever touches something reaches it: bodies and walls that keep others off are hit by melee as well."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from simulator.catalog import load_catalog
 
 CATALOG = load_catalog()
 MELEE = [u.name for u in CATALOG.units if any(w.range <= 0.1 and w.hits for w in u.weapons) and u.speed_n and u.army]
+HALLS = ["Nexus", "Hatchery", "Hive", "CommandCenter", "PlanetaryFortress"]
 WIDE = [
     unit.name for unit in CATALOG.units
     if unit.separation > unit.radius and not (unit.passive or unit.uncommandable or unit.structure) and unit.army
@@ -28,6 +29,21 @@ def test_a_melee_unit_hits_a_wide_body(field: Any, attacker: str, victim: str) -
     world = field.world
     target = field.still(victim, 2, 20.0, 16.0)
     slot = field.put(attacker, 1, 14.0, 16.0)
+    world.life[slot] = world.life_max[slot] = 10_000.0
+    whole = field.vitals(target)
+    commands.attack_unit(world, [slot], world.tag_of(target))
+    field.until(lambda: field.vitals(target) < whole, most=200)
+
+
+@pytest.mark.parametrize("start", [(10.0, 16.5), (16.5, 24.0), (10.0, 10.0), (24.0, 23.5)])
+@pytest.mark.parametrize("victim", HALLS)
+@pytest.mark.parametrize("attacker", ["Zergling", "Zealot", "DarkTemplar", "Ultralisk"])
+def test_a_melee_unit_hits_a_town_hall_from_every_side(
+    field: Any, attacker: str, victim: str, start: tuple[float, float]
+) -> None:
+    world = field.world
+    target = field.still(victim, 2, 17.5, 16.5)
+    slot = field.put(attacker, 1, *start)
     world.life[slot] = world.life_max[slot] = 10_000.0
     whole = field.vitals(target)
     commands.attack_unit(world, [slot], world.tag_of(target))
