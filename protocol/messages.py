@@ -308,6 +308,8 @@ class Counts(Frozen):
     units: tuple[TypeCount, ...] = ()
     structures: tuple[TypeCount, ...] = ()
     production: tuple[Production, ...] = ()
+    planned: dict[str, int] = {}
+    """Structures that workers are on their way to build, by type."""
     enemies: tuple[EnemyCount, ...] = ()
 
 

@@ -43,10 +43,13 @@ ON_TOP = 1.0
 def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
     """What one can warp in at and build by, in the order of tags; with its place on the screen of a camera."""
     sources = scene.snapshot.response.observation.raw_data.player.power_sources
-    for source in sorted(sources, key=lambda source: source.tag):
-        body = scene.bodies.get(source.tag)
+    radius = {source.tag: source.radius for source in sources}
+    for field in scene.power:
+        body = scene.bodies.get(field.tag)
         if body is not None and body.name in POWERS:
-            yield _landmark("power field", body, camera, f"radius {source.radius:g}")
+            states = (("warps in fast", field.fast), ("no room for a unit", not field.room))
+            states_now = [words for words, is_so in states if is_so]
+            yield _landmark("power field", body, camera, ", ".join([f"radius {radius[field.tag]:g}", *states_now]))
 
 
 def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:

@@ -14,13 +14,16 @@ at a hundred units in each step. Views of the whole side are made by `bridge.obs
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 from s2clientprotocol import raw_pb2
 
 from bridge.frames import CAMERA_WIDTH, Camera, MapFrame
+from bridge.ground import land_of
 from bridge.knowledge import knowledge
+from bridge.macro.warp import fields
 from bridge.names import upgrade_name
 from bridge.observe.body import body, rounded
 from bridge.observe.events import Events, Witnessed
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bridge.macro.warp import PowerField
     from bridge.observe.body import Body
     from bridge.observe.possible import Choice
     from bridge.observe.teams import Team
@@ -89,6 +93,18 @@ class Scene:
         neutral = (u for u in self.snapshot.response.observation.raw_data.units if u.alliance == raw_pb2.Neutral)
         found = (body(unit, self.world) for unit in sorted(neutral, key=lambda unit: unit.tag))
         return tuple(b for b in found if b.name in knowledge() and knowledge()[b.name].resource)
+
+    @functools.cached_property
+    def power(self) -> tuple[PowerField, ...]:
+        """The power fields of the player, in ascending order of tags."""
+        return fields(self.snapshot)
+
+    @functools.cached_property
+    def planned(self) -> dict[str, int]:
+        """Structures that workers are on their way to build, by type."""
+        if not any(order.name.startswith("Build_") for b in self._order if b.is_own for order in b.view.orders):
+            return {}
+        return dict(sorted(Counter(structure for structure, _ in land_of(self.snapshot).plans).items()))
 
     @functools.cached_property
     def view(self) -> View:

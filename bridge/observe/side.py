@@ -53,6 +53,7 @@ def counts(scene: Scene, chronicle: Chronicle) -> Counts:
         units=tuple(count for count in counted if not is_structure(count.type)),
         structures=tuple(count for count in counted if is_structure(count.type)),
         production=tuple(_production(body.view for body in scene.bodies.values() if body.is_own)),
+        planned=scene.planned,
         enemies=chronicle.enemies(),
     )
 

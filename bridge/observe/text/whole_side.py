@@ -24,6 +24,7 @@ def counts(page: Page) -> Iterator[str]:
     yield from _line("Your units", [_ready(count) for count in found.units if count.ready])
     yield from _line("Your structures", [_ready(count) for count in found.structures if count.ready])
     yield from _line("Under construction", [_under_way(count) for count in found.structures if count.under_way])
+    yield from _line("Going to be built by workers on their way", [counted(found.planned)] if found.planned else [])
     yield from _line("Coming in", [_under_way(count) for count in found.units if count.under_way])
     yield from _line("In production", [_production(made) for made in found.production])
     if found.enemies:
@@ -161,7 +162,7 @@ def warp(page: Page) -> Iterator[str]:
     if gates is not None:
         ready = "" if gates.ready is None else f", {gates.ready} ready now"
         yield f"{INDENT}WarpGates: {gates.count}{ready}"
-    yield from listed("Power fields:", (f"{mark.type} {mark.tag} at minimap {point(mark.minimap)}" for mark in fields))
+    yield from listed("Power fields:", map(_place, fields))
 
 
 @section("places", parts=("places", "power"))

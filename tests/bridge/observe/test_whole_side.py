@@ -170,7 +170,7 @@ def test_free_places_are_named_by_the_resource_beside_them(base: Any, look: Any,
     apart = {tag: abs(x - place.minimap[0]) + abs(y - place.minimap[1]) for tag, (x, y) in fields.items()}
     assert apart[place.tag] < 12
     assert marks(view, "geyser") == [("VespeneGeyser", "by your Nexus 0x100010001")]
-    assert marks(view, "power field") == [("Pylon", "radius 6.5")]
+    assert marks(view, "power field") == [("Pylon", "radius 6.5, warps in fast")]
 
 
 def test_a_place_is_free_until_somebody_builds_there(base: Any, unit: Any, look: Any, views: Any) -> None:
@@ -180,6 +180,23 @@ def test_a_place_is_free_until_somebody_builds_there(base: Any, unit: Any, look:
     used = unit(0x501, "Assimilator", 8.5, 10.5)
     (view,) = views("Builder", look([*base(), taken, used]))
     assert marks(view, "base place") == marks(view, "geyser") == []
+
+
+def test_a_power_field_without_room_says_so(unit: Any, look: Any, views: Any) -> None:
+    crowd = [unit(0x600 + n, "Zealot", 11 + n % 15, 10.5 + n // 15, radius=1.0) for n in range(15 * 15)]
+    (view,) = views("Developer", look([unit(0x100040001, "Pylon", 18, 17.5), *crowd]))
+    assert marks(view, "power field") == [("Pylon", "radius 6.5, no room for a unit")]
+
+
+def test_what_workers_are_on_their_way_to_build_is_told(unit: Any, look: Any, base_task: Any) -> None:
+    probe = unit(1, "Probe", 16, 16)
+    for x in (30, 34):
+        place = probe.orders.add(ability_id=functions()["Build_Pylon_screen"].ability_id).target_world_space_pos
+        place.x, place.y = x, 30
+    developer = Observer(base_task).observe(look([probe])).agents["Developer"]
+    assert developer.view.counts is not None
+    assert developer.view.counts.planned == {"Pylon": 2}
+    assert "    Going to be built by workers on their way: 2 Pylon\n" in developer.text
 
 
 def test_structures_say_what_they_do(base: Any, look: Any, views: Any) -> None:
