@@ -104,8 +104,9 @@ def llm(
 ) -> None:
     """Serve the scripted model over HTTP, in the form of OpenAI's chat completions.
 
-    It plays from the text of the prompt alone. The model's name selects the player: focus-fire fires with all teams
-    on the weakest enemy, random-legal does anything that is allowed, silent orders nothing.
+    It plays from the text of the prompt alone. The model's name selects the player: skilled uses skills, keeps its
+    distance, raids and builds; focus-fire fires with all teams on the weakest enemy, random-legal does anything that
+    is allowed, silent orders nothing.
     """
     from agents import commands  # noqa: PLC0415  # see there
 
