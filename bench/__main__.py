@@ -12,7 +12,7 @@ from pathlib import Path
 
 MEASUREMENTS = (
     "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "recognition",
-    "image", "http_client", "recording",
+    "macro", "image", "http_client", "recording",
 )  # fmt: skip
 
 

@@ -33,13 +33,14 @@ BASE_REACH: Final = 16.0
 
 def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
     """(w, h) where the game would let the player place a structure, as far as he can know."""
+    return _fitting(land, structure, _ground(land, ledger, structure))
+
+
+def _fitting(land: Land, structure: str, ground: Bools) -> Bools:
+    """(w, h) where a structure may stand if its cells may be on this ground."""
     site, footprint = sites()[structure], footprint_need(structure)
-    result = everywhere(_ground(land, ledger, structure), footprint.cells)
-    if site.clear:
-        result &= everywhere(land.clear, footprint.cells)
-    if site.ground == "powered":
-        result &= land.powered(corner=on_corner(structure))
-    return result
+    result = everywhere(ground & land.clear if site.clear else ground, footprint.cells)
+    return result & land.powered(corner=on_corner(structure)) if site.ground == "powered" else result
 
 
 def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
@@ -67,12 +68,11 @@ def good(land: Land, ledger: Ledger, structure: str) -> Bools:
     Never dropped: what the game asks, the ways of workers, the places of town halls, and that the place was seen and
     can be walked to.
     """
-    cells = footprint_need(structure).cells
-    site = sites()[structure]
-    result = legal(land, ledger, structure) & everywhere(~land.kept & (land.sight > 0), cells) & _reached(land)
+    ground = _ground(land, ledger, structure) & ~land.kept
+    result = _fitting(land, structure, ground & (land.sight > 0)) & _reached(land)
     wishes = [_open_around(land, ledger, _with_addon(structure))]
-    if site.addon:
-        wishes.insert(0, everywhere(_ground(land, ledger, structure) & ~land.kept, ADDON))
+    if sites()[structure].addon:
+        wishes.insert(0, everywhere(ground, ADDON))
     for wish in wishes:
         narrowed = result & wish
         if narrowed.any():
@@ -82,12 +82,10 @@ def good(land: Land, ledger: Ledger, structure: str) -> Bools:
 
 def best(grid: Bools, cost: Floats) -> tuple[int, int] | None:
     """The cell with the least cost among those that are marked; of equal ones that with the least coordinates."""
-    cells = np.argwhere(grid)
-    if not len(cells):
-        return None
-    costs = cost[cells[:, 0], cells[:, 1]]
-    place = int(np.argmin(np.round(costs, 3)))
-    return (int(cells[place, 0]), int(cells[place, 1])) if np.isfinite(costs[place]) else None
+    costs = np.where(grid, np.round(cost, 3), np.inf)
+    place = int(np.argmin(costs))
+    x, y = divmod(place, grid.shape[1])
+    return (x, y) if np.isfinite(costs[x, y]) else None
 
 
 def footprint_need(structure: str) -> Footprint:
