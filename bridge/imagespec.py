@@ -64,6 +64,13 @@ MINIMAP_LAYERS = (
 WHOLE = ("screen", "minimap", "features")
 KINDS = (*WHOLE, *(f"layer:{n}" for n in (*DRAWN_LAYERS, *GAME_LAYERS)), *(f"minimap:{n}" for n in MINIMAP_LAYERS))
 """Everything that `ImageSpec.what` may be."""
+PAPER = {
+    "combat_group": ("screen", "minimap"),
+    "commander": ("minimap",),
+    "developer": ("minimap",),
+    "builder": ("screen", "minimap", "layer:power", "layer:pathable", "layer:buildable"),
+}
+"""What the paper shows to each kind of agent."""
 
 
 class ImageSpec(Frozen):
@@ -132,3 +139,19 @@ class ImageSpec(Frozen):
     def of_teams(self) -> bool:
         """Whether it shows what a team sees, and not the whole map."""
         return not self.what.startswith("minimap")
+
+
+def images_for(words: str, kind: str) -> tuple[ImageSpec, ...]:
+    """The pictures that a few words ask for.
+
+    Args:
+        words: `paper` for those of the agent's kind, `none`, or what each picture shows, with commas between.
+        kind: of the agent.
+
+    Raises:
+        ValidationError: there is no such picture.
+    """
+    if words == "none":
+        return ()
+    asked = PAPER[kind] if words == "paper" else words.split(",")
+    return tuple(ImageSpec(what=what.strip()) for what in asked)

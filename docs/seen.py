@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from agents.llm.vision import ANTHROPIC, OPENAI
 from agents.scripted.players import PLAYERS
-from bridge.imagespec import ImageSpec
+from bridge.imagespec import PAPER, ImageSpec
 from khala.local import one_side
 from orchestrator.config import MatchConfig, load_task
 from orchestrator.host import assemble
@@ -49,13 +49,12 @@ are estimates, for Anthropic's and for OpenAI's models.
 
 @dataclass(frozen=True)
 class Scene:
-    """One observation: whose it is, and which pictures go with it."""
+    """One observation: whose it is."""
 
     game: str
     agent: str
     title: str
     about: str
-    images: tuple[str, ...]
 
 
 GAMES = {"pvz_task6_level1": 20, "simple64_eceb": 130}
@@ -66,31 +65,27 @@ SCENES = {
         "CombatGroup6",
         "CombatGroup",
         "Four Sentries at the ramp of their base. Force fields have cut a swarm in two, and storms fall on its wings.",
-        ("screen", "minimap"),
     ),
     "commander": Scene(
         "simple64_eceb",
         "Commander",
         "Commander",
         "A full game after four minutes. It orders the army as a whole.",
-        ("minimap",),
     ),
     "developer": Scene(
         "simple64_eceb",
         "Developer",
         "Developer",
         "The same moment. It trains, researches and builds, and the host finds producers and places.",
-        ("minimap",),
     ),
     "builder": Scene(
         "simple64_eceb",
         "Builder",
         "Builder",
         "The same moment, seen by the Builder of `simple64_ecsb`: one Probe that places structures by hand.",
-        ("screen", "minimap", "layer:power", "layer:pathable", "layer:buildable"),
     ),
 }
-"""By kind of agent; the pictures are those that the paper gives to the kind."""
+"""By kind of agent."""
 
 
 class Stop(Exception):  # no error
@@ -159,10 +154,10 @@ def task_of(game: str) -> TaskConfig:
     """The task of a game, with the pictures of its scenes; a Builder joins the one that has none."""
     task = load_task(game)
     agents = {agent.name: agent for agent in task.agents}
-    for scene in SCENES.values():
+    for kind, scene in SCENES.items():
         if scene.game == game:
             agent = agents.get(scene.agent) or load_task("simple64_ecsb").agent(scene.agent)
-            images = tuple(ImageSpec(what=what, format="webp", max_teams=1) for what in scene.images)
+            images = tuple(ImageSpec(what=what, format="webp", max_teams=1) for what in PAPER[kind])
             agents[agent.name] = agent.model_copy(update={"images": images})
     return task.model_copy(update={"agents": tuple(agents.values())})
 

@@ -51,6 +51,7 @@ RUN_EPILOG = """
 Examples:\n
     khala run 2s3z\n
     khala run 2s3z_pair --model deepseek --episodes 5\n
+    khala run pvz_task6_level1 --model anthropic --images paper\n
     khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
     khala run my_task.yaml --policy my_agent:decide --json
 """
@@ -77,6 +78,14 @@ MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after 
 ExecutorName = Annotated[
     str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
 ]
+Images = Annotated[
+    str | None,
+    typer.Option(
+        help="Pictures for all agents: paper (those of their kind), none, or a list such as screen,minimap.",
+        show_default="as the task says",
+        metavar="LIST",
+    ),
+]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
 Out = Annotated[Path, typer.Option(help="Directory that gets a directory for the run.", metavar="DIR")]
 
@@ -89,7 +98,7 @@ def run(
     ] = "scripted",
     model_name: Annotated[
         str | None,
-        typer.Option(help="Another model there; scripted has focus-fire, random-legal, silent."),
+        typer.Option(help="Another model there; scripted has skilled, focus-fire, random-legal, silent."),
     ] = None,
     base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
     policy: Annotated[
@@ -104,6 +113,7 @@ def run(
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
     max_steps: MaxSteps = None,
+    images: Images = None,
     run: RunName = None,
     assemble: Assemble = 60.0,
     out: Out = Path("runs"),
@@ -118,7 +128,7 @@ def run(
 
     config = _config(
         task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps,
+        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps, images=images,
     )  # fmt: skip
     minds = Minds(model, model_name, base_url, policy, budget_usd, latency)
     _until_interrupted(config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch))
@@ -140,6 +150,7 @@ def host(
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
     max_steps: MaxSteps = None,
+    images: Images = None,
     assemble: Assemble = 60.0,
     out: Out = Path("runs"),
     as_json: Json = False,
@@ -152,7 +163,7 @@ def host(
 
     config = _config(
         task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps,
+        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps, images=images,
     )  # fmt: skip
     bus = _bus(connect, listen, insecure=insecure)
     _until_interrupted(

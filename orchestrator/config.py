@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, ValidationError
 
+from bridge.imagespec import images_for
 from bridge.maps import known_maps
 from bridge.standard import standard_task
 from bridge.task import TaskConfig
@@ -77,7 +78,9 @@ def load_task(name: str) -> TaskConfig:
 
 
 def change(task: TaskConfig, **changes: Any) -> TaskConfig:
-    """The task with fields replaced; `max_wait_s` and `step_loops` are those of its clock. None changes nothing.
+    """The task with fields replaced. None changes nothing.
+
+    `max_wait_s` and `step_loops` are those of its clock, `images` are words for all agents, see `images_for`.
 
     Raises:
         ConfigError: a value does not fit.
@@ -88,10 +91,15 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
         if name in given:
             fields["clock"][name] = given.pop(name)
     try:
+        if "images" in given:
+            asked = given.pop("images")
+            for agent in fields["agents"]:
+                agent["images"] = images_for(asked, agent["kind"])
         return TaskConfig.model_validate(fields | given)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise ConfigError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}", source="command line") from None
+        place, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise ConfigError(f"{place}: {words}", source="command line") from None
 
 
 def new_run_name(task: str) -> str:

@@ -7,6 +7,7 @@ import re
 import cv2
 import pytest
 
+from bridge.imagespec import PAPER
 from bridge.observe.text import SECTIONS_OF
 from docs import seen
 
@@ -15,7 +16,7 @@ SHOWN = re.findall(r"!\[[^\]]*\]\(\.\./images/seen/([\w-]+)\.webp\)", PAGE)
 
 
 def test_every_kind_of_agent_is_shown() -> None:
-    assert set(seen.SCENES) == set(SECTIONS_OF)
+    assert set(seen.SCENES) == set(SECTIONS_OF) == set(PAPER)
 
 
 @pytest.mark.parametrize("kind", seen.SCENES)
@@ -23,7 +24,7 @@ def test_an_observation_is_shown_with_all_its_pictures(kind: str) -> None:
     scene = seen.SCENES[kind]
     assert f"## {scene.title}\n\n{scene.about}" in PAGE
     assert [name for name in SHOWN if name.startswith(f"{kind}-")] == [
-        f"{kind}-{place}" for place in range(1, len(scene.images) + 1)
+        f"{kind}-{place}" for place in range(1, len(PAPER[kind]) + 1)
     ]
 
 
