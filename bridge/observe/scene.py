@@ -79,8 +79,7 @@ class Scene:
         order = self._order = tuple(self.bodies.values())
         self._index = {b.tag: index for index, b in enumerate(order)}
         self._tags = [b.view.tag for b in order]
-        self._x = np.array([b.x for b in order], dtype=float)  # world
-        self._y = np.array([b.y for b in order], dtype=float)
+        self._places = np.array([(b.x, b.y) for b in order], dtype=float).reshape(-1, 2)  # world
         ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
         self._rank = np.array([ranks[b.name] for b in order], dtype=int)  # of the type, by name
         foe = [b.alliance == raw_pb2.Enemy and b.name not in UNSEEN_TYPES for b in order]
@@ -137,7 +136,7 @@ class Scene:
         members = np.array([self._index[tag] for tag in team.tags])
         head = self._order[members[0]]
         camera = Camera(head.x, head.y, self._screen_size)
-        looked = _Look(camera, self._x, self._y, members)
+        looked = _Look(camera, self._places, members)
         friends = np.flatnonzero(looked.others & self._friend)
         foes = np.flatnonzero(looked.others & self._foe)
         friends = friends[np.argsort(self._rank[friends], kind="stable")]
@@ -163,9 +162,9 @@ class Scene:
         units = []
         for row, at, distance in zip(rows.tolist(), points, distances, strict=True):
             view = self._order[row].view
-            fields = view.__dict__.copy()
-            fields["alliance"], fields["screen"], fields["distance"] = alliance, at, distance
-            units.append(view.having(fields))
+            values = view.__dict__.copy()
+            values["alliance"], values["screen"], values["distance"] = alliance, at, distance
+            units.append(view.having(values))
         return tuple(units)
 
     def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
@@ -185,17 +184,17 @@ class Scene:
 class _Look:
     """Where all bodies are for one team's camera; one row a body in each array."""
 
-    def __init__(self, camera: Camera, x: Floats, y: Floats, members: NDArray[np.intp]) -> None:
-        right, down = x - (camera.x - _HALF), (camera.y + _HALF) - y
-        inside = (right >= 0) & (right < CAMERA_WIDTH) & (down >= 0) & (down < CAMERA_WIDTH)
-        inside[members] = False
-        scale = camera.size / CAMERA_WIDTH
-        self.others: NDArray[np.bool_] = inside
+    def __init__(self, camera: Camera, places: Floats, members: NDArray[np.intp]) -> None:
+        """Takes a camera, (n, 2) places in the world, and the rows of those who are of the team."""
+        self.others: NDArray[np.bool_] = camera.sees(places)
         """Who is on the screen and not of the team."""
+        self.others[members] = False
+        right, down = places[:, 0] - camera.x + _HALF, camera.y + _HALF - places[:, 1]
+        scale = camera.size / CAMERA_WIDTH
         self.screen_x = _tenths(right * scale, camera.size)
         self.screen_y = _tenths(down * scale, camera.size)
-        middle = x[members].mean(), y[members].mean()
-        self.distance = np.round(np.hypot(x - middle[0], y - middle[1]), 1)
+        apart = places - places[members].mean(axis=0)
+        self.distance = np.round(np.hypot(apart[:, 0], apart[:, 1]), 1)
         """From the middle of the team, in world units."""
 
 
