@@ -157,8 +157,8 @@ REASONS: tuple[Reason, ...] = (under_construction, tech, energy, price, queue, p
 
 
 def is_attack(function: Function) -> bool:
-    """Whether a function attacks."""
-    return ATTACK in (function.ability_id, function.general_id)
+    """Whether a function attacks; scanning goes by the same general ability, and is for those without a weapon."""
+    return ATTACK in (function.ability_id, function.general_id) and function.stem != "Scan_Move"
 
 
 def can_shoot(name: str, able: frozenset[int]) -> bool:
