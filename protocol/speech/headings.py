@@ -24,7 +24,7 @@ known to the bridge only.
 | H16 | the word Team behind the name, and "for" before it | `Stalker-1 team:`, `For Team A:` |
 | H17 | sections and teams in other languages, also two at once | `Aktionen:`, `动作/Actions:`, `小队 A:` |
 | H18 | actions that are only spoken of, and actions that replace earlier ones | `Valid actions:`, `Final actions:` |
-| H19 | an explanation behind the actions belongs to the analysis | `Explanation:` |
+| H19 | an explanation or notes behind the actions belong to the analysis | `Explanation: <Stop()>?`, `## Notes` |
 | H20 | a team that is named in a sentence right before a call | `Team A should <Stop()>`, `A-1 will now <Stop()>` |
 | H21 | a team as a value of JSON | `"team": "Stalker-1"` |
 """
@@ -70,7 +70,7 @@ class Heading:
     numbered: bool = False
     """Whether it counts what it opens, `Action 2:`, so that it goes on with what is above."""
     explains: bool = False
-    """Whether it opens an explanation of what stands above (rule H19)."""
+    """Whether it opens an explanation of what stands above, of one line unless it stands alone (rule H19)."""
 
 
 # Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
@@ -93,7 +93,7 @@ _SEVERAL = rf"{_WORD}(?:{_GAP}{_WORD}){{1,8}}+"
 _SHALL = r"[ \t]+(?:should|shall|will|must|can|to|needs?[ \t]+to)(?:[ \t]+(?:now|then|also|first))?[ \t]*+(?=<)"
 _TEAM = (
     rf"(?P<every>{words.EVERY_TEAM}){_CLOSE}:"
-    rf"|(?:for[ \t]+)?{_TEAM_WORD}(?:[^\w\n<]*+"
+    rf"|(?:(?:and|then|und|et|y)[ \t]+)?(?:for[ \t]+)?{_TEAM_WORD}(?:[^\w\n<]*+"
     rf"(?:(?P<team>(?!teams?\b)(?:{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}})){_CLOSE}:"
     rf"|(?P<short>{_WORD}){_CLOSE}{_TO_EDGE}|(?P<shall>{_WORD}){_SHALL})|[^\w\n<:]*+:{_TO_EDGE})"
     rf"|(?!(?:my|our|the|this|your)\b)(?P<behind>{_LATIN})(?:{words.TEAM_BEHIND}){_CLOSE}:"
@@ -106,7 +106,10 @@ _BARE = (
     rf"|(?P<acts>[A-Za-z]\w*-[0-9]++){_SHALL}"
     rf"|(?P<several>(?=[^\n<:]*[0-9]){_SEVERAL}){_CLOSE}:{_TO_EDGE}"
 )
-_EXPLAINS = r"(?P<explains>explanations?|rationale|justification|erklärung|explicación|解释|说明)(?![^\W_])[^\w\n<:]*+:"
+_EXPLAINS = (
+    rf"(?P<explains>{words.EXPLANATION})(?![^\W_])[^\w\n<:]*+:"
+    rf"|(?P<aside>{words.EXPLANATION}|{words.REMARKS})(?![^\W_])[^\w\n<]*+$"
+)
 _NAMED_BY = ("team", "short", "shall", "every", "behind", "bare", "numbered", "cell", "alone", "acts", "several", "of")
 _FLAGS = re.IGNORECASE | re.MULTILINE
 _LINE = re.compile(rf"{_BULLET}(?:{_SECTION}|{_EXPLAINS}|{_TEAM}|{_BARE})", _FLAGS)
@@ -135,6 +138,8 @@ _SECTIONS = tuple(
 
 SENTENCE_END = rf"(?:(?<=[.!?;][ \t])|(?<=。))[*_]*+(?={_KEYWORD}[*_]*+:)"
 """Regular expression of a place within a line where a section may begin (rule H6)."""
+JSON_KEY = rf"(?<=[,{{])[ \t]*+\"(?={_KEYWORD}\"[ \t]*+:)"
+"""The same where a section is a key of JSON."""
 
 
 def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
@@ -158,7 +163,7 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
     if found["alone"] is not None and not line_start:
         return None
     name = next((found[group] for group in _NAMED_BY if found[group] is not None), None)
-    section, explains = _section(found["section"]), found["explains"] is not None
+    section, explains = _section(found["section"]), bool(found["explains"] or found["aside"])
     return Heading(
         end=match.end(),
         section=section,

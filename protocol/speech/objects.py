@@ -75,9 +75,12 @@ def _call(found: object, end: int) -> ObjectCall | None:
     call = _CALL.fullmatch(named.strip()) if isinstance(named, str) else None
     if call is None or not (call["inside"] is not None or "_" in call["name"] or _has(found, ARGUMENTS)):
         return None
-    team = _first(found, TEAMS)
+    given = _first(found, ARGUMENTS)
+    team = _first(found, TEAMS) or _first(given, TEAMS)
+    if isinstance(given, dict):
+        given = {key: value for key, value in given.items() if str(key).lower() not in TEAMS}
     try:
-        args = read_arguments(call["inside"]) if call["inside"] else tuple(_values(_first(found, ARGUMENTS)))
+        args = read_arguments(call["inside"]) if call["inside"] else tuple(_values(given))
     except Malformed:
         return None
     return ObjectCall(call["name"], args, team if isinstance(team, str) else None, end)

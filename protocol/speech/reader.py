@@ -31,7 +31,16 @@ from protocol.speech.calls import (
     segment_end,
     stands_alone,
 )
-from protocol.speech.headings import SENTENCE_END, Heading, Section, Tone, heading_at, json_heading_at, tag_heading_at
+from protocol.speech.headings import (
+    JSON_KEY,
+    SENTENCE_END,
+    Heading,
+    Section,
+    Tone,
+    heading_at,
+    json_heading_at,
+    tag_heading_at,
+)
 from protocol.speech.marks import SHORT, Malformed, to_ascii, unescaped
 from protocol.speech.objects import ObjectMessage, object_at
 from protocol.speech.quoting import MessageReader
@@ -63,7 +72,7 @@ _NEXT = re.compile(
     rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<think>{_THINKS})|(?P<comment><!--)"
     r"|(?P<speaker><\|(?:im_)?start\|>\s*+user\b)|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
     r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\())"
-    rf"|(?P<sentence>{SENTENCE_END})",
+    rf"|(?P<sentence>{SENTENCE_END}|{JSON_KEY})",
     re.IGNORECASE,
 )
 _OBJECT_AHEAD = re.compile(r"[\s\[,]*+\{")
@@ -87,6 +96,7 @@ class _Walk:
     def _start_over(self) -> None:
         self.gathering = Gathering()
         self._section = Section.NONE
+        self._aside_until = 0
         self._team: str | None = None
         self._team_above_section: str | None = None
         self._team_end = -_DIRECTLY_ABOVE
@@ -153,7 +163,12 @@ class _Walk:
         if heading.section and heading.section is Section.ACTIONS and heading.tone is Tone.INSTEAD:
             self.gathering.withdraw_orders(heading.team)
         if heading.explains and self._section is Section.ACTIONS and self.gathering.has_orders():
-            self._section = Section.ANALYSIS
+            line_end = self._plain.find("\n", heading.end)
+            rest = self._plain[heading.end : line_end if line_end >= 0 else None]
+            if rest.strip("*_#: \t"):
+                self._aside_until = heading.end + len(rest)
+            else:
+                self._section = Section.ANALYSIS
         if heading.section:
             self.gathering.open_block(self._plain[at : heading.end])
             if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip('#*_> \t\n",{['):
@@ -298,7 +313,7 @@ class _Walk:
         text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
         fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
         kind = Section.COMMUNICATIONS if is_talk(name) else Section.ACTIONS
-        self.gathering.add(fault, kind, self._section)
+        self.gathering.add(fault, kind, self._section_at(start))
 
     def _add(self, item: Call | MessageTo | ListenTo, kind: Section, start: int) -> None:
         before = self._plain[max(0, start - _LOOKED_BACK) : start]
@@ -307,7 +322,11 @@ class _Walk:
         if before and not before.isspace():
             struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
             taken_back = bool(struck or _NEGATED.search(before))
-        self.gathering.add(item, kind, self._section, taken_back=taken_back)
+        self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
+
+    def _section_at(self, start: int) -> Section:
+        """The section that something at this place stands in."""
+        return Section.ANALYSIS if start < self._aside_until else self._section
 
 
 _READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {

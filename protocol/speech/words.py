@@ -37,6 +37,10 @@ NOT_TO_DO = (
 """Words before "actions" that say that what follows is not to be carried out."""
 INSTEAD = "final|revised|corrected|updated|definitive|definite|actual"
 """Words before "actions" that take back what stands under such a heading before."""
+EXPLANATION = "explanations?|rationale|justification|summary|conclusion|erklärung|explicación|解释|说明|总结"
+"""Words that open an explanation of what was said."""
+REMARKS = "notes?|remarks?|comments?|strategy|next steps?|reasoning|anmerkungen|notas|备注"
+"""Headings of what else may stand behind the actions."""
 NEGATION = (
     r"\b(?:do(?:es)?[ \t]++not|don['’´`]t|doesn['’´`]t|must[ \t]++not|should[ \t]++not|won['’´`]t|not|never|avoid|"  # noqa: RUF001  # apostrophes as they are written
     r"instead[ \t]++of|rather[ \t]++than|without|no|nicht|kein[en]?|statt|ohne|ne[ \t]++pas|pas[ \t]++de|"
