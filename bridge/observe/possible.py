@@ -12,7 +12,7 @@ import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 from bridge.catalog import catalogue
-from bridge.knowledge import ability_of, is_armed, knowledge, stand_ins
+from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
 from bridge.macro.ledger import Ledger
 from protocol.messages import Barred, Offer
 
@@ -53,7 +53,9 @@ class Possible:
         for body in bodies.values():
             if body.is_own:
                 self._own.setdefault(body.name, []).append(body)
-        self._standing = {name for name, there in self._own.items() if any(b.view.build_progress >= 1 for b in there)}
+        self._ready = {name: [b for b in there if b.view.build_progress >= 1] for name, there in self._own.items()}
+        self._standing = {name for name, there in self._ready.items() if there}
+        self._able_of: dict[tuple[str, ...], frozenset[int] | None] = {}
 
     def for_team(self, agent: AgentConfig, members: Sequence[Body]) -> Choice:
         """The actions of a team's types of units, in the order in which they are listed for them."""
@@ -86,6 +88,18 @@ class Possible:
             return None
         return frozenset().union(*(self._abilities.get(unit.tag, ()) for unit in units))
 
+    def _able_types(self, types: tuple[str, ...]) -> frozenset[int] | None:
+        """The same for all finished units of some types, () for every type; remembered, since many actions ask it."""
+        if types not in self._able_of:
+            self._able_of[types] = self._able(b for name in types or self._ready for b in self._ready.get(name, ()))
+        return self._able_of[types]
+
+    def _facts(self, action: Action, unit_type: str) -> AbilityFacts | None:
+        """What is known of the ability in which an action ends: of several levels of research, the next one."""
+        cases = _cases(action.name, unit_type)
+        open_ = (facts for facts in cases if facts.researches not in self._upgrades)
+        return next(open_, cases[-1] if cases else None)
+
     def _choice(self, judged: Mapping[str, str | None], unit_type: str) -> Choice:
         valid = [catalogue()[name] for name, reason in judged.items() if reason is None]
         offers = (self._offer(action, unit_type or _carrier(action)) for action in valid)
@@ -93,7 +107,7 @@ class Possible:
         return Choice(tuple(a.spec for a in valid), tuple(offer for offer in offers if offer is not None), barred)
 
     def _offer(self, action: Action, unit_type: str) -> Offer | None:
-        facts = _facts(action.name, unit_type)
+        facts = self._facts(action, unit_type)
         if facts is None or not (facts.minerals or facts.vespene or facts.supply):
             return None
         prices = zip(self._purse, (facts.minerals, facts.vespene, facts.supply), strict=True)
@@ -120,7 +134,7 @@ class Possible:
         function = action.pysc2
         if reason is not None or able is None or function is None:
             return reason
-        facts = _facts(action.name, unit_type)
+        facts = self._facts(action, unit_type)
         if function.ability_id in able:
             return self._promised_away(facts)
         if facts is None:
@@ -129,17 +143,15 @@ class Possible:
 
     def _why_nobody(self, action: Action) -> str | None:
         """Why nobody of the side can do an action now; None if somebody can."""
-        units = [body for name in action.units for body in self._own.get(name, ())]
-        if action.units and not units:
-            return f"no {' or '.join(action.units)}"
-        ready = [body for body in units if body.view.build_progress >= 1]
-        if units and not ready:
-            return f"{units[0].name} is not finished"
+        ready = [body for name in action.units for body in self._ready.get(name, ())]
+        if action.units and not ready:
+            begun = next((name for name in action.units if name in self._own), None)
+            return f"{begun} is not finished" if begun else f"no {' or '.join(action.units)}"
         function = action.pysc2
         if function is None:
             return None
-        able = self._able(ready or (body for there in self._own.values() for body in there))
-        facts = _facts(action.name, ready[0].name if ready else "")
+        able = self._able_types(action.units)
+        facts = self._facts(action, ready[0].name if ready else "")
         if able is not None and function.ability_id in able:
             return self._promised_away(facts)
         if facts is None:
@@ -229,7 +241,11 @@ def _carrier(action: Action) -> str:
 
 
 @functools.cache
-def _facts(action: str, unit_type: str) -> AbilityFacts | None:
-    """What is known of the ability in which an action ends, for a type of unit."""
+def _cases(action: str, unit_type: str) -> tuple[AbilityFacts, ...]:
+    """What is known of the ability in which an action ends, for a type of unit: one case, or levels of research."""
     function = catalogue()[action].pysc2
-    return None if function is None else ability_of(function.ability_id, unit_type)
+    facts = None if function is None else ability_of(function.ability_id, unit_type)
+    if function is None or facts is None:
+        return ()
+    levels = [abilities()[number] for number in abilities()[function.ability_id].special]
+    return tuple(level for level in levels if level.researches and unit_type in level.users) or (facts,)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bridge.functions import functions, general
-from bridge.knowledge import abilities
+from bridge.knowledge import abilities, upgrades
 from bridge.observe import Observer
 from bridge.task import TaskConfig
 
@@ -172,6 +172,21 @@ def test_the_first_structure_of_its_kind_is_marked(
     units = [unit(1, "Probe", 16, 16), *others]
     view = team(units, "Build_Forge", abilities={1: able("Build_Forge_screen")}, player=RICH)
     assert [offer.first for offer in view.offers] == [first]
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_of_several_levels_the_next_one_is_offered(level: int, unit: Any, team: Any) -> None:
+    forge = unit(1, "Forge", 16, 16, is_powered=True)
+    known = upgrades()
+    done = [known[f"ProtossGroundWeaponsLevel{before}"].id for before in range(1, level)]
+    price = known[f"ProtossGroundWeaponsLevel{level}"]
+    given = {1: able("Research_ProtossGroundWeapons_quick")}
+    view = team([forge], "Research_ProtossGroundWeapons", abilities=given, player=RICH, upgrades=done)
+    assert [(offer.minerals, offer.vespene) for offer in view.offers] == [(price.minerals, price.vespene)]
+    council = unit(2, "TwilightCouncil", 20, 16)
+    poor = team([forge, council], "Research_ProtossGroundWeapons", abilities={}, upgrades=done)
+    missing = f"{price.minerals:g} minerals too few, {price.vespene:g} vespene too few"
+    assert reasons(poor) == {"Research_ProtossGroundWeapons": missing}
 
 
 def test_research_is_done_once_however_rich_one_is(unit: Any, team: Any) -> None:
