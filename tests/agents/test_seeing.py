@@ -6,11 +6,13 @@ import asyncio
 import hashlib
 import logging
 from base64 import b64encode
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from agents.build import replay_policies
+from agents.llm.limits import Limits, Ticket
 from agents.llm.replay import NotRecorded
 from agents.llm.vision import ANTHROPIC, Vision
 from agents.llm_policy import LLMPolicy
@@ -23,7 +25,7 @@ from protocol.keys import image_key
 from protocol.messages import Exchange, ImageRef
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import AsyncIterator, Callable, Mapping
 
     from protocol.bus.memory import MemoryBroker
     from protocol.messages import Briefing, Observation
@@ -121,6 +123,32 @@ async def test_a_model_that_sees_is_shown_the_pictures_of_its_observation(
     assert request.pictures == by_hash(ONE, TWO)
     assert (exchanges[0].usage.images, exchanges[0].usage.image_tokens) == (2, 700)
     assert exchanges[0].usage.prompt_tokens == 100  # as the endpoint counted
+
+
+class Counting(Limits):
+    """Limits that note how many tokens a request is expected to take."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tokens: list[int] = []
+
+    @asynccontextmanager
+    async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
+        self.tokens.append(tokens)
+        async with super().admit(tokens=tokens, deadline=deadline) as ticket:
+            yield ticket
+
+
+async def test_the_shared_limits_expect_the_tokens_of_pictures(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    limits = Counting()
+    policy, _ = policy_of(listed_model("go", "on"), limits=limits)
+    await policy.pictures.put(ONE)
+    await policy.decide(briefing(), observation(0))
+    await policy.decide(briefing(), observation(1, images=(ref(ONE),)))
+    plain, with_picture = limits.tokens
+    assert with_picture - plain == 350 + 3  # 512 x 512 / 750, and the title "The screen."
 
 
 async def test_an_exchange_names_pictures_and_never_holds_one(
