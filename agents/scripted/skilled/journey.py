@@ -29,7 +29,7 @@ def passing(plan: Plan) -> bool:
 
 def travel(plan: Plan) -> bool:
     """Plans the way of a team; says whether it has one to go."""
-    team, told = plan.team, told_goal(plan.situation)
+    team, told = plan.team, None if plan.prey else told_goal(plan.situation)
     goal = told or task_goal(team, plan.situation)
     if goal is None or team.minimap is None or math.dist(goal, team.minimap) <= ARRIVED:
         return False

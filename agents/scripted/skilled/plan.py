@@ -23,7 +23,7 @@ class Plan:
     support: Mapping[str, float] = field(default_factory=dict)
     """By the tag of an enemy: how many units of all teams have it in reach."""
     prey: str = ""
-    """What the team is after besides the fight: "worker" or "hall"; "" for nothing."""
+    """What the team is after besides the fight: "worker", "hall" or "place"; "" if it may be called."""
     busy: set[str] = field(default_factory=set)
     """Tags of units that have an order in this reply."""
 

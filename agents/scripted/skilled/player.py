@@ -22,6 +22,7 @@ MESSAGE_SHARE = 0.2
 ORDERS_EVERY_S = 12
 """How often a commander says where all go."""
 _RAID = re.compile(r"\b(raid|workers?|drones?|probes?|scvs?)\b", re.IGNORECASE)
+_GATHER = re.compile(r"\bgather\b", re.IGNORECASE)
 _HALL = re.compile(r"\b(hatchery|nexus|command center)\b", re.IGNORECASE)
 _ATTACK = re.compile(r"\b(raid|kill|destroy)\b", re.IGNORECASE)
 
@@ -80,7 +81,7 @@ def shade(plan: Plan) -> None:
 
 def prism(plan: Plan) -> None:
     """To where its task wants it, and open a field of power there; away when it is shot at."""
-    team = plan.team
+    team, plan.prey = plan.team, "place"
     foes = [foe for foe in combat.threats(team) if foe.distance < 9]
     phasing = any(unit.type == "WarpPrismPhasing" for unit in team.own)
     if phasing:
@@ -109,7 +110,7 @@ def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     fighting = [team for team in situation.teams.values() if team.enemies and team.minimap]
     if fighting and rng.random() < MESSAGE_SHARE:
         return [(people[0], _report(fighting[0]))]
-    if situation.friends and "CombatGroup" in " ".join(people) and situation.time_s % ORDERS_EVERY_S < 2:
+    if situation.friends and _GATHER.search(situation.task) and situation.time_s % ORDERS_EVERY_S < 2:
         groups = [name for name in people if name.startswith("CombatGroup")]
         return [(name, economy.marching_order(situation)) for name in groups]
     calls = [(sender, place) for sender, text in situation.messages for place in points(text)]
