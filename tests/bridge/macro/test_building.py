@@ -77,7 +77,7 @@ def test_the_game_accepts_the_place_that_is_found(rich: Callable[..., Game], nam
 
 
 @pytest.mark.parametrize("race", RACES)
-@pytest.mark.parametrize("name", ["Simple64", "Flat64"])
+@pytest.mark.parametrize("name", ["Simple64", pytest.param("Flat64", marks=pytest.mark.slow)])
 def test_a_whole_base_can_be_built_and_nobody_is_walled_in(
     make_game: Callable[..., Game], name: str, race: str
 ) -> None:
