@@ -31,14 +31,17 @@ _WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTI
 _NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
 _TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
+_PROMISED = re.compile(r"\((?:(\d{1,5}) minerals)?(?: and )?(?:(\d{1,5}) vespene)? of it for", re.ASCII)
 _SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
 _UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
 _MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+)?: '''(.*)'''", re.MULTILINE)
 _ACCEPTED = re.compile(r"^    accepted: (\S+) <(\w+)\((.*)\)>", re.MULTILINE)
-_COUNTED = re.compile(r"^    (Your units|Your structures|Under construction|In production): (.*)", re.MULTILINE)
+_COUNTED = re.compile(
+    r"^    (Your units|Your structures|Under construction|Going to be built[^:]*|In production): (.*)", re.MULTILINE
+)
 _COUNT = re.compile(r"(?:^|, )(\d{1,4}) (\w+)", re.ASCII)
 _MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
-_POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTILINE | re.ASCII)
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
@@ -138,6 +141,7 @@ class Situation:
     correspondents: list[str] = field(default_factory=list)
     time_s: float = 0.0
     minerals: int = 0
+    """What is not promised to workers who are on their way to build."""
     vespene: int = 0
     supply_used: float = 0.0
     supply_cap: float = 0.0
@@ -157,7 +161,7 @@ class Situation:
     prices: dict[str, Price] = field(default_factory=dict)
     """By the name of the action; only of what can be paid now."""
     power: list[tuple[str, str, Point]] = field(default_factory=list)
-    """Type, tag and place of what gives power."""
+    """Type, tag and place of what gives power, and has room for a unit."""
     known: list[tuple[str, Point]] = field(default_factory=list)
     """Types of enemies and where on the minimap one of them is."""
     friends: list[Point] = field(default_factory=list)
@@ -201,6 +205,9 @@ def _read_game(situation: Situation, body: str) -> None:
         situation.time_s = 60.0 * int(found[1]) + int(found[2])
     amounts = {name.casefold(): int(amount) for name, amount in _AMOUNT.findall(body)}
     situation.minerals, situation.vespene = amounts.get("minerals", 0), amounts.get("vespene", 0)
+    if found := _PROMISED.search(body):
+        situation.minerals -= int(found[1] or 0)
+        situation.vespene -= int(found[2] or 0)
     if found := _SUPPLY.search(body):
         situation.supply_used, situation.supply_cap = float(found[1]), float(found[2])
     if found := _UPGRADES.search(body):
@@ -215,7 +222,7 @@ def _read_counts(situation: Situation, body: str) -> None:
                     int(number) for number in re.findall(r"(\d{1,4}) (?:at|more)", how_many)
                 )
             continue
-        counts = situation.begun if title == "Under construction" else situation.counts
+        counts = situation.counts if title.startswith("Your") else situation.begun
         for number, kind in _COUNT.findall(re.sub(r"\([^()]*\)", "", listed)):
             counts[kind] = counts.get(kind, 0) + int(number)
     situation.known = [(kind, (float(x), float(y))) for kind, x, y in _SEEN_AT.findall(body)]
@@ -322,7 +329,9 @@ def _read_lines(situation: Situation, body: str) -> None:
     situation.accepted += _ACCEPTED.findall(body)
     situation.rejected += _REJECTED.findall(body)
     situation.power += [
-        (kind, tag, (float(x), float(y))) for kind, tag, x, y in _POWER.findall(body) if kind in POWERFUL
+        (kind, tag, (float(x), float(y)))
+        for kind, tag, x, y, more in _POWER.findall(body)
+        if kind in POWERFUL and "no room" not in more
     ]
 
 

@@ -239,7 +239,8 @@ def test_the_army_sets_out_when_it_is_strong_and_comes_home_when_it_is_not(
 
 
 def test_units_are_warped_in_at_a_phasing_prism() -> None:
-    fields = "        Pylon 0x1 at minimap [10, 36]\n        WarpPrismPhasing 0x2 at minimap [52, 24]\n\n"
+    fields = "        WarpPrismPhasing 0x3 at minimap [5, 5], radius 3.75, warps in fast, no room for a unit\n"
+    fields += "        Pylon 0x1 at minimap [10, 36]\n        WarpPrismPhasing 0x2 at minimap [52, 24]\n\n"
     costs = "        Warp_Zealot_Near: warps. Costs 100 minerals, 2 supply; enough for 4.\n"
     assert (
         calls(side("<Warp_Zealot_Near(tag)>", "Your units: 12 Probe", costs=costs, more=f"Warping in\n{fields}"))
@@ -257,12 +258,19 @@ def test_build_orders_name_types_that_the_player_knows() -> None:
 def test_what_an_observation_says_of_the_side_is_read() -> None:
     counts = (
         "Your units: 2 Probe (1 working, 1 idle), 1 Sentry\n    Your structures: 2 Gateway (1 working, 1 idle)\n"
-        "    Under construction: 1 Stargate (35%)\n"
+        "    Under construction: 1 Stargate (35%)\n    Going to be built by workers on their way: 2 Pylon\n"
         "    In production: Train_Probe (1 at 40%), Train_Zealot (2 at 5%, 9%; 3 more queued)\n"
         "    Enemies spotted so far:\n        1 Roach in sight at minimap [34, 47]"
     )
     seen = read(side("<Build_Pylon()>", counts))
     assert seen.counts == {"Probe": 2, "Sentry": 1, "Gateway": 2}
-    assert (seen.begun, seen.producing) == ({"Stargate": 1}, {"Train_Probe": 1, "Train_Zealot": 5})
+    assert (seen.begun, seen.producing) == ({"Stargate": 1, "Pylon": 2}, {"Train_Probe": 1, "Train_Zealot": 5})
     assert seen.known == [("Roach", (34, 47))]
     assert (seen.minerals, seen.vespene, seen.supply_used, seen.supply_cap) == (400, 100, 20, 31)
+
+
+def test_what_is_promised_is_not_spent_again() -> None:
+    text = side("<Build_Pylon()>", "Your units: 12 Probe")
+    promise = "vespene: 100 (100 minerals and 25 vespene of it for what workers are on their way to build)"
+    seen = read(text.replace("vespene: 100", promise))
+    assert (seen.minerals, seen.vespene) == (300, 75)
