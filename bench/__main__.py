@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 MEASUREMENTS = (
-    "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "recognition",
-    "macro", "image", "http_client", "recording",
+    "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "act",
+    "recognition", "macro", "image", "http_client", "recording",
 )  # fmt: skip
 
 

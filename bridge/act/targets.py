@@ -85,9 +85,9 @@ class Targets:
         if camera is not None:
             x, y = camera.screen(place.x, place.y)
             if 0 <= x < camera.size and 0 <= y < camera.size:
-                return f"; the nearest free place is [{x:g}, {y:g}]"
+                return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
         x, y = self._sight.map.minimap(place.x, place.y)
-        return f"; the nearest free place is at [{x:.1f}, {y:.1f}] of the minimap"
+        return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
 
     # --- points -----------------------------------------------------------------------------------------------
 

@@ -155,8 +155,8 @@ def test_a_rule_is_asked_with_the_units_of_the_team_and_the_point_in_the_world(
     ("place", "better"),
     [
         (None, ""),
-        (WorldPoint(15, 9), "; the nearest free place is [15, 13]"),
-        (WorldPoint(30, 30), "; the nearest free place is at [60.0, 4.0] of the minimap"),
+        (WorldPoint(15.04, 9), "; the nearest free place is [15, 13]"),
+        (WorldPoint(30, 30), "; the nearest free place is at [60, 4] of the minimap"),
     ],
 )
 def test_why_a_rule_finds_nothing_is_told_with_the_place_that_would_do(
