@@ -7,12 +7,13 @@ front door's part.
 import asyncio
 import json
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.padding import Padding
 from rich.text import Text
 
 from orchestrator import show
@@ -74,12 +75,19 @@ def tasks(*, as_json: Json = False) -> None:
         ]
         typer.echo(json.dumps({"tasks": rows}))
         return
-    table = Table(box=None, pad_edge=False)
-    for column in ("task", "agents", "about"):
-        table.add_column(column)
+    console = Console(highlight=False)
     for task in found:
-        table.add_row(task.name, ", ".join(agent.name for agent in task.agents), task.description)
-    Console().print(table)
+        console.print(Text.assemble((task.name, "bold"), "  ", (people([a.name for a in task.agents]), "dim")))
+        console.print(Padding(task.description, (0, 0, 0, 4), expand=False))
+
+
+def people(names: Sequence[str]) -> str:
+    """Names of agents, those that only differ by a number together: `Commander, CombatGroup1 2 5`."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        stem = name.rstrip("0123456789")
+        groups.setdefault(stem, []).append(name.removeprefix(stem))
+    return ", ".join(f"{stem}{' '.join(numbers)}" for stem, numbers in groups.items())
 
 
 def replay(
