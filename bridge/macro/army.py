@@ -55,16 +55,19 @@ def army_attack(ask: Ask) -> list[Order]:
 def army_defend(ask: Ask) -> list[Order]:
     """Fights intruders, those nearest to a town hall first; without any it waits in front of the foremost base.
 
+    Queens fight intruders too, and do not wait.
+
     Raises:
         Impossible: there is no army that is free.
     """
-    units = _army(ask)
+    units = _army(ask, home=True)
     homes = [place(unit) for unit in own_structures(ask.snapshot)]
     enemies = [unit for unit in enemies_in_reach(ask.snapshot, units) if not is_structure(unit) or is_armed(unit)]
     intruders = [u for u in enemies if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
     if intruders:
         halls = [place(hall) for hall in land_of(ask.snapshot).own_halls]
         return _send(ask, units, _nearest(intruders, halls or homes), fight=True)
+    units = _army(ask)
     return _send(ask, units, _rally(ask, _middle(units)), fight=True)
 
 
@@ -80,9 +83,9 @@ def army_retreat(ask: Ask) -> list[Order]:
     return _send(ask, units, _rally(ask, _middle(units)), fight=False)
 
 
-def _army(ask: Ask) -> list[Unit]:
+def _army(ask: Ask, *, home: bool = False) -> list[Unit]:
     """The army, without units that an agent has ordered in this turn: what was said of them holds."""
-    found = army(ask.snapshot)
+    found = army(ask.snapshot, home=home)
     if not found:
         raise never(ask, "you have no army; train units first.")
     free = [unit for unit in found if unit.tag not in ask.ledger.busy]

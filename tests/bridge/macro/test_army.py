@@ -89,6 +89,16 @@ def test_it_defends_against_intruders(game: Game) -> None:
     assert orders[0].function.name == "Attack_minimap"
 
 
+def test_queens_fight_intruders_and_stay_at_their_work_otherwise(make_game: Callable[..., Game]) -> None:
+    game = make_game("Flat64", "zerg")
+    queen, zergling = game.put("Queen", 46, 18), game.put("Zergling", 40, 20)
+    assert zergling in game.say("All_Units_Defend")[0].units
+    game.see()
+    assert queen not in game.say("All_Units_Defend")[0].units
+    game.put("Marine", 44, 20, owner=2)
+    assert queen in game.say("All_Units_Defend")[0].units
+
+
 def test_without_intruders_it_waits_in_front_of_the_base(game: Game) -> None:
     land = land_of(game.snapshot)
     hall, enemy = land.own_halls[0], land.ground.starts[0]
