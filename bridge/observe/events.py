@@ -22,6 +22,9 @@ MIN_CHANGE = 1.0
 """Health and shield that make an event; Protoss shields regain less than that between two quick observations."""
 
 
+_NOTHING = Event(what="appeared", tag="", type="", alliance="neutral", amount=None)
+
+
 class Witnessed(NamedTuple):
     """Tags of the units in a team's view, in its order; views are many, and slower to go through."""
 
@@ -83,5 +86,5 @@ class Events:
 
 
 def event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
-    """What happened to a unit."""
-    return Event(what=what, tag=unit.tag, type=unit.type, alliance=alliance, amount=amount)
+    """What happened to a unit; unchecked, since a battle has hundreds in each step."""
+    return _NOTHING.having({"what": what, "tag": unit.tag, "type": unit.type, "alliance": alliance, "amount": amount})

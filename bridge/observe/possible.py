@@ -107,8 +107,8 @@ class Possible:
         return Choice(tuple(a.spec for a in valid), tuple(offer for offer in offers if offer is not None), barred)
 
     def _offer(self, action: Action, unit_type: str) -> Offer | None:
-        facts = self._facts(action, unit_type)
-        if facts is None or not (facts.minerals or facts.vespene or facts.supply):
+        facts = self._facts(action, unit_type) if _is_paid(action.name, unit_type) else None
+        if facts is None:
             return None
         prices = zip(self._purse, (facts.minerals, facts.vespene, facts.supply), strict=True)
         made = facts.produces
@@ -134,9 +134,9 @@ class Possible:
         function = action.pysc2
         if reason is not None or able is None or function is None:
             return reason
-        facts = self._facts(action, unit_type)
         if function.ability_id in able:
-            return self._promised_away(facts)
+            return self._promised_away(action, unit_type)
+        facts = self._facts(action, unit_type)
         if facts is None:
             return f"{unit_type} cannot"
         return self._lacking(facts) or _not_ready(facts, units) or "not in its present state"
@@ -151,9 +151,10 @@ class Possible:
         if function is None:
             return None
         able = self._able_types(action.units)
-        facts = self._facts(action, ready[0].name if ready else "")
+        unit_type = ready[0].name if ready else ""
         if able is not None and function.ability_id in able:
-            return self._promised_away(facts)
+            return self._promised_away(action, unit_type)
+        facts = self._facts(action, unit_type)
         if facts is None:
             return None if able is None else "nobody can now"
         reason = self._lacking(facts)
@@ -177,9 +178,10 @@ class Possible:
                 return f"{name} is not finished" if stand_ins(name) & self._own.keys() else f"no {name}"
         return self._short_of(facts)
 
-    def _promised_away(self, facts: AbilityFacts | None) -> str | None:
+    def _promised_away(self, action: Action, unit_type: str) -> str | None:
         """What is too few for an action that the game would take, since it knows nothing of promises."""
-        return None if facts is None or not any(self.promised) else self._short_of(facts)
+        facts = self._facts(action, unit_type) if any(self.promised) else None
+        return None if facts is None else self._short_of(facts)
 
     def _short_of(self, facts: AbilityFacts) -> str | None:
         prices = facts.minerals, facts.vespene, facts.supply
@@ -202,6 +204,12 @@ def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None
     if action.needs.upgrade is not None and action.needs.upgrade not in upgrades:
         return f"{action.needs.upgrade} is not researched"
     return None
+
+
+@functools.cache
+def _is_paid(action: str, unit_type: str) -> bool:
+    """Whether an action costs anything."""
+    return any(facts.minerals or facts.vespene or facts.supply for facts in _cases(action, unit_type))
 
 
 @functools.lru_cache(1024)

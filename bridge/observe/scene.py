@@ -193,7 +193,7 @@ class _Look:
         scale = camera.size / CAMERA_WIDTH
         self.screen_x = _tenths(right * scale, camera.size)
         self.screen_y = _tenths(down * scale, camera.size)
-        apart = places - places[members].mean(axis=0)
+        apart = places - places[members].sum(axis=0) / len(members)
         self.distance = np.round(np.hypot(apart[:, 0], apart[:, 1]), 1)
         """From the middle of the team, in world units."""
 
