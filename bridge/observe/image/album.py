@@ -103,13 +103,20 @@ def _minimap(
     if pixels is None and not spec.is_drawn:
         return
     sites = [Site(team.name, team.camera) for team in teams]
-    tags = frozenset(tag for team in teams for tag in team.tags)
+    tags = _commanded(moment, teams, seen)
     alerts = [alert.minimap for alert in seen.view.alerts]
     others = [(other.name, other.minimap) for other in seen.view.others]
     image, legend = minimap.draw(
         moment, world, sites, tags, alerts, spec.size_px, others=others, grid=spec.grid, pixels=pixels
     )
     yield Drawing(image, "minimap", titles.of_minimap(world.minimap_size, legend))
+
+
+def _commanded(moment: Moment, teams: list[_Looker], seen: AgentSight) -> frozenset[int]:
+    """The units that are the agent's own: those of its teams, or all, if it orders the whole side."""
+    if any(team.team.kind == "side" for team in seen.teams):
+        return frozenset(one.tag for one in moment.subjects if one.side == "own")
+    return frozenset(tag for team in teams for tag in team.tags)
 
 
 def _layer(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:

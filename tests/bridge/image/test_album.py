@@ -15,6 +15,7 @@ from bridge.observe import Observer
 from bridge.observe.image import titles
 from bridge.observe.image.picture import encoded
 from bridge.observe.image.screen import Legend
+from orchestrator.config import load_task
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -188,6 +189,17 @@ def test_what_is_wrong_with_a_specification_is_said(wrong: dict[str, Any], words
     with pytest.raises(ValidationError) as raised:
         ImageSpec(**wrong)
     assert words in raised.value.errors()[0]["msg"]
+
+
+def test_who_orders_the_whole_side_sees_all_of_it_as_its_own(snapshot: Snap, battle: list[raw_pb2.Unit]) -> None:
+    def title(name: str) -> str:
+        config = load_task(name)
+        agent = config.agents[0].model_copy(update={"images": (ImageSpec(what="minimap"),)})
+        sight = Observer(config.model_copy(update={"agents": (agent,)})).observe(snapshot(battle))
+        return sight.agents[agent.name].pictures[0].title
+
+    assert "blue: your units, red: enemies;" in title("simple64_eceb")  # a Commander with a team of the kind side
+    assert "green: your side's other units" in title("pvz_task6_level1")  # one who only talks
 
 
 def test_the_game_renders_only_for_those_who_ask_for_it(task: Callable[..., TaskConfig]) -> None:
