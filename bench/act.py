@@ -3,10 +3,10 @@
     python -m bench.act            a table
     python -m bench.act --json     one JSON object on stdout
 
-One agent has five teams of four units and may say every text action that fits its units or its side, of the whole
-catalogue. The game has told what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:
+One agent has five teams of four units and may say every text action of the catalogue, those of other races among them. The game has told what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:
 names, teams and arguments, who may do it now, at what, and the accounts of the turn. `wrong` is a reply of the same
-length of which two calls of three are refused, with what it takes to say what was most likely meant.
+length of which two calls of three are refused, with what it takes to say what was most likely meant. The times are of
+the processor: nothing is waited for here, and other programs disturb them less.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def scene() -> tuple[Actor, Any]:
                 *({"name": f"{name}-1", "unit_types": [name]} for name in TEAMS),
                 {"name": "Base", "kind": "side", "actions": base},
             ],
-            "actions": {name: tuple(a.name for a in actions if a.fits(name)) for name in TEAMS},
+            "actions": {name: tuple(a.name for a in actions if a.fits(name)) for name in knowledge()},
             "max_actions": len(CALLS),
         }
     )
@@ -114,11 +114,11 @@ def measure(calls: tuple[str, ...]) -> dict[str, Any]:
     read_ms, check_ms = [], []
     joint = actor.joint(sight, {AGENT: parse(text)})
     for _ in range(ROUNDS):
-        began = time.perf_counter()
+        began = time.process_time()
         speech = parse(text)
-        read = time.perf_counter()
+        read = time.process_time()
         joint = actor.joint(sight, {AGENT: speech})
-        check_ms.append(1000 * (time.perf_counter() - read))
+        check_ms.append(1000 * (time.process_time() - read))
         read_ms.append(1000 * (read - began))
     both = [read + check for read, check in zip(read_ms, check_ms, strict=True)]
     return {

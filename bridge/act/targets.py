@@ -8,6 +8,7 @@ wrong target may be the worst one. Knows no ability of the units that are to do 
 from __future__ import annotations
 
 import functools
+import operator
 from typing import TYPE_CHECKING
 
 from s2clientprotocol import raw_pb2
@@ -190,7 +191,7 @@ def _slips(wanted: str, known: str) -> int | None:
     if known.startswith(wanted) and len(wanted) >= SHORTEST:
         return 0
     if len(wanted) == len(known):
-        wrong = sum(one != other for one, other in zip(wanted, known, strict=True))
+        wrong = sum(map(operator.ne, wanted, known))
         return wrong if wrong <= MOST_SLIPS else None
     shorter, longer = sorted((wanted, known), key=len)
     dropped = (longer[:place] + longer[place + 1 :] for place in range(2, len(longer)))

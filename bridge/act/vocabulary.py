@@ -34,6 +34,7 @@ class Vocabulary:
         self._agent = agent
         self._actions: dict[str, Action] = {}
         self._catalogue = agent.catalogue()
+        self._by_name = {action.name: action for action in self._catalogue}
         for action in self._catalogue:
             self._actions[squashed(action.name)] = action
         for action in self._catalogue:
@@ -65,13 +66,12 @@ class Vocabulary:
         return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
 
     def _sayable(self, teams: list[TeamSight]) -> Iterable[Action]:
-        """What some teams may be told, in the order of the agent's catalogue; everything if there are none."""
+        """What some teams may be told, in the order in which it is listed; everything if there are none."""
         if not teams:
             return self._catalogue
-        names = {name for team in teams for name in team.team.config.actions}
-        types = {unit.type for team in teams for unit in team.view.units}
-        names.update(name for unit_type in types for name in self._agent.actions.get(unit_type, ()))
-        return [action for action in self._catalogue if action.name in names]
+        types = dict.fromkeys(unit.type for team in teams for unit in team.view.units)
+        lists = (*(team.team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
+        return [self._by_name[name] for name in dict.fromkeys(name for listed in lists for name in listed)]
 
 
 @functools.lru_cache(maxsize=8192)

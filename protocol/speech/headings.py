@@ -136,9 +136,9 @@ _SECTIONS = tuple(
     )
 )
 
-SENTENCE_END = rf"(?:(?<=[.!?;][ \t])|(?<=。))[*_]*+(?={_KEYWORD}[*_]*+:)"
-"""Regular expression of a place within a line where a section may begin (rule H6)."""
-JSON_KEY = rf"(?<=[,{{])[ \t]*+\"(?={_KEYWORD}\"[ \t]*+:)"
+SENTENCE_END = rf"(?:[.!?;][ \t]|。)[*_]*+(?={_KEYWORD}[*_]*+:)"
+"""Regular expression of the end of a sentence behind which a section begins within the line (rule H6)."""
+JSON_KEY = rf"(?:(?<=[,{{])|(?<=[,{{] ))\"(?={_KEYWORD}\"[ \t]*+:)"
 """The same where a section is a key of JSON."""
 
 

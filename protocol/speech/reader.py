@@ -68,6 +68,8 @@ _CHANNEL = r"<\|channel\|>\s*+"
 _THINKS = rf"{_THINK.format(slash='')}|<\|begin_of_thought\|>|{_CHANNEL}(?:analysis|commentary)\b[^<>\n]*+<\|message\|>"
 _THOUGHT = rf"{_THINK.format(slash='/')}|<\|end_of_thought\|>"
 _THINK_ENDS = re.compile(rf"{_THOUGHT}|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
+_MAY_BEGIN = re.compile(r"[\n<\[◁{\"'.!?;。]")
+"""First characters of what `_NEXT` matches; a search for one of them is ten times faster."""
 _NEXT = re.compile(
     rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<think>{_THINKS})|(?P<comment><!--)"
     r"|(?P<speaker><\|(?:im_)?start\|>\s*+user\b)|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
@@ -103,8 +105,9 @@ class _Walk:
 
     def run(self) -> None:
         at = self._line(0)
-        while mark := _NEXT.search(self._plain, at):
-            at = _READS[str(mark.lastgroup)](self, mark)
+        while place := _MAY_BEGIN.search(self._plain, at):
+            mark = _NEXT.match(self._plain, place.start())
+            at = place.end() if mark is None else _READS[str(mark.lastgroup)](self, mark)
 
     @cached_property
     def _closing_tags(self) -> frozenset[str]:
