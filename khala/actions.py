@@ -32,6 +32,8 @@ Examples:\n
     khala actions --race zerg --json
 """
 INDENT = " " * 4
+FEW = 20
+"""Names that an error can tell all of."""
 MANY = 9
 """Unit types that are named one by one; of more, the first ones are."""
 
@@ -92,7 +94,8 @@ def _check(given: str | None, known: Iterable[str], what: str) -> None:
     if given is None or given in names:
         return
     close = difflib.get_close_matches(given, names, n=1)
-    raise ConfigError(f"there is no {what} '{given}'" + (f", did you mean '{close[0]}'?" if close else ""))
+    all_of_them = f", there are {', '.join(names)}" if len(names) <= FEW else ""
+    raise ConfigError(f"there is no {what} '{given}'" + (f", did you mean '{close[0]}'?" if close else all_of_them))
 
 
 def _function(given: str | None) -> str | None:

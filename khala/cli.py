@@ -251,8 +251,11 @@ def _leaves(group: BaseExceptionGroup[Any]) -> Iterator[BaseException]:
 
 def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     """The match that the options describe; its recording is in a directory of its own below `out`."""
+    from bridge.observe import Observer  # noqa: PLC0415  # half a second that other commands do without
+
     match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
     loaded = change(load_task(task), **given)
+    Observer(loaded)  # a section that does not exist is told before a game is started
     name = check_name(run or new_run_name(loaded.name), "run")
     return MatchConfig(task=loaded, run=name, record=_free_recording(out / name), **match)
 

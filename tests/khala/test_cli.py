@@ -40,6 +40,11 @@ BAD = [
         "run bad.yaml",
         "bad.yaml:3 (agents.0.teams.0.unit_types.0): there is no unit type 'Stlaker', did you mean 'Stalker'?",
     ),
+    ("run sections.yaml", "there is no section 'teamz' of an observation: did you mean 'teams'?"),
+    ("run 2s3z --images foo", "there is no picture 'foo', there are screen, minimap"),
+    ("actions --group foo", "there is no group 'foo', there are basic, build"),
+    ("actions --unit Stlaker", "there is no unit type 'Stlaker', did you mean 'Stalker'?"),
+    ("knowledge show Nothing", "nothing in version 4.10 of the game is called 'Nothing'"),
     ("run broken.yaml", "broken.yaml:2: this is no YAML"),
     ("run missing.yaml", "missing.yaml: there is no such file"),
     ("run 2s3z --run a/b", "run 'a/b' cannot stand in a key"),
@@ -75,6 +80,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "bad.yaml").write_text(
         "name: bad\nmap: 2s3z\nagents: [{name: A, role: r, teams: [{name: T, unit_types: [Stlaker]}], actions: {}}]\n"
         "task: win\n"
+    )
+    (place / "sections.yaml").write_text(
+        "name: bad\nmap: 2s3z\nagents: [{name: A, role: r, sections: [game, teamz], teams: [{name: T, unit_types: "
+        "[Stalker]}], actions: {Stalker: [Stop]}}]\ntask: win\n"
     )
     (place / "broken.yaml").write_text("name: x\n  map: [\n")
     (place / "file").write_text("")
