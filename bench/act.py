@@ -3,10 +3,11 @@
     python -m bench.act            a table
     python -m bench.act --json     one JSON object on stdout
 
-One agent has five teams of four units and may say every text action of the catalogue, those of other races among them. The game has told what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:
-names, teams and arguments, who may do it now, at what, and the accounts of the turn. `wrong` is a reply of the same
-length of which two calls of three are refused, with what it takes to say what was most likely meant. The times are of
-the processor: nothing is waited for here, and other programs disturb them less.
+One agent has five teams of four units and may say every text action of the catalogue, those of other races among them.
+The game has told what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands: names,
+teams and arguments, who may do it now, at what, and the accounts of the turn. `wrong` is a reply of the same length of
+which two calls of three are refused, with what it takes to say what was most likely meant. The times are of the
+processor: nothing is waited for here, and other programs disturb them less.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 
@@ -10,6 +10,7 @@ from bridge.act import Actor, Command, JointAction
 from bridge.frames import WorldPoint
 from bridge.observe import Observer
 from bridge.task import AgentConfig
+from protocol.messages import RejectionReason
 from protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -298,6 +299,19 @@ def test_a_call_is_refused_in_words_that_help(
     (rejection,) = joint.rejections["A"]
     assert (rejection.reason, rejection.message) == (reason, message)
     assert (rejection.team, rejection.start) == ("Stalker-1", reply.index(call))
+
+
+ELSEWHERE = {  # where the sentences of the other classes are pinned
+    "malformed": "tests/protocol/test_speech.py",
+    "unknown_team": "below and tests/bridge/test_addressee.py",
+    "too_many_actions": "below",
+    "unknown_recipient": "tests/orchestrator/test_mailbox.py",
+    "refused_by_game": "tests/bridge/test_executors.py",
+}
+
+
+def test_every_class_of_refusals_is_pinned() -> None:
+    assert {reason for _, reason, _ in REFUSED} == set(get_args(RejectionReason)) - set(ELSEWHERE)
 
 
 @pytest.mark.parametrize(
