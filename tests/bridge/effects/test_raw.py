@@ -8,6 +8,8 @@ import pytest
 
 from bridge.act.raw import RawExecutor
 from bridge.catalog import catalogue
+from bridge.functions import functions
+from bridge.generated import without_words
 
 from .cases import Case, cases
 from .performance import perform
@@ -43,3 +45,10 @@ def test_a_text_action_does_what_it_says(case: Case, stage_of: Stages) -> None:
 
 def test_the_table_of_those_without_effect_names_actions() -> None:
     assert BY_RAW.keys() <= catalogue().keys()
+
+
+def test_every_function_has_an_action_whose_effect_is_seen() -> None:
+    seen = {action.function for name, action in catalogue().items() if reason(name, BY_RAW) is None}
+    unseen = functions().keys() - seen - without_words().keys()
+    paint = {name for name in functions() if name.startswith("Effect_Spray")}
+    assert unseen == paint | {"Rally_Morphing_Unit_screen", "Rally_Morphing_Unit_minimap"}
