@@ -1,8 +1,14 @@
-"""What agents see: units → teams → views → text.
+"""What agents see: units → teams → views → text and pictures.
 
-`teams` says which unit answers to which agent; `sight` makes the typed view of every team from a snapshot, `events`
-compares it with the one before, `text` writes it down with what is known of the types in it. `observer` is the way
-through all of it. Everything here is a function of snapshots and of what agents said; no clock, no bus.
+    observer   the way through all of it, snapshot after snapshot
+    teams      which unit answers to which agent              stages      where a team is in its task
+    scene      what stands on each team's screen              body        a unit as all see it
+    events     what changed since the snapshot before         chronicle   what is remembered of an episode
+    possible   what may be told now, and why not the rest
+    side, landmarks   what those are told who lead or build the whole side
+    sight      all of this as a value                         text, image  in words; in pictures
+
+Everything here is a function of snapshots and of what agents said; no clock, no bus.
 """
 
 from bridge.observe.observer import Observer
