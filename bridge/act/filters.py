@@ -77,6 +77,12 @@ def unfit(action: Action, unit: raw_pb2.Unit) -> str | None:
     return None
 
 
+def needs_sight(action: Action) -> bool:
+    """Whether the place that an action is aimed at has to be in sight."""
+    facts = _facts(action.function)
+    return facts is not None and facts.target != "unit" and "visible" in facts.must
+
+
 def _is(word: str, unit: raw_pb2.Unit, known: UnitType | None) -> bool | None:
     """Whether a word of the filters holds for a unit; None if nothing is known of its type."""
     if word in _STATES:

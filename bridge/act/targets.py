@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 from s2clientprotocol import raw_pb2
 
-from bridge.act.filters import unfit
+from bridge.act.filters import needs_sight, unfit
 from bridge.act.refused import Refused
 from bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
+from bridge.ground import land_of
+from bridge.ground.land import SEEN_NOW
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
@@ -76,9 +78,13 @@ class Targets:
         """The point among the arguments, in the world.
 
         Raises:
-            Refused: it lies outside of its frame, or beyond the edge of the map.
+            Refused: it lies outside of its frame, beyond the edge of the map, or where it would have to be seen.
         """
-        return self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
+        point = self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
+        if needs_sight(said.action) and not self._is_seen(point):
+            where = f"[{said.point[0]:g}, {said.point[1]:g}]" if said.point else "The place"
+            raise Refused("invalid_target", f"{where} is out of your sight; {said.action.name} needs a place in sight.")
+        return point
 
     def instead(self, said: Recognised, place: WorldPoint) -> str:
         """A place that would do, as the end of a sentence: on the team's screen if it is there, else on the minimap."""
@@ -89,6 +95,14 @@ class Targets:
                 return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
         x, y = self._sight.map.minimap(place.x, place.y)
         return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
+
+    def _is_seen(self, point: WorldPoint) -> bool:
+        """Whether the player sees a place now; not doubted where the game showed no map."""
+        if not self._sight.snapshot.response.observation.raw_data.map_state.visibility.data:
+            return True
+        cells = land_of(self._sight.snapshot).sight  # (w, h)
+        x, y = min(int(point.x), cells.shape[0] - 1), min(int(point.y), cells.shape[1] - 1)
+        return bool(cells[x, y] == SEEN_NOW)
 
     # --- points -----------------------------------------------------------------------------------------------
 

@@ -212,6 +212,30 @@ def test_a_target_that_the_action_cannot_be_used_on_is_refused(
     assert told(play(scene, call)) == [("invalid_target", message)]
 
 
+@pytest.mark.parametrize(("seen", "refused"), [(2, []), (1, ["invalid_target"]), (0, ["invalid_target"])])
+def test_a_place_has_to_be_in_sight_where_the_game_wants_it(
+    seen: int, refused: list[str], task: Callable[..., TaskConfig], unit: Make, snapshot: Callable[..., Snapshot]
+) -> None:
+    call = "<Effect_KD8Charge_Screen([12, 12])>"
+    agent = AgentConfig.model_validate(
+        {
+            "name": "A",
+            "role": "",
+            "teams": [{"name": "Team-1", "unit_types": ["Reaper"]}],
+            "actions": {"Reaper": ("Effect_KD8Charge_Screen",)},
+        }
+    )
+    config = task("2s3z", agents=(agent,))
+    now = snapshot([unit(A, "Reaper", 10, 10)])
+    visibility = now.response.observation.raw_data.map_state.visibility
+    visibility.bits_per_pixel, visibility.size.x, visibility.size.y = 8, 32, 32
+    visibility.data = bytes([seen]) * (32 * 32)
+    joint = Actor(config).joint(Observer(config).observe(now), {"A": parse(call)})
+    assert [rejection.reason for rejection in joint.rejections["A"]] == refused
+    words = "[12, 12] is out of your sight; Effect_KD8Charge_Screen needs a place in sight."
+    assert [message for _, message in told(joint)] == [words] * len(refused)
+
+
 # --- who of a team does it ---------------------------------------------------------------------------------------
 
 
