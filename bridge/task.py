@@ -16,6 +16,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from bridge.action import GROUP_SELECTOR, Action
 from bridge.catalog import alias_of, catalogue, chosen
+from bridge.forms import forms_of
 from bridge.imagespec import ImageSpec  # noqa: TC001  # pydantic evaluates it
 from bridge.knowledge import knowledge
 from bridge.maps import Difficulty, MapSpec, Race, known_maps
@@ -54,6 +55,15 @@ def _known_action(name: str) -> str:
         return name
     action = alias_of(name)
     return action.name if action else _known(name, catalogue(), "action")
+
+
+def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """What the forms of some types may be told: of what is listed for a type all that the form has as well."""
+    return {
+        form: tuple(name for name in chosen(names, form) if catalogue()[name].fits(form))
+        for unit_type, names in actions.items()
+        for form in forms_of(unit_type)
+    }
 
 
 def _some(values: tuple[T, ...]) -> tuple[T, ...]:
@@ -156,7 +166,7 @@ class AgentConfig(Frozen):
     """One or more; a commander may have none, and only talk."""
     actions: dict[UnitTypeName, tuple[ActionName, ...]] = Field(default_factory=dict)
     """Names of text actions by unit type, in the order in which they are shown; `group:<name>` stands for those of a
-    group that the type has."""
+    group that the type has. A form of a type (sieged, burrowed, …) that is not listed may be told what the type may."""
     task: str = ""
     """What it has to do besides the task of all."""
     max_actions: int | None = Field(default=None, ge=1)
@@ -171,7 +181,7 @@ class AgentConfig(Frozen):
         for unit_type, names in found.items():
             if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
                 raise ValueError(f"{unit_type} has no action {strange[0]}")
-        return found
+        return found | {form: names for form, names in _of_forms(actions).items() if form not in found}
 
     @model_validator(mode="after")
     def _every_type_has_actions(self) -> Self:

@@ -35,6 +35,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from bridge.forms import form_of
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
@@ -52,49 +53,6 @@ NEAR_HEAD = 15.0
 NEAR_TRANSPORT = 4.0
 WORKERS_PER_BUILDER = 30
 ARMY_PER_DEFENDER = 15
-
-FORMS = {
-    "BanelingCocoon": "Zergling",
-    "BroodLordCocoon": "Corruptor",
-    "GreaterSpire": "Spire",
-    "Hellbat": "Hellion",
-    "Hive": "Hatchery",
-    "Lair": "Hatchery",
-    "LiberatorAG": "Liberator",
-    "LurkerCocoon": "Hydralisk",
-    "ObserverSurveillanceMode": "Observer",
-    "OrbitalCommand": "CommandCenter",
-    "OrbitalCommandFlying": "CommandCenter",
-    "OverlordTransport": "Overlord",
-    "OverlordTransportCocoon": "Overlord",
-    "OverseerCocoon": "Overlord",
-    "OverseerOversightMode": "Overseer",
-    "PlanetaryFortress": "CommandCenter",
-    "RavagerCocoon": "Roach",
-    "SiegeTankSieged": "SiegeTank",
-    "SupplyDepotLowered": "SupplyDepot",
-    "ThorHighImpactMode": "Thor",
-    "VikingAssault": "VikingFighter",
-    "WarpGate": "Gateway",
-    "WarpPrismPhasing": "WarpPrism",
-}
-"""By the name of a form: the type as which it counts where no team lists the form."""
-FORM_SUFFIXES = ("Burrowed", "Flying", "Uprooted")
-"""Ends of the names of forms that are made of the type's own name."""
-
-
-def form_of(name: str) -> str | None:
-    """The type that a unit type is another form of; None if it is no form.
-
-    >>> form_of("RoachBurrowed"), form_of("SiegeTankSieged"), form_of("Roach")
-    ('Roach', 'SiegeTank', None)
-    """
-    if name in FORMS:
-        return FORMS[name]
-    for suffix in FORM_SUFFIXES:
-        if name.endswith(suffix) and name != suffix:
-            return name.removesuffix(suffix)
-    return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bridge.maps import known_maps
-from bridge.task import TaskConfig
+from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.configfile import load, loads
 from protocol.errors import ConfigError
 
@@ -100,3 +100,25 @@ def test_a_wrong_task_is_told_with_its_line(old: str, new: str, line: int, text:
         loads(GOOD.replace(old, new, 1), TaskConfig, source="duel.yaml")
     assert text in str(error.value)
     assert error.value.line == line
+
+
+def test_a_form_of_a_listed_type_may_be_told_what_the_type_may() -> None:
+    tank = AgentConfig(
+        name="A",
+        role="r",
+        teams=(TeamConfig(name="T", unit_types=("SiegeTank",)),),
+        actions={"SiegeTank": ("Attack_Unit", "group:skill")},
+    )
+    assert "Morph_Unsiege" in tank.actions["SiegeTankSieged"]
+    assert tank.actions["SiegeTankSieged"][0] == "Attack_Unit"
+    assert "Morph_SiegeMode" not in tank.actions["SiegeTankSieged"]
+
+
+def test_what_is_listed_for_a_form_stands() -> None:
+    tank = AgentConfig(
+        name="A",
+        role="r",
+        teams=(TeamConfig(name="T", unit_types=("SiegeTank",)),),
+        actions={"SiegeTank": ("Attack_Unit",), "SiegeTankSieged": ("Stop",)},
+    )
+    assert tank.actions["SiegeTankSieged"] == ("Stop",)

@@ -10,7 +10,8 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.compat import units as pysc2_units
-from bridge.observe.teams import FORMS, Roster, form_of
+from bridge.forms import FORMS, form_of, forms_of
+from bridge.observe.teams import Roster
 from bridge.task import AgentConfig, TaskConfig
 
 if TYPE_CHECKING:
@@ -157,7 +158,9 @@ NUMBERS = {
 """Unit types as the game counts them, forms among them that `knowledge` need not know."""
 
 
-def followed(agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None) -> list[dict[int, str]]:
+def followed(
+    agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None
+) -> list[dict[int, str]]:
     """Agent and team of every unit at each moment; a moment says of what type the units are then."""
     roster = Roster(agents)
     found: list[dict[int, str]] = []
@@ -242,6 +245,14 @@ def test_every_form_and_what_it_is_a_form_of_is_a_unit_of_pysc2() -> None:
     by_suffix = {name: base for name in NUMBERS if name not in FORMS and (base := form_of(name))}
     assert set(by_suffix.values()) <= NUMBERS.keys()
     assert not {"Locust", "Burrowed"} & by_suffix.keys()
+
+
+def test_forms_of_forms_are_forms() -> None:
+    assert forms_of("CommandCenter") == (
+        "CommandCenterFlying", "OrbitalCommand", "OrbitalCommandFlying", "PlanetaryFortress",
+    )  # fmt: skip
+    assert "Hive" in forms_of("Hatchery")
+    assert forms_of("Stalker") == ()
 
 
 def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
