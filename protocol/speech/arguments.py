@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from protocol.messages import Call, Point
 
 _PADDING = " \t\n*$#" + QUOTES
-_NUMBER = r"[+-]?+(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+"
+_NUMBER = r"[+-]?+(?:[0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?"
 _AXIS = r"[\"']?(?P<{0}>[xyXY])[\"']?\s*+[=:]\s*+"
 _APART = r"(?:\s*+[,;]\s*+|\s++)"
 _POINT = re.compile(
@@ -48,13 +48,13 @@ _POINT = re.compile(
 _AXES = re.compile(
     rf"(?<!\w){_AXIS.format('first')}(?P<one>{_NUMBER}){_APART}{_AXIS.format('second')}(?P<other>{_NUMBER})"
 )
-_TWO_NUMBERS = re.compile(r"([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?+)\s++([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?+)")
+_TWO_NUMBERS = re.compile(r"([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?)\s++([+-]?+[0-9]{1,3}+(?:\.[0-9]++)?)")
 _LONE_NUMBER = re.compile(_NUMBER)
 _HEX = r"0[xX]0*+[0-9a-fA-F]*+(?<=[0-9a-fA-F])"
 _TAG = re.compile(r"0[xX]0*+([0-9a-fA-F]*+)(?<=[0-9a-fA-F])")
 _REMARK = re.compile(rf"({_HEX})(?:\s|[(\[{{/#*:-])[\s(\[{{/#*:-]*+[A-Za-z][^0-9\[\]]*+")
 _VALUES = re.compile(rf"(?<!\w){_HEX}(?!\w)|{_POINT.pattern}".replace("?P<", "?P<_"))
-_BETWEEN_VALUES = re.compile(r"(?:[\s\"']|[A-Za-z_]\w{0,30}+\s*+[=:])*+")
+_BETWEEN_VALUES = re.compile(r"(?:[\s\"']|[A-Za-z_]\w{0,30}+\s*+[=:])*")
 _KEYWORD = re.compile(r"[A-Za-z_][\w ]{0,30}+[=:]\s*+|(?:[A-Za-z_]\w{0,30}+\s++){1,3}(?=[0\[({])")
 _SEPARATOR_OR_BRACKET = re.compile(r"[,;()\[\]{}]")
 _LARGEST_COORDINATE = 1000.0

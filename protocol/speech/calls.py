@@ -15,7 +15,7 @@ from protocol.speech.marks import SHORT, Malformed
 # Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
 _NAME = re.compile(r"<(?P<blank>\s*+)[*`]*+(?P<name>[A-Za-z](?:\\?+[\w-])*+)[*`]*+(?P<open>\s*+\\?+\()?")
-_SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4}+)\s*+\\?+\(")
+_SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4})\s*+\\?+\(")
 _CLOSE = re.compile(r"[\s\\)\]}]*+[-=/]?+\s*+\\?+>")
 _CLOSE_BARE = re.compile(r"\s*+\\?+/?+\s*+\\?+>")
 _LOOSE = re.compile(r"(?:\s*+[:=]\s*+|\s++|(?=[\[{]))(?P<inside>[^<>\n]{1,200}?)\s*+/?+\s*+>")
