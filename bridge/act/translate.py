@@ -26,7 +26,7 @@ from bridge.act.validity import Obstacle, Validity
 from bridge.frames import WorldPoint
 from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger, Order
-from bridge.names import unit_name
+from bridge.names import buff_name, unit_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -193,7 +193,7 @@ class Translator:
         aiming = tuple(tag for tag in able if tag != unit.tag)
         if is_attack(function):
             aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
-            where = "in the air" if unit.is_flying else "on the ground"
+            where = "in the air" if _is_aloft(unit) else "on the ground"
             what = f"{hex(unit.tag)} is a {unit_name(unit.unit_type)} {where}"
             if not aiming:
                 raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
@@ -206,7 +206,12 @@ class Translator:
     @staticmethod
     def _hits(unit: raw_pb2.Unit, target: raw_pb2.Unit) -> bool:
         """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
-        return _reaches(unit_name(unit.unit_type), unit_name(target.unit_type), target.is_flying)
+        return _reaches(unit_name(unit.unit_type), unit_name(target.unit_type), _is_aloft(target))
+
+
+def _is_aloft(unit: raw_pb2.Unit) -> bool:
+    """Whether a unit is hit in the air: what flies, and what a Phoenix holds up with its beam."""
+    return unit.is_flying or any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)
 
 
 @functools.cache

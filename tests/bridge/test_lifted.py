@@ -1,0 +1,53 @@
+"""What a Phoenix holds up with its beam is hit in the air, whatever the game says of its flying."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bridge.act import Actor
+from bridge.observe import Observer
+from bridge.task import AgentConfig, TaskConfig
+from protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from s2clientprotocol import raw_pb2
+
+    from bridge.snapshot import Snapshot
+
+GRAVITON_BEAM = 5
+
+
+@pytest.mark.parametrize(
+    ("attacker", "buffs", "refused"),
+    [
+        ("Phoenix", (), ["invalid_target"]),
+        ("Phoenix", (GRAVITON_BEAM,), []),
+        ("Zealot", (), []),
+        ("Zealot", (GRAVITON_BEAM,), ["invalid_target"]),
+    ],
+)
+def test_what_is_lifted_is_hit_in_the_air(
+    attacker: str,
+    buffs: tuple[int, ...],
+    refused: list[str],
+    task: Callable[..., TaskConfig],
+    unit: Callable[..., raw_pb2.Unit],
+    snapshot: Callable[..., Snapshot],
+) -> None:
+    agent = AgentConfig.model_validate(
+        {
+            "name": "A",
+            "role": "",
+            "teams": [{"name": "T", "unit_types": [attacker]}],
+            "actions": {attacker: ["Attack_Unit"]},
+        }
+    )
+    config = task("2s3z", agents=(agent,))
+    queen = unit(0x100180001, "Queen", 12, 10, alliance="enemy", buff_ids=buffs)
+    sight = Observer(config).observe(snapshot([unit(0x100040001, attacker, 10, 10), queen]))
+    joint = Actor(config).joint(sight, {"A": parse("<Attack_Unit(0x100180001)>")})
+    assert [rejection.reason for rejection in joint.rejections["A"]] == refused
