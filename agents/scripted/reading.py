@@ -31,6 +31,8 @@ _WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTI
 _NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
 _TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
+_HIT = re.compile(r"^        own \w+ was hit: (.*)", re.MULTILINE)
+_HEX = re.compile(r"0x[0-9a-f]+", re.ASCII)
 _PROMISED = re.compile(r"\((?:(\d{1,5}) minerals)?(?: and )?(?:(\d{1,5}) vespene)? of it for", re.ASCII)
 _SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
 _UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
@@ -121,6 +123,8 @@ class Team:
     actions: list[Action] = field(default_factory=list)
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
+    hit: set[str] = field(default_factory=set)
+    """Tags of own units that were hit since the last observation."""
     resources: list[Point] = field(default_factory=list)
     """Where minerals and geysers are on the screen."""
     minimap: Point | None = None
@@ -247,6 +251,7 @@ def _read_team(team: Team, body: str) -> None:
     if bounds := _SCREEN.search(body):
         x0, x1, y0, y1 = (float(number) for number in bounds.groups())
         team.bounds = (x0, x1, y0, y1)
+    team.hit = {tag for listed in _HIT.findall(body) for tag in _HEX.findall(listed)}
     team.resources = [(float(x), float(y)) for _, x, y in _RESOURCE.findall(body)]
     if place := _PLACE.search(body):
         team.minimap = float(place[1]), float(place[2])

@@ -127,7 +127,8 @@ def shoot(plan: Plan, target: Unit) -> bool:
 
 def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
     """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
-    hurt = [unit for unit in plan.team.own if unit.share < HURT and _pressed(unit, foes)]
+    hit = plan.team.hit
+    hurt = [unit for unit in plan.team.own if unit.share < HURT and unit.tag in hit and _pressed(unit, foes)]
     if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
         return  # nobody would be left to fight
     for unit in sorted(hurt, key=lambda unit: unit.share):

@@ -23,7 +23,7 @@ ORDERS_EVERY_S = 12
 """How often a commander says where all go."""
 _RAID = re.compile(r"\b(raid|workers?|drones?|probes?|scvs?)\b", re.IGNORECASE)
 _GATHER = re.compile(r"\bgather\b", re.IGNORECASE)
-_HALL = re.compile(r"\b(hatchery|nexus|command center)\b", re.IGNORECASE)
+_HALL = re.compile(r"(?<!your )\b(hatchery|nexus|command center)\b", re.IGNORECASE)
 _ATTACK = re.compile(r"\b(raid|kill|destroy)\b", re.IGNORECASE)
 
 

@@ -35,12 +35,15 @@ def page(
     task: str = "",
     more: str = "",
     minimap: str = "[30, 32]",
+    hit: str = "",
 ) -> str:
     """An observation of one team, T."""
     lists = {"Your units": own, "Allied units": tuple(allies), "Enemy units": tuple(enemies)}
     blocks = [
         f"    {title}:\n" + "".join(f"        {unit}\n" for unit in units) for title, units in lists.items() if units
     ]
+    if hit:
+        blocks.append(f"    Since the last observation:\n        own Stalker was hit: {hit}\n")
     valid = ", ".join(f"<{action}>" for action in actions)
     return (
         f"Game\n    Time: 0:20\n\nTeam T\n    Minimap position: {minimap}\n{''.join(blocks)}\n"
@@ -97,14 +100,16 @@ BLINK = (*BASIC, "Select_Unit_Blink_Screen(tag, screen)")
 
 def test_the_nearly_dead_blink_out_of_reach_and_the_others_go_on() -> None:
     hurt = line(9, "Stalker", 13, 12, "shield 0/80", "weapon ready", health="30/80")
-    first, second = calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK))
+    first, second = calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x9 -16, 0x1 -8"))
     assert first.startswith("Select_Unit_Blink_Screen 0x9")
     assert second == "Attack_Unit 0x10"
+    assert calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x1 -8")) == ["Attack_Unit 0x10"]
 
 
 def test_who_cannot_blink_again_yet_does_not_try() -> None:
     hurt = line(9, "Stalker", 13, 12, "shield 0/80", "weapon ready", "not ready Blink", health="30/80")
-    assert "Select_Unit_Blink_Screen" not in names(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK))
+    said = names(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x9 -16"))
+    assert "Select_Unit_Blink_Screen" not in said
 
 
 ROACHES = [line(0x20 + n, "Roach", 17, 8 + n, far=5.0) for n in range(5)]
