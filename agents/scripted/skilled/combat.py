@@ -128,7 +128,11 @@ def shoot(plan: Plan, target: Unit) -> bool:
 def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
     """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
     hit = plan.team.hit
-    hurt = [unit for unit in plan.team.own if unit.share < HURT and unit.tag in hit and _pressed(unit, foes)]
+    hurt = [
+        unit
+        for unit in plan.team.own
+        if unit.share < HURT and (unit.tag in hit or _caught(unit, foes)) and _pressed(unit, foes)
+    ]
     if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
         return  # nobody would be left to fight
     for unit in sorted(hurt, key=lambda unit: unit.share):
@@ -165,6 +169,11 @@ def _keep_off(plan: Plan, foes: Sequence[Unit]) -> bool:
     if near:
         plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
     return True
+
+
+def _caught(unit: Unit, foes: Sequence[Unit]) -> bool:
+    """Whether somebody who fights by hand stands at a unit."""
+    return any(kind_of(foe).melee and _gap(foe, unit) < 1.0 for foe in foes)
 
 
 def _pressed(unit: Unit, foes: Sequence[Unit]) -> bool:
