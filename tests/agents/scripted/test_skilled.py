@@ -103,7 +103,9 @@ def test_the_nearly_dead_blink_out_of_reach_and_the_others_go_on() -> None:
     first, second = calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x9 -16, 0x1 -8"))
     assert first.startswith("Select_Unit_Blink_Screen 0x9")
     assert second == "Attack_Unit 0x10"
-    assert calls(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x1 -8")) == ["Attack_Unit 0x10"]
+    roach = line(0x10, "Roach", 15, 12, far=3.0, health="145/145")
+    assert calls(page(*STALKERS, hurt, enemies=[roach], actions=BLINK, hit="0x1 -8")) == ["Attack_Unit 0x10"]
+    assert len(calls(page(*STALKERS, hurt, enemies=[roach], actions=BLINK, hit="0x9 -8"))) == 2
 
 
 def test_who_cannot_blink_again_yet_does_not_try() -> None:
