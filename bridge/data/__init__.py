@@ -22,8 +22,8 @@ _LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml is 15 t
 _HERE = Path(__file__).parent
 
 
-def path(name: str) -> Path:
-    """Where a data file is."""
+def path(name: str | Path) -> Path:
+    """Where a data file is; an absolute path is left as it is."""
     return _HERE / name
 
 
