@@ -22,15 +22,6 @@ GROUP_SELECTOR = "group:"
 """Begins what stands in a task for all actions of a group: `group:skill`."""
 
 
-class Needs(Frozen):
-    """What has to be true for an action to be valid now, where the game itself is not asked."""
-
-    weapon: bool = False
-    """The unit type has a weapon."""
-    upgrade: str | None = None
-    """The player has this upgrade, named as in `pysc2.lib.upgrades`."""
-
-
 class Action(Frozen):
     """One text action."""
 
@@ -61,7 +52,6 @@ class Action(Frozen):
     """Rule of `bridge.macro` that finds who carries it out, or where; None if the words say it all."""
     produces: str | None = None
     """Unit type or upgrade that comes of it."""
-    needs: Needs = Needs()
 
     @property
     def named(self) -> int:

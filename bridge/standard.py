@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bridge.available import unmet
 from bridge.catalog import catalogue
-from bridge.knowledge import is_armed, knowledge
+from bridge.knowledge import knowledge
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.messages import Clock
 
@@ -59,11 +60,9 @@ def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
 
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
     """Whether units of a type are told the action on this map."""
-    needs = action.needs
     return (
         action.group in GROUPS
         and action.subject != "side"
         and action.fits(unit)
-        and (not needs.weapon or is_armed(unit))
-        and (needs.upgrade is None or needs.upgrade in spec.upgrades)
+        and (bool(_base(spec)) or unmet(action.pysc2, unit, spec.upgrades) is None)
     )

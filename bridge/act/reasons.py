@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from bridge.available import ATTACK, is_attack
 from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
 from bridge.names import unit_name, upgrade_name
 
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from bridge.macro import Ledger
     from bridge.snapshot import Snapshot
 
-ATTACK = 3674
-"""The general ability to attack."""
 SCAN_MOVE = 19
 """What units without a weapon do when they are told to attack: they walk there."""
 QUEUE_LENGTH = 5
@@ -154,11 +153,6 @@ def otherwise(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str 
 
 REASONS: tuple[Reason, ...] = (under_construction, tech, energy, price, queue, power, cooldown, otherwise)
 """In the order in which they are tried."""
-
-
-def is_attack(function: Function) -> bool:
-    """Whether a function attacks; scanning goes by the same general ability, and is for those without a weapon."""
-    return ATTACK in (function.ability_id, function.general_id) and function.stem != "Scan_Move"
 
 
 def can_shoot(name: str, able: frozenset[int]) -> bool:

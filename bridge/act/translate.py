@@ -19,10 +19,11 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bridge.act.reasons import facts_of, is_attack
+from bridge.act.reasons import facts_of
 from bridge.act.refused import Refused, reject
 from bridge.act.targets import Targets
 from bridge.act.validity import Obstacle, Validity
+from bridge.available import is_attack
 from bridge.frames import WorldPoint
 from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger, Order

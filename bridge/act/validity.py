@@ -20,11 +20,11 @@ from bridge.act.reasons import (
     energy,
     facts_of,
     incapable,
-    is_attack,
     price,
     too_dear,
 )
-from bridge.knowledge import is_armed, upgrades
+from bridge.available import is_attack, unmet
+from bridge.knowledge import is_armed
 from bridge.names import unit_name
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from bridge.action import Action
     from bridge.functions import Function
-    from bridge.knowledge import AbilityFacts
     from bridge.macro import Ledger
     from bridge.snapshot import Snapshot
 
@@ -68,7 +67,7 @@ class Validity:
             return self._spent(function, unit, name)
         facts = facts_of(function.ability_id, name)
         if able is None or function.kind == "autocast":  # the game is not asked about switches
-            reason = self._surely_not(action, function, name, facts)
+            reason = unmet(function, name, self._means.upgrades)
             return None if reason is None else Obstacle(0, unit.energy, reason)
         if facts is None or (is_attack(function) and not is_armed(name)):
             return Obstacle(0, unit.energy, incapable(function, name))
@@ -108,11 +107,3 @@ class Validity:
         if facts and facts.energy and (tired := energy(self._means, facts, unit, name)):
             return Obstacle(REASONS.index(energy) + 1, unit.energy, tired)
         return None
-
-    def _surely_not(self, action: Action, function: Function, name: str, facts: AbilityFacts | None) -> str | None:
-        """What is sure without the game's word."""
-        if is_attack(function) and not is_armed(name):
-            return f"{name} has no weapon"
-        needs = {*(facts.requires if facts else ()), *((action.needs.upgrade,) if action.needs.upgrade else ())}
-        missing = [need for need in sorted(needs) if need in upgrades() and not self._means.has(need)]
-        return f"{missing[0]} is not researched" if missing else None

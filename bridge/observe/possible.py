@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
+from bridge.available import is_attack, unmet
 from bridge.catalog import catalogue
 from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
 from bridge.macro.ledger import Ledger
@@ -130,10 +131,9 @@ class Possible:
     def _why_not(self, action: Action, units: Sequence[Body], able: frozenset[int] | None) -> str | None:
         """Why units of one type cannot do an action now, as the end of a sentence; None if one of them can."""
         unit_type = units[0].name
-        reason = unmet(action, unit_type, self._upgrades)
         function = action.pysc2
-        if reason is not None or able is None or function is None:
-            return reason
+        if able is None or function is None or (is_attack(function) and not is_armed(unit_type)):
+            return unmet(function, unit_type, self._upgrades)
         if function.ability_id in able:
             return self._promised_away(action, unit_type)
         facts = self._facts(action, unit_type)
@@ -195,15 +195,6 @@ def _promised(snapshot: Snapshot, bodies: Mapping[int, Body]) -> tuple[int, int]
         return 0, 0
     minerals, vespene = Ledger.of(snapshot).aside
     return round(minerals), round(vespene)
-
-
-def unmet(action: Action, unit_type: str, upgrades: Iterable[str]) -> str | None:
-    """Why units of a type cannot do an action now, as the end of a sentence; None if they can."""
-    if action.needs.weapon and not is_armed(unit_type):
-        return f"{unit_type} has no weapon"
-    if action.needs.upgrade is not None and action.needs.upgrade not in upgrades:
-        return f"{action.needs.upgrade} is not researched"
-    return None
 
 
 @functools.cache

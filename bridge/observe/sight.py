@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from bridge.observe.events import Witnessed
-from bridge.observe.possible import unmet
 
 if TYPE_CHECKING:
     from bridge.frames import Camera, MapFrame
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from bridge.task import AgentConfig
     from protocol.messages import TeamView, View
 
-__all__ = ["AgentSight", "Sight", "TeamSight", "unmet"]
+__all__ = ["AgentSight", "Sight", "TeamSight"]
 
 
 @dataclass(frozen=True, slots=True)
