@@ -210,9 +210,11 @@ class BusConformance:
         assert await take(subscription, 1) == [Sample("a/b", b"after")]
 
     async def test_a_closed_publisher_leaves_no_state_behind(self, connect: Connect) -> None:
-        host, late = await connect(), await connect()
+        host, witness, late = await connect(), await connect(), await connect()
+        seen = await witness.subscribe("a/b", Delivery.STATE)
         publisher = await host.publisher("a/b", Delivery.STATE)
         await publisher.put(b"old")
+        await take(seen, 1)  # it is not on its way any more
         await publisher.close()
         await publisher.close()
         await (await host.publisher("a/c", Delivery.STATE)).put(LAST)
