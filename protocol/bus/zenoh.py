@@ -10,6 +10,8 @@ thread that keeps the process from ending. A session does not survive a fork: st
 from __future__ import annotations
 
 import asyncio
+import atexit
+import contextlib
 import json
 import logging
 from concurrent.futures import ThreadPoolExecutor
@@ -98,6 +100,17 @@ async def probe(config: BusConfig) -> tuple[str, ...]:
         await bus.close()
 
 
+_unclosed: set[ZenohBus] = set()
+
+
+@atexit.register
+def _close_what_was_forgotten() -> None:
+    """Closes sessions that nobody closed: a callback that meets an interpreter on its way out aborts the process."""
+    for bus in tuple(_unclosed):
+        with contextlib.suppress(zenoh.ZError):
+            bus._session.close()  # type: ignore[no-untyped-call]  # noqa: SLF001  # as in `_shut`; the module's own class
+
+
 class ZenohBus:
     """A session of Zenoh; keeps the promises of `protocol.bus`. Made by `open_bus`."""
 
@@ -117,6 +130,7 @@ class ZenohBus:
         self._links = {str(transport.zid) for transport in session.info.transports()}
         events = Callback(partial(self._hand_over, self._on_transport), indirect=False)
         self._held.add(session.info.declare_transport_events_listener(events, history=True))
+        _unclosed.add(self)
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -208,6 +222,7 @@ class ZenohBus:
         if self._held.closed:
             return
         self._held.closed = True
+        _unclosed.discard(self)
         for mailbox in self._mailboxes:
             mailbox.shut()
         try:
