@@ -11,8 +11,7 @@ from s2clientprotocol import raw_pb2
 from bridge.frames import WorldPoint
 from bridge.functions import functions
 from bridge.ground import land_of, sites
-from bridge.ground.footprints import ADDON_OFFSET
-from bridge.ground.land import SEEN_NOW
+from bridge.ground.land import SEEN_NOW, addon_place
 from bridge.macro.builders import GAS_STRUCTURES, builder
 from bridge.macro.places import for_structure, free_base, free_geyser
 from bridge.macro.price import charge, check, require
@@ -133,7 +132,7 @@ def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
     width, height = footprint_need(structure).size
     ask.ledger.promise(middle, width, height)
     if sites()[structure].addon:
-        ask.ledger.promise(WorldPoint(middle.x + ADDON_OFFSET[0], middle.y + ADDON_OFFSET[1]), 2, 2)
+        ask.ledger.promise(addon_place(middle), 2, 2)
     return orders
 
 
