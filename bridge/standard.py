@@ -51,11 +51,16 @@ def _commander(spec: MapSpec) -> AgentConfig:
 
 def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
     """Where there are workers, the team of no units that trains and builds."""
-    if not any(knowledge()[unit].worker for unit in spec.units):
+    if not _has_workers(spec):
         return ()
     known = {action.group for action in catalogue().values() if action.race in (spec.race, None)}
     groups = tuple(f"group:{name}/{spec.race}" for name in SIDE_GROUPS if name in known)
     return (TeamConfig(name=BASE, kind="side", actions=groups),)
+
+
+def _has_workers(spec: MapSpec) -> bool:
+    """Whether there is an economy, so that what is not there yet can be built and researched."""
+    return any(knowledge()[unit].worker for unit in spec.units)
 
 
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
@@ -64,5 +69,5 @@ def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
         action.group in GROUPS
         and action.subject != "side"
         and action.fits(unit)
-        and (bool(_base(spec)) or unmet(action.pysc2, unit, spec.upgrades) is None)
+        and (_has_workers(spec) or unmet(action.pysc2, unit, spec.upgrades) is None)
     )
