@@ -24,7 +24,7 @@ from agents.llm.retry import RetryRule
 from agents.llm.vision import Vision
 from agents.llm_policy import LLMPolicy
 from agents.memory import LastSteps
-from agents.policy import FunctionPolicy, Policy
+from agents.policy import Policy, as_policy
 from agents.scripted.policies import Silent
 from agents.secret import read_key
 from protocol.errors import ConfigError
@@ -176,9 +176,7 @@ def load_policy(name: str) -> Policy:
     found = getattr(module, attribute, None)
     if found is None:
         raise ConfigError(f"the module {module_name} has no '{attribute}'", source=f"policy {name}")
-    policy = found() if isinstance(found, type) else found
-    if hasattr(policy, "decide"):
-        return policy  # type: ignore[no-any-return]  # a policy is whatever has a `decide`
-    if callable(policy):
-        return FunctionPolicy(policy)
-    raise ConfigError("it is no function and has no method `decide`", source=f"policy {name}")
+    try:
+        return as_policy(found() if isinstance(found, type) else found)
+    except TypeError as error:
+        raise ConfigError(str(error), source=f"policy {name}") from None

@@ -17,7 +17,6 @@ import typer
 
 from agents.build import Workshop
 from agents.config import AgentsFile, WorkerSpec, load_agents
-from agents.policy import Checked
 from agents.scripted.endpoint import Behaviour, Endpoint
 from agents.scripted.faults import Faults, parse_faults
 from agents.scripted.players import PLAYERS
@@ -55,7 +54,7 @@ def play(
     check_name(side, "side")
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     config = BusConfig(connect=tuple(connect))
-    tallies = _until_told(lambda stop: _play(config, run, side, policies, file.default_reply, stop))
+    tallies = _until_told(lambda stop: _play(config, run, side, policies, stop))
     if as_json:
         typer.echo(json.dumps({"run": run, "agents": {name: _plain(tally) for name, tally in tallies.items()}}))
     else:
@@ -108,7 +107,7 @@ def _settle_memory() -> None:
 
 
 async def _play(
-    config: BusConfig, run: str, side: str, policies: dict[str, Policy], default_reply: str, stop: asyncio.Event
+    config: BusConfig, run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
 ) -> dict[str, Tally]:
     await _check(policies.values())
     bus = await open_bus(config)
@@ -117,17 +116,16 @@ async def _play(
             f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {', '.join(config.connect_to)}"
         )
         _settle_memory()
-        return await run_workers(bus, run, side, policies, default_reply=default_reply, stop=stop)
+        return await run_workers(bus, run, side, policies, stop=stop)
     finally:
         await bus.close()
 
 
 async def _check(policies: Iterable[Policy]) -> None:
-    """Lets policies that can find out what is wrong with them do so, before anybody counts on them."""
+    """Let policies look for what is wrong with them, before a host counts on them."""
     async with asyncio.TaskGroup() as group:
         for policy in policies:
-            if isinstance(policy, Checked):
-                group.create_task(policy.check())
+            group.create_task(policy.check())
 
 
 def _sentence(name: str, tally: Tally) -> str:

@@ -1,7 +1,8 @@
-"""Asks a policy, and has a reply in time whatever the policy does.
+"""Ask a policy, and have a reply in time whatever the policy does.
 
 A policy is somebody else's code: it may raise, return nonsense, take too long, or not care that it is cancelled.
-Each of these is a `Decision` with status `fallback` and the default reply here. Above it: `agents.worker`.
+Each of these is a `Decision` with status `fallback` and no words here; the host then takes the default reply of the
+task. Above it: `agents.worker`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import traceback
 from typing import TYPE_CHECKING, ParamSpec
 
 from agents.llm.client import LLMError
-from agents.policy import Answer, Decision
+from agents.policy import Decision, Said
 from agents.secret import scrub
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ P = ParamSpec("P")
 log = logging.getLogger(__name__)
 
 UNWIND_S = 0.02
-"""A policy that is cancelled gets so long to tell what it has spent, before the default reply is sent."""
+"""A policy that is cancelled gets so long to tell what it has spent, before the fallback is sent."""
 MAX_REPLY_CHARACTERS = 65_536
 """Longer replies are cut: a model that repeats itself without end must not fill the bus."""
 
@@ -33,16 +34,14 @@ class Guard:
 
     Args:
         agent: name of the agent, for the log.
-        default_reply: what is said when the policy says nothing.
     """
 
-    def __init__(self, agent: str, default_reply: str = "") -> None:
+    def __init__(self, agent: str) -> None:
         self._agent = agent
-        self._default_reply = default_reply
         self._complaints: set[str] = set()
-        self._abandoned: set[asyncio.Task[Answer]] = set()
+        self._abandoned: set[asyncio.Task[Said]] = set()
 
-    async def within(self, time_s: float | None, deciding: Coroutine[Any, Any, Answer]) -> Decision:
+    async def within(self, time_s: float | None, deciding: Coroutine[Any, Any, Said]) -> Decision:
         """The decision, or a fallback after `time_s` seconds. Raises only what a cancelled or ending process raises."""
         task = asyncio.create_task(deciding, name=f"decide {self._agent}")
         try:
@@ -50,7 +49,7 @@ class Guard:
             if not done:
                 task.cancel()
                 await asyncio.wait({task}, timeout=UNWIND_S)
-                return self._fallback("timeout")
+                return _fallback("timeout")
         finally:
             self._let_go(task)
         return self._outcome(task)
@@ -71,16 +70,16 @@ class Guard:
             if pending:
                 log.warning("agent %s: %d decision(s) ignored that they were cancelled", self._agent, len(pending))
 
-    def _outcome(self, task: asyncio.Task[Answer]) -> Decision:
+    def _outcome(self, task: asyncio.Task[Said]) -> Decision:
         if task.cancelled():
-            return self._fallback("cancelled")
+            return _fallback("cancelled")
         error = task.exception()
         if isinstance(error, LLMError):
             self._complain_of_model(error)
-            return self._fallback(error.status)
+            return _fallback(error.status)
         if isinstance(error, Exception):
             self._complain("the policy failed", error)
-            return self._fallback(type(error).__name__)
+            return _fallback(type(error).__name__)
         return self._checked(task.result())
 
     def _checked(self, answer: object) -> Decision:
@@ -89,22 +88,19 @@ class Guard:
         if not isinstance(answer, Decision):
             kind = type(answer).__name__
             self._once(f"the policy returned {kind}, a reply is a str or an agents.policy.Decision")
-            return self._fallback(f"returned {kind}")
+            return _fallback(f"returned {kind}")
         text = answer.text[:MAX_REPLY_CHARACTERS]
         if not text.isascii():  # lone surrogates cannot be sent
             text = text.encode("utf-8", "replace").decode("utf-8")
         return Decision(text, answer.status, answer.detail, answer.attempts, answer.usage)
 
-    def _fallback(self, detail: str) -> Decision:
-        return Decision(self._default_reply, "fallback", detail)
-
-    def _let_go(self, task: asyncio.Task[Answer]) -> None:
+    def _let_go(self, task: asyncio.Task[Said]) -> None:
         if not task.done():
             task.cancel()
             self._abandoned.add(task)
             task.add_done_callback(self._forget)
 
-    def _forget(self, task: asyncio.Task[Answer]) -> None:
+    def _forget(self, task: asyncio.Task[Said]) -> None:
         self._abandoned.discard(task)
         if not task.cancelled():
             task.exception()  # asked for, so that asyncio does not report it as never retrieved
@@ -121,3 +117,7 @@ class Guard:
         if (key or text) not in self._complaints:
             self._complaints.add(key or text)
             log.error("agent %s: %s", self._agent, text)
+
+
+def _fallback(detail: str) -> Decision:
+    return Decision("", "fallback", detail)

@@ -34,7 +34,6 @@ class Links:
     images: Subscription[Sample]
     runs: Subscription[Sample]
     results: Subscription[Sample]
-    messages: Publisher
     replies: Publisher
     exchanges: Publisher
 
@@ -62,7 +61,6 @@ async def join(stack: AsyncExitStack, bus: Bus, run: str, side: str, agent: str)
         observations=await hear(agent_key(run, side, agent, Topic.OBSERVATION)),
         runs=await hear(run_key(run, Topic.RUN)),
         results=await hear(run_key(run, Topic.RESULT)),
-        messages=await say(Topic.MESSAGE, Delivery.SPEECH),
         replies=await say(Topic.REPLY, Delivery.SPEECH),
         exchanges=await say(Topic.EXCHANGE, Delivery.LOG),
     )

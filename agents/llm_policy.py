@@ -1,7 +1,7 @@
 """The policy that asks a language model: prompt → tries within limits → the model's words.
 
 Above it: the worker, which cancels it at the deadline. Below it: `agents.prompt`, `agents.memory` and
-`agents.llm`. It knows no bus; each try, also one that failed or was cancelled, is told to `trace`.
+`agents.llm`. It knows no bus; each try, also one that failed or was cancelled, goes to the trace of its context.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import logging
 import random
 from typing import TYPE_CHECKING
 
-from agents.deadline import time_to_decide_s
 from agents.llm.client import (
     Completion,
     LLMClient,
@@ -24,22 +23,24 @@ from agents.llm.client import (
 from agents.llm.limits import Limits
 from agents.llm.retry import RetryRule, retried
 from agents.memory import Memory, NoMemory
-from agents.pictures import PATIENCE_S, Pictures
+from agents.pictures import PATIENCE_S
+from agents.policy import Policy
 from agents.prompt import Prompt
 from protocol.messages import Exchange, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from agents.llm.vision import Vision
-    from protocol.messages import Briefing, ChatMessage, Observation
+    from agents.policy import Context
+    from protocol.messages import Briefing, ChatMessage
 
 log = logging.getLogger(__name__)
 
 UNKNOWN = Usage(requests=1, unknown_requests=1)
 
 
-class LLMPolicy:
+class LLMPolicy(Policy):
     """Decides by asking a language model.
 
     One request with `try_timeout_s` for it, repeated as `retry` says, never past the deadline.
@@ -52,10 +53,6 @@ class LLMPolicy:
         try_timeout_s: time for one try; the time to the deadline if that is shorter.
         vision: what the model sees; None if it sees nothing, and pictures are left out.
         rng: jitter of the waits between tries.
-
-    Attributes:
-        trace: called with every request that was made, as soon as it is over.
-        pictures: where the pictures of observations are found; the worker sets it.
     """
 
     def __init__(
@@ -69,13 +66,11 @@ class LLMPolicy:
         vision: Vision | None = None,
         rng: random.Random | None = None,
     ) -> None:
-        self.trace: Callable[[Exchange], None] = _untold
         self.client = client
         self.limits = limits or Limits()
         self.try_timeout_s = try_timeout_s
         self.vision = vision
-        self.pictures = Pictures()
-        self._told_blind = False
+        self._warned_blind = False
         self._memory = memory or NoMemory()
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
@@ -94,23 +89,23 @@ class LLMPolicy:
         self._memory.clear()
         await self.client.refresh()
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
-        """The model's words.
+    async def decide(self, context: Context) -> str:
+        """Return the model's words.
 
         Raises:
             LLMError: there are none; the error of the last try.
         """
-        arrived = asyncio.get_running_loop().time()
-        pictures = await self._look(observation)
+        observation = context.observation
+        pictures = await self._look(context)
         wanted = observation.images[: self.vision.max_images] if self.vision else ()
-        prompt = self._prompt_for(briefing).messages(
+        prompt = self._prompt_for(context.briefing).messages(
             observation.text,
             self._memory.recall(),
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        tries = _Tries(self, observation, prompt, pictures, arrived)
-        completion = await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+        tries = _Tries(self, context, prompt, pictures)
+        completion = await retried(tries.once, self._retry, deadline=context.deadline, rng=self._rng)
         self._memory.remember(observation, completion.text)
         return completion.text
 
@@ -118,23 +113,23 @@ class LLMPolicy:
         """Closes the client."""
         await self.client.close()
 
-    async def _look(self, observation: Observation) -> Mapping[str, bytes]:
+    async def _look(self, context: Context) -> Mapping[str, bytes]:
         """The pictures of an observation that are there, or come in a moment; none for a model that does not see."""
+        observation = context.observation
         if not observation.images:
             return {}
         if self.vision is None:
-            if not self._told_blind:
+            if not self._warned_blind:
                 log.warning(
                     "agent %s: its observations have pictures, and the model %s is shown none of them: "
                     "say `images: true` in its model file if it sees",
                     observation.agent,
                     self.client.model,
                 )
-            self._told_blind = True
+            self._warned_blind = True
             return {}
-        time_s = time_to_decide_s(observation.answer_within_s)
-        patience_s = PATIENCE_S if time_s is None else min(PATIENCE_S, time_s / 4)
-        return await self.pictures.get(observation.images[: self.vision.max_images], patience_s)
+        patience_s = PATIENCE_S if context.time_s is None else min(PATIENCE_S, context.time_s / 4)
+        return await context.pictures.get(observation.images[: self.vision.max_images], patience_s)
 
     def _prompt_for(self, briefing: Briefing) -> Prompt:
         if self._prompt is None or self._prompt[0] is not briefing:
@@ -148,13 +143,13 @@ class _Tries:
     def __init__(
         self,
         policy: LLMPolicy,
-        observation: Observation,
+        context: Context,
         prompt: tuple[ChatMessage, ...],
         pictures: Mapping[str, bytes],
-        arrived: float,
     ) -> None:
+        observation = context.observation
         self._policy = policy
-        self._observation = observation
+        self._context = context
         self._prompt = prompt
         self._origin = Origin(observation.agent, observation.episode, observation.step)
         self._pictures = pictures
@@ -165,13 +160,10 @@ class _Tries:
         )
         self._made = 0
         self._clock = asyncio.get_running_loop().time
-        self._arrived = arrived
-        time_s = time_to_decide_s(observation.answer_within_s)
-        self.deadline = None if time_s is None else self._arrived + time_s
 
     async def once(self) -> Completion:
         """Makes one try, as soon as the limits let it."""
-        async with self._policy.limits.admit(tokens=self._tokens, deadline=self.deadline) as ticket:
+        async with self._policy.limits.admit(tokens=self._tokens, deadline=self._context.deadline) as ticket:
             self._made += 1
             began = self._clock()
             status, text, usage = "cancelled", None, UNKNOWN + self._images
@@ -186,7 +178,7 @@ class _Tries:
                     ticket.settle(usage)
                 raise
             finally:
-                self._tell(began, ticket.waited_s, status, text, usage)
+                self._trace(began, ticket.waited_s, status, text, usage)
             return completion
 
     def _with_images(self, usage: Usage) -> Usage:
@@ -194,14 +186,14 @@ class _Tries:
 
     def _request(self, now: float) -> Request:
         timeout_s = self._policy.try_timeout_s
-        if self.deadline is not None:
-            timeout_s = min(timeout_s, max(self.deadline - now, 0.0))
+        if self._context.deadline is not None:
+            timeout_s = min(timeout_s, max(self._context.deadline - now, 0.0))
         return Request(
             self._prompt, timeout_s=timeout_s, origin=self._origin, attempt=self._made, pictures=self._pictures
         )
 
-    def _tell(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
-        seen = self._observation
+    def _trace(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
+        seen = self._context.observation
         exchange = Exchange(
             run=seen.run,
             agent=seen.agent,
@@ -215,13 +207,9 @@ class _Tries:
             params=dict(self._policy.client.params),
             completion=text,
             status=status,
-            started_s=began - self._arrived,
+            started_s=began - self._context.arrived,
             latency_s=self._clock() - began,
             waited_s=waited_s,
             usage=usage,
         )
-        self._policy.trace(exchange)
-
-
-def _untold(exchange: Exchange) -> None:
-    """Nobody listens."""
+        self._context.trace(exchange)

@@ -1,8 +1,8 @@
 """The pictures that arrived lately, found by the hash under which observations name them.
 
 A picture travels on a topic of its own and is put before the observation that names it, but nothing promises that it
-arrives before, or at all: whoever wants pictures waits for a moment, and goes on with those that are there. Only
-`agents.worker` puts some in; policies ask for them (`agents.policy.Seeing`).
+arrives before, or at all: a policy that wants pictures waits for a moment, and goes on with those that are there. Only
+`agents.worker` puts some in; policies find them in their `agents.policy.Context`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Shows recorded observations to an agent again, and compares what it says with what it said.
+"""Show recorded observations to an agent again, and compare what it says with what it said.
 
-Worker, prompt and speech are the real ones, on a bus in memory; the model is replaced by its recorded completions,
+Worker and prompt are the real ones, on a bus in memory; the model is replaced by its recorded completions,
 or the whole policy by one of the caller's. Observations that were not answered in time then are left out: what an
 agent does when it is cut off depends on the clock.
 """
@@ -17,7 +17,7 @@ from protocol.bus.memory import MemoryBroker
 from protocol.codec import decode_as, encode
 from protocol.errors import RecordingError
 from protocol.keys import Topic, agent_key, image_key, run_key
-from protocol.messages import Briefing, Exchange, Message, Observation, Reply
+from protocol.messages import Briefing, Exchange, Observation, Reply
 from protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
         policy: decides; by default the language model policy with the recorded completions.
 
     Returns:
-        every reply and every list of messages that is not the recorded one.
+        every reply that is not the recorded one.
 
     Raises:
         RecordingError: the recording has no such agent, or no requests of it and no policy is given.
@@ -73,8 +73,8 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
 class _Scene:
     """One observation with what was said to it."""
 
-    def __init__(self, observation: Observation, reply: Reply, messages: list[Message]) -> None:
-        self.observation, self.reply, self.messages = observation, reply, messages
+    def __init__(self, observation: Observation, reply: Reply) -> None:
+        self.observation, self.reply = observation, reply
 
 
 class _Image(NamedTuple):
@@ -90,9 +90,6 @@ _Part = Briefing | _Image | _Scene
 def _script(recording: Recording, agent: str) -> Iterator[_Part]:
     """Briefings, pictures, and the observations that were answered, in their order."""
     replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
-    messages: dict[tuple[int, int], list[Message]] = {}
-    for message in recording.of(Message, agent=agent):
-        messages.setdefault((message.episode, message.step), []).append(message)
     for sample in recording:
         address = sample.address
         if address is not None and address.topic is Topic.IMAGE and address.agent == agent:
@@ -102,8 +99,7 @@ def _script(recording: Recording, agent: str) -> Iterator[_Part]:
             case Briefing(agent=name) as briefing if name == agent:
                 yield briefing
             case Observation(agent=name) as seen if name == agent and (seen.episode, seen.step) in replies:
-                at = (seen.episode, seen.step)
-                yield _Scene(seen, replies[at], messages.get(at, []))
+                yield _Scene(seen, replies[seen.episode, seen.step])
 
 
 class _Stage:
@@ -114,15 +110,12 @@ class _Stage:
         briefings: Publisher,
         observations: Publisher,
         replies: Subscription[Sample],
-        messages: Subscription[Sample],
         frame: Callable[[int], Awaitable[Publisher]],
     ) -> None:
         self._frame = frame
         self._frames: dict[int, Publisher] = {}
         self._briefings, self._observations = briefings, observations
         self._replies = replies
-        self._said: list[Message] = []
-        self._hearing = asyncio.create_task(self._hear(messages))
 
     @classmethod
     async def set(cls, bus: Bus, run: Run, side: str, agent: str) -> _Stage:
@@ -138,7 +131,6 @@ class _Stage:
             await bus.publisher(key(Topic.BRIEFING), Delivery.STATE),
             await bus.publisher(key(Topic.OBSERVATION), Delivery.STATE),
             await bus.subscribe(key(Topic.REPLY), Delivery.SPEECH),
-            await bus.subscribe(key(Topic.MESSAGE), Delivery.SPEECH),
             frame,
         )
 
@@ -146,10 +138,6 @@ class _Stage:
         if image.place not in self._frames:
             self._frames[image.place] = await self._frame(image.place)
         await self._frames[image.place].put(image.data)
-
-    async def _hear(self, messages: Subscription[Sample]) -> None:
-        async for sample in messages:
-            self._said.append(decode_as(Message, sample.payload))
 
     async def play(self, script: Iterator[_Part]) -> AsyncIterator[Difference]:
         for part in script:
@@ -162,19 +150,11 @@ class _Stage:
             await self._observations.put(encode(part.observation))
             async with asyncio.timeout(PATIENCE_S):
                 reply = decode_as(Reply, (await anext(self._replies)).payload)
-            said, self._said = self._said, []  # messages come before the reply that they were sent with
-            for what, recorded, sent in (
-                ("reply", _words(part.reply), _words(reply)),
-                ("messages", _said(part.messages), _said(said)),
-            ):
-                if recorded != sent:
-                    yield Difference(reply.agent, reply.episode, reply.step, what, recorded, sent)
+            recorded, sent = _words(part.reply), _words(reply)
+            if recorded != sent:
+                yield Difference(reply.agent, reply.episode, reply.step, "reply", recorded, sent)
 
 
 def _words(reply: Reply) -> str:
     """What a reply says, without how long it took."""
     return reply.model_dump_json(exclude={"latency_s", "usage"})
-
-
-def _said(messages: list[Message]) -> str:
-    return "\n".join(message.model_dump_json() for message in messages)

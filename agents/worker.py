@@ -1,9 +1,9 @@
-"""One agent on the bus: an observation in, messages and one reply out.
+"""One agent on the bus: an observation in, one reply out.
 
 The worker owns what a policy must not care about: the bus, the deadline, and that every step is answered once
 and only once. It announces the agent's liveliness, hears briefings and observations (the newest supersedes
 the older ones, and cancels a decision that is still being made for one of them), has a policy decide under
-`agents.guard`, and sends what was said: messages first, then the reply, then what it took.
+`agents.guard`, and sends what was said and what it took. It does not read the reply: the host does.
 
 It may join late or be restarted: briefing and newest observation are there as soon as it listens. Below it
 are `protocol` and a policy; above it are the command line, and tests.
@@ -24,15 +24,15 @@ from agents.guard import Guard
 from agents.ledger import Ledger
 from agents.links import Links, join
 from agents.pictures import Pictures
-from agents.policy import Answer, Closing, Decision, Policy, Prepared, Seeing, Traced
-from protocol import speech
+from agents.policy import Context
 from protocol.codec import decode_as, encode
 from protocol.errors import BusClosed, BusError, PeerError
-from protocol.messages import Briefing, Message, Observation, Reply, Result, Run, Usage, Wire
+from protocol.messages import Briefing, Observation, Reply, Result, Run, Usage, Wire
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Mapping
 
+    from agents.policy import Decision, Policy, Said
     from protocol.bus import Bus, Sample, Subscription
 
 log = logging.getLogger(__name__)
@@ -70,7 +70,6 @@ async def run_worker(
     name: str,
     policy: Policy,
     *,
-    default_reply: str = "",
     stop: asyncio.Event | None = None,
 ) -> Tally:
     """Plays one agent until the run's last result, or until `stop` is set or the bus is closed.
@@ -80,12 +79,10 @@ async def run_worker(
         run: name of the run.
         side: side of the agent.
         name: name of the agent.
-        policy: decides; closed afterwards, if it can be.
-        default_reply: sent when the policy has nothing to say in time; by default nothing is ordered, and the
-            teams go on as before.
+        policy: decides; closed afterwards. If it says nothing in time, an empty reply is sent as a fallback.
         stop: ends the worker when it is set.
     """
-    return await Worker(bus, run, side, name, policy, default_reply=default_reply).play(stop or asyncio.Event())
+    return await Worker(bus, run, side, name, policy).play(stop or asyncio.Event())
 
 
 async def run_workers(
@@ -94,16 +91,13 @@ async def run_workers(
     side: str,
     policies: Mapping[str, Policy],
     *,
-    default_reply: str = "",
     stop: asyncio.Event | None = None,
 ) -> dict[str, Tally]:
     """Plays several agents in one process, each with its own policy, until all have ended."""
     stop = stop or asyncio.Event()
     async with asyncio.TaskGroup() as group:
         tasks = {
-            name: group.create_task(
-                run_worker(bus, run, side, name, policy, default_reply=default_reply, stop=stop), name=f"agent {name}"
-            )
+            name: group.create_task(run_worker(bus, run, side, name, policy, stop=stop), name=f"agent {name}")
             for name, policy in policies.items()
         }
     return {name: task.result() for name, task in tasks.items()}
@@ -112,12 +106,12 @@ async def run_workers(
 class Worker:
     """One agent's part in one run; see the module."""
 
-    def __init__(self, bus: Bus, run: str, side: str, name: str, policy: Policy, *, default_reply: str = "") -> None:
+    def __init__(self, bus: Bus, run: str, side: str, name: str, policy: Policy) -> None:
         self.tally = Tally()
         self._bus = bus
         self._run, self._side, self._name = run, side, name
         self._policy = policy
-        self._guard = Guard(name, default_reply)
+        self._guard = Guard(name)
         self._clock = asyncio.get_running_loop().time
         self._ended = asyncio.Event()
         self._ledger = Ledger(name)
@@ -128,16 +122,11 @@ class Worker:
         self._newest: tuple[int, int] | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
-        if isinstance(policy, Traced):
-            policy.trace = self._ledger.note
-        if isinstance(policy, Seeing):
-            policy.pictures = self._pictures
 
     async def play(self, stop: asyncio.Event) -> Tally:
         """Joins, answers, and leaves; see `run_worker`."""
         async with AsyncExitStack() as stack:
-            if isinstance(self._policy, Closing):
-                stack.push_async_callback(self._guard.safely, "closing the policy", self._policy.close)
+            stack.push_async_callback(self._guard.safely, "closing the policy", self._policy.close)
             try:
                 links = await join(stack, self._bus, self._run, self._side, self._name)
                 await self._serve(links, stop)
@@ -169,8 +158,7 @@ class Worker:
 
     async def _hear_briefings(self, links: Links, group: asyncio.TaskGroup) -> None:
         async for briefing in self._read(Briefing, links.briefings):
-            is_new = await self._briefings.put(briefing)
-            if is_new and isinstance(self._policy, Prepared):
+            if await self._briefings.put(briefing):
                 _cancel(self._preparing)
                 preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
                 self._preparing = group.create_task(preparing, name=f"prepare {self._name}")
@@ -220,7 +208,7 @@ class Worker:
         arrived = self._clock()
         self._ledger.open((observation.episode, observation.step))
         time_s = time_to_decide_s(observation.answer_within_s)
-        decision = await self._guard.within(time_s, self._decide(observation))
+        decision = await self._guard.within(time_s, self._decide(observation, arrived))
         self._deciding = None
         try:
             await self._send(observation, decision, links, latency_s=self._clock() - arrived)
@@ -229,34 +217,24 @@ class Worker:
         except BusError as error:  # the host will find this step unanswered, and the next may get through
             log.warning("agent %s: the reply to step %d could not be sent: %s", self._name, observation.step, error)
 
-    async def _decide(self, observation: Observation) -> Answer:
+    async def _decide(self, observation: Observation, arrived: float) -> Said:
         briefing = await self._briefings.of(observation.episode)
-        return await self._policy.decide(briefing, observation)
+        return await self._policy.decide(Context(briefing, observation, self._pictures, self._ledger.note, arrived))
 
     async def _send(self, observation: Observation, decision: Decision, links: Links, *, latency_s: float) -> None:
         attempts, usage = self._ledger.account()  # before anything is awaited, for another step may begin meanwhile
-        spoken = speech.parse(decision.text)
-        place = {
-            "run": self._run,
-            "side": self._side,
-            "agent": self._name,
-            "episode": observation.episode,
-            "step": observation.step,
-        }
-        for said in spoken.messages:
-            message = Message.model_validate({**place, "recipient": said.recipient, "text": said.text})
-            await links.messages.put(encode(message))
-        reply = Reply.model_validate(
-            {
-                **place,
-                "text": decision.text,
-                "calls": spoken.calls,
-                "status": decision.status,
-                "detail": decision.detail,
-                "latency_s": latency_s,
-                "attempts": attempts or decision.attempts,
-                "usage": usage if attempts else decision.usage,
-            }
+        reply = Reply(
+            run=self._run,
+            side=self._side,
+            agent=self._name,
+            episode=observation.episode,
+            step=observation.step,
+            text=decision.text,
+            status=decision.status,
+            detail=decision.detail,
+            latency_s=latency_s,
+            attempts=attempts or decision.attempts,
+            usage=usage if attempts else decision.usage,
         )
         await links.replies.put(encode(reply))
         self._count(reply)

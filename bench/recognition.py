@@ -36,7 +36,7 @@ from protocol.speech import parse
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.observe.sight import Sight
+    from bridge.observe.observation import SideObservation
 
 CORPUS = Path(__file__).parent.parent / "tests" / "bridge" / "corpus"
 AGENT = "CombatGroup1"
@@ -156,7 +156,7 @@ def scores(files: Iterable[tuple[str, list[Entry]]]) -> dict[str, Score]:
 
 
 @cache
-def _scene(roster: str) -> tuple[Actor, Sight]:
+def _scene(roster: str) -> tuple[Actor, SideObservation]:
     task = _task(("Stalker",) if roster == "one" else ("Stalker", "Zealot", "Immortal"))
     return Actor(task), Observer(task).observe(_snapshot())
 

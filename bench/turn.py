@@ -53,6 +53,7 @@ from protocol.speech import parse
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from bridge.observe import SideObservation
     from bridge.snapshot import Snapshot
     from bridge.task import AgentConfig, TaskConfig
     from orchestrator.turn import Answer, Answers
@@ -119,11 +120,12 @@ class Bench:
 
     async def _step(self, turn: Turn, number: int, measured: Measured) -> None:
         began = time.perf_counter()
-        answers = await turn.ask(self._questions(number, measured))
+        seen = self.observer.observe(self.snapshot)
+        answers = await turn.ask(self._questions(seen, number, measured))
         asked = time.perf_counter()
         assert {answer.status for answer in answers.by_seat.values()} == {"ok"}
         speeches = {seat.agent: parse(answer.text or "") for seat, answer in answers.by_seat.items()}
-        self.actor.joint(self.observer.sight, speeches)
+        self.actor.joint(seen, speeches)
         ended = time.perf_counter()
         measured.step_s.append(ended - began)
         await self._told()
@@ -134,13 +136,16 @@ class Bench:
 
     def original_s(self, base_url: str, steps: int) -> list[float]:
         """Durations of the same steps in the way of the original."""
+        seen = self.observer.observe(self.snapshot)
 
         def build() -> Iterator[str]:
-            return (seen.text for seen in self.observer.each(self.snapshot))
+            nonlocal seen
+            seen = self.observer.observe(self.snapshot)
+            return (agent.text for agent in seen.agents.values())
 
         def act(replies: list[str]) -> None:
             speeches = {seat.agent: parse(reply) for seat, reply in zip(self.seats, replies, strict=True)}
-            self.actor.joint(self.observer.sight, speeches)
+            self.actor.joint(seen, speeches)
 
         return step_s(base_url, "silent", build, act, steps)
 
@@ -160,8 +165,8 @@ class Bench:
             "http": request.latency_s - LATENCY_S,
         }
 
-    def _questions(self, number: int, measured: Measured) -> Iterator[Question]:
-        for seen in self.observer.each(self.snapshot):
+    def _questions(self, side: SideObservation, number: int, measured: Measured) -> Iterator[Question]:
+        for seen in side.agents.values():
             observation = Observation(
                 run=self.run, agent=seen.agent.name, side=self.task.side, episode=0, step=number,
                 game_loop=8 * number, answer_within_s=30, text=seen.text, view=seen.view,

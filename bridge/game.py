@@ -73,7 +73,7 @@ class GameInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class StepResult:
     """What became of one player's plan."""
 
     snapshot: Snapshot
@@ -92,7 +92,7 @@ class Game(Protocol):
     def reset(self) -> tuple[Snapshot, ...]:
         """Begins an episode; a snapshot for each player."""
 
-    def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
+    def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Plays one plan of each player to its end, or to the end of the episode, which must not be over yet."""
 
     def kill(self) -> None:
@@ -148,7 +148,7 @@ class GameThread:
         """Begins an episode; a snapshot for each player."""
         return await self._run(self._playing.reset)
 
-    async def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
+    async def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Plays one plan of each player to its end, or to the end of the episode."""
         return await self._run(functools.partial(self._playing.act, plans))
 
@@ -203,12 +203,12 @@ class OneSide:
         (self._now,) = await self._thread.reset()
         return self._now
 
-    async def act(self, commands: Sequence[Command]) -> Turn:
+    async def act(self, commands: Sequence[Command]) -> StepResult:
         """Plays the commands of a joint action, and lets the game loops of a step pass."""
         assert self._now is not None, "the game is reset before it is played"
-        (turn,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
-        self._now = turn.snapshot
-        return turn
+        (result,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
+        self._now = result.snapshot
+        return result
 
 
 def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str, str] = os.environ) -> Path:

@@ -23,7 +23,7 @@ from bridge.available import available, question
 from bridge.compat import maps, sc2_env
 from bridge.errors import GameError, GameMissing
 from bridge.functions import check_against_pysc2
-from bridge.game import GameConfig, GameInfo, Turn, check_install
+from bridge.game import GameConfig, GameInfo, StepResult, check_install
 from bridge.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class PySC2Game:
                 snapshots = self._snapshots(self._env.step([[] for _ in snapshots], step_mul=1))
             return self._with_abilities(snapshots)
 
-    def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
+    def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Plays one plan of each player, step by step, all players in the same steps."""
         if self._ended:
             raise GameError("the episode is over: the game has to be reset before it is played on")
@@ -106,7 +106,7 @@ class PySC2Game:
             snapshots = self._with_abilities(snapshots)
         for player in players:
             player.close()
-        return tuple(Turn(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
+        return tuple(StepResult(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
 
     def kill(self) -> None:
         """Kills the game's processes; a call that waits for them fails then."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from protocol.messages import Message, Observation, Reply, Report, Result, Run, UnitView
 from protocol.recording import read
+from protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -105,7 +106,7 @@ def _note(moment: Moment, message: Observation | Reply | Message | Report) -> No
 def _note_reply(moment: Moment, reply: Reply) -> None:
     words = reply.text.partition("Actions:")[0].removeprefix("Analysis:").strip()
     moment.said[reply.agent].insert(0, " ".join(words.split()))
-    for call in reply.calls:
+    for call in parse(reply.text).calls:
         tags = [arg for arg in call.args if isinstance(arg, str) and arg.startswith("0x")]
         moment.said[reply.agent].append(f"{call.team or ''}  {reply.text[call.start : call.end]}".strip())
         if tags and call.team:

@@ -21,10 +21,10 @@ from bridge.imagespec import PAPER, ImageSpec
 from khala.local import one_side
 from orchestrator.config import MatchConfig, load_task
 from orchestrator.host import assemble
+from orchestrator.match import SilentObserver
 from orchestrator.roster import Seat
 from orchestrator.turn import Answer, Answers
-from protocol.messages import Message, Reply
-from protocol.speech import parse
+from protocol.messages import Reply
 from simulator.install import install
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from bridge.task import TaskConfig
     from orchestrator.turn import Question
-    from protocol.messages import Briefing, ImageRef, Report, Result
+    from protocol.messages import ImageRef
 
 DOCS = Path(__file__).parent
 OUT = DOCS / "images" / "seen"
@@ -106,29 +106,11 @@ class Played:
         if asked[0].observation.step >= self._step:
             raise Stop
         answers: dict[Seat, Answer] = {}
-        messages: list[Message] = []
         for seen, _ in asked:
             text = PLAYERS["skilled"](seen.text, random.Random(seen.step))
             place = {"run": seen.run, "agent": seen.agent, "side": seen.side, "episode": 0, "step": seen.step}
             answers[Seat(seen.side, seen.agent)] = Answer("ok", Reply.model_validate({**place, "text": text}))
-            messages += (
-                Message.model_validate({**place, "recipient": said.recipient, "text": said.text})
-                for said in parse(text).messages
-            )
-        return Answers(answers, tuple(messages))
-
-
-class Nobody:
-    """Who is told nothing."""
-
-    async def brief(self, briefing: Briefing) -> None:
-        """Is not told."""
-
-    async def report(self, report: Report) -> None:
-        """Is not told."""
-
-    async def result(self, result: Result) -> None:
-        """Is not told."""
+        return Answers(answers)
 
 
 async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Question]:
@@ -140,14 +122,14 @@ async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Quest
         sc2path: where the simulator is.
     """
     config = MatchConfig(task=task, run="seen")
-    asking = Played(step)
+    agents = Played(step)
     async with one_side(config, sc2path) as game:
         try:
-            async for _ in assemble(config, game, asking, Nobody()).play():
+            async for _ in assemble(config, game, agents, SilentObserver()).play():
                 pass
         except Stop:
             pass
-    return asking.questions
+    return agents.questions
 
 
 def task_of(game: str) -> TaskConfig:

@@ -24,9 +24,9 @@ from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
 from khala.knowledge.cli import app as knowledge
-from orchestrator import show
 from orchestrator.cli import Insecure, Json, Listen
 from orchestrator.config import MatchConfig, change, load_task, new_run_name
+from orchestrator.console import Progress, stderr_console
 from protocol.bus.config import BusConfig
 from protocol.errors import ConfigError, KhalaError
 from protocol.keys import check_name
@@ -278,8 +278,8 @@ def _until_interrupted(
     config: MatchConfig, as_json: bool, play: Callable[[Callable[[Wire], None]], Coroutine[Any, Any, list[Result]]]
 ) -> None:
     """Plays with a live picture, prints the results, and ends in order on SIGINT and SIGTERM."""
-    screen = show.console()
-    with show.Progress(screen, config.task.max_steps) as progress:
+    screen = stderr_console()
+    with Progress(screen, config.task.max_steps) as progress:
         results = asyncio.run(_cancelled_by_signals(play(progress)))
     if results is None:
         screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from agents.policy import as_policy
 from agents.replay import replay_agent
 from khala import games
 from khala.local import one_side
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from agents.policy import Policy
     from protocol.recording.difference import Difference
 
 __all__ = ["replay_agents", "replay_host"]
@@ -39,14 +39,15 @@ async def replay_host(path: Path | str, *, game: str = "simulator") -> list[Diff
         return await replay(recording, side)
 
 
-async def replay_agents(path: Path | str, policies: Mapping[str, Policy] | None = None) -> list[Difference]:
-    """Shows every agent its recorded observations: each must send the recorded replies and messages.
+async def replay_agents(path: Path | str, policies: Mapping[str, object] | None = None) -> list[Difference]:
+    """Show every agent its recorded observations: each must send the recorded replies.
 
     Args:
         path: a recording.
-        policies: by agent; the others decide with their recorded completions.
+        policies: by agent, a policy or what `agents.policy.as_policy` makes one of; the others decide with their
+            recorded completions.
     """
     recording = Recording.open(path)
     agents = [card.name for card in recording.run.agents] if recording.run else []
-    given = policies or {}
+    given = {name: as_policy(policy) for name, policy in (policies or {}).items()}
     return [difference for name in agents for difference in await replay_agent(recording, name, given.get(name))]

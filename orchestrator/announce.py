@@ -1,4 +1,4 @@
-"""Tells everybody what everybody may know: the run card, briefings, reports and results.
+"""Publish what everybody may know: the run card, briefings, what agents write to each other, reports and results.
 
 Below it: the bus. Above it: `orchestrator.match`, which says what, and this module where.
 """
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from protocol.bus import Bus, Publisher
-    from protocol.messages import Briefing, Report, Result, Run
+    from protocol.messages import Briefing, Message, Report, Result, Run
 
 _DELIVERY = {Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT: Delivery.STATE}
 
 
 class Announcer:
-    """Publishers of what the host tells. An asynchronous context manager."""
+    """The host's publishers. An asynchronous context manager."""
 
     def __init__(self, bus: Bus, run: str, seats: Iterable[Seat]) -> None:
         self._bus = bus
@@ -31,6 +31,7 @@ class Announcer:
         self._seats = tuple(seats)
         self._topics: dict[Topic, Publisher] = {}
         self._briefings: dict[Seat, Publisher] = {}
+        self._messages: dict[Seat, Publisher] = {}
 
     async def __aenter__(self) -> Self:
         for topic, delivery in _DELIVERY.items():
@@ -38,26 +39,32 @@ class Announcer:
         for seat in self._seats:
             key = agent_key(self._run, seat.side, seat.agent, Topic.BRIEFING)
             self._briefings[seat] = await self._bus.publisher(key, Delivery.STATE)
+            key = agent_key(self._run, seat.side, seat.agent, Topic.MESSAGE)
+            self._messages[seat] = await self._bus.publisher(key, Delivery.LOG)
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for publisher in (*self._topics.values(), *self._briefings.values()):
+        for publisher in (*self._topics.values(), *self._briefings.values(), *self._messages.values()):
             await publisher.close()
 
     async def run(self, card: Run) -> None:
-        """Publishes the run card."""
+        """Publish the run card."""
         await self._topics[Topic.RUN].put(encode(card))
 
     async def brief(self, briefing: Briefing) -> None:
-        """Publishes what one agent has to know."""
+        """Publish what one agent has to know."""
         await self._briefings[Seat(briefing.side, briefing.agent)].put(encode(briefing))
 
+    async def message(self, message: Message) -> None:
+        """Publish what one agent wrote to another or to a channel, under the name of the sender."""
+        await self._messages[Seat(message.side, message.agent)].put(encode(message))
+
     async def report(self, report: Report) -> None:
-        """Publishes what happened in a step."""
+        """Publish what happened in a step."""
         await self._topics[Topic.REPORT].put(encode(report))
 
     async def result(self, result: Result) -> None:
-        """Publishes how an episode ended."""
+        """Publish how an episode ended."""
         await self._topics[Topic.RESULT].put(encode(result))

@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from orchestrator import show
 from orchestrator.config import all_tasks
+from orchestrator.console import stderr_console
 from protocol.bus.config import BusConfig
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
@@ -102,7 +102,12 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Tell what was said and done in a recorded run."""
-    from orchestrator.tell import Selection, save_pictures, summary, tell  # noqa: PLC0415  # zstd is not for --help
+    from orchestrator.transcript import (  # noqa: PLC0415  # zstd is not for --help
+        Selection,
+        save_pictures,
+        summary,
+        transcript,
+    )
 
     selection = Selection.of(agent, steps)
     if images is not None:
@@ -114,7 +119,7 @@ def replay(
         typer.echo(json.dumps(summary(file, selection)))
         return
     console = Console(highlight=False)
-    for part in tell(file, selection, whole=text):
+    for part in transcript(file, selection, whole=text):
         console.print(part, soft_wrap=isinstance(part, Text))
 
 
@@ -142,4 +147,4 @@ def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(data))
     else:
-        show.console().print(sentence)
+        stderr_console().print(sentence)

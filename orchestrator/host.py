@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
     from bridge.game import OneSide
     from orchestrator.config import MatchConfig
-    from orchestrator.match import Telling
-    from orchestrator.turn import Asking
+    from orchestrator.match import MatchObserver
+    from orchestrator.turn import AgentPool
     from protocol.bus import Bus
-    from protocol.messages import Briefing, Report, Result, Wire
+    from protocol.messages import Briefing, Message, Report, Result, Wire
 
 
 async def host(
@@ -64,12 +64,12 @@ async def host(
         watch(card)
         await roster.assemble(required, config.assemble_s)
         gc.freeze()  # what was imported stays: going through it again and again stops a step for 40 ms
-        match = assemble(config, game, turn, _Told(announcer, watch, flush))
+        match = assemble(config, game, turn, _PublishingObserver(announcer, watch, flush))
         return [result async for result in match.play()]
 
 
-def assemble(config: MatchConfig, game: OneSide, asking: Asking, telling: Telling) -> Match:
-    """A match with everything between the game and those who are asked."""
+def assemble(config: MatchConfig, game: OneSide, agents: AgentPool, match_observer: MatchObserver) -> Match:
+    """Return a match with everything between the game and the agents."""
     task = config.task
     reach = {
         Seat(task.side, agent.name): [Seat(task.side, other.name) for other in task.correspondents(agent)]
@@ -81,14 +81,14 @@ def assemble(config: MatchConfig, game: OneSide, asking: Asking, telling: Tellin
         game=game,
         observer=Observer(task),
         actor=Actor(task),
-        asking=asking,
+        agents=agents,
         mailbox=Mailbox(reach, channels),
-        telling=telling,
+        match_observer=match_observer,
     )
 
 
-class _Told:
-    """Tells the bus, whoever watches, and makes the recording safe up to here after each step."""
+class _PublishingObserver:
+    """Publishes what happens, calls `watch`, and makes the recording safe up to here after each step."""
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
         self._announcer = announcer
@@ -97,6 +97,9 @@ class _Told:
 
     async def brief(self, briefing: Briefing) -> None:
         await self._announcer.brief(briefing)
+
+    async def message(self, message: Message) -> None:
+        await self._announcer.message(message)
 
     async def report(self, report: Report) -> None:
         await self._announcer.report(report)

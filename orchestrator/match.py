@@ -2,59 +2,90 @@
 
 The loop reads like the turn in docs/design/turn.md. It owns nothing but the order: what agents see is
 `bridge.observe`'s, who answered in time `orchestrator.turn`'s, what their words do `bridge.act`'s, who hears what
-`orchestrator.mailbox`'s. It needs no bus: a recording can stand in for the agents (`Asking`).
+`orchestrator.mailbox`'s. It needs no bus: a recording can stand in for the agents (`AgentPool`).
 """
 
 from __future__ import annotations
 
 import time
+from collections import defaultdict
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 from bridge.observe import Feedback
 from orchestrator.brief import briefing
 from orchestrator.roster import Seat
 from orchestrator.tally import Tally
 from orchestrator.turn import Question
-from protocol.messages import AgentReport, Observation, Received, Report, Timings
+from protocol.messages import AgentReport, Message, Observation, Received, Report, Timings
 from protocol.speech import parse
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator, Mapping
+    from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 
     from bridge.act import Actor, JointAction
-    from bridge.game import OneSide, Turn
-    from bridge.observe import Observer
+    from bridge.game import OneSide, StepResult
+    from bridge.observe import AgentObservation, Observer, SideObservation
     from bridge.snapshot import Snapshot
     from orchestrator.config import MatchConfig
     from orchestrator.mailbox import Mailbox, Post
-    from orchestrator.turn import Answers, Asking
+    from orchestrator.turn import AgentPool, Answers
     from protocol.messages import Briefing, Rejection, Result
     from protocol.speech import Speech
 
+Phase = Literal["observe", "act", "game"]
 
-class Telling(Protocol):
-    """Where a match says what happens; `orchestrator.announce.Announcer` is one."""
+
+class MatchObserver(Protocol):
+    """What hears what happens in a match."""
 
     async def brief(self, briefing: Briefing) -> None:
-        """Takes a briefing, before the first observation of an episode."""
+        """Take a briefing, before the first observation of an episode."""
+        ...
+
+    async def message(self, message: Message) -> None:
+        """Take what one agent wrote to another or to a channel, before the report of the step."""
         ...
 
     async def report(self, report: Report) -> None:
-        """Takes the report of a step."""
+        """Take the report of a step."""
         ...
 
     async def result(self, result: Result) -> None:
-        """Takes the result of an episode."""
+        """Take the result of an episode."""
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class At:
-    """Where a match stands."""
+class SilentObserver:
+    """A `MatchObserver` that does nothing."""
+
+    async def brief(self, briefing: Briefing) -> None:
+        """Do nothing."""
+
+    async def message(self, message: Message) -> None:
+        """Do nothing."""
+
+    async def report(self, report: Report) -> None:
+        """Do nothing."""
+
+    async def result(self, result: Result) -> None:
+        """Do nothing."""
+
+
+class StepId(NamedTuple):
+    """One step of a run."""
 
     episode: int
     step: int
+
+
+class StepOutcome(NamedTuple):
+    """What a step leads to: its report, and what the next one begins with."""
+
+    report: Report
+    snapshot: Snapshot
+    feedback: Mapping[str, Feedback]
 
 
 @dataclass
@@ -65,12 +96,12 @@ class Match:
     game: OneSide
     observer: Observer
     actor: Actor
-    asking: Asking
+    agents: AgentPool
     mailbox: Mailbox
-    telling: Telling
+    match_observer: MatchObserver
 
     async def play(self) -> AsyncIterator[Result]:
-        """Plays every episode and yields its result."""
+        """Play every episode and yield its result."""
         for episode in range(self.config.episodes):
             yield await self._episode(episode)
 
@@ -78,81 +109,103 @@ class Match:
         began = time.perf_counter()
         await self._begin(episode)
         snapshot = await self.game.reset()
-        tally, feedback, step = Tally(snapshot), dict[str, Feedback](), 0
+        tally, step = Tally(snapshot), 0
+        feedback: Mapping[str, Feedback] = {}
         while not snapshot.ended and step != self.config.task.max_steps:
-            report, snapshot, feedback = await self._step(At(episode, step), snapshot, feedback)
+            report, snapshot, feedback = await self._step(StepId(episode, step), snapshot, feedback)
             tally.add(report, snapshot)
-            await self.telling.report(report)
+            await self.match_observer.report(report)
             step += 1
         result = tally.result(self.config.run, episode, wall_s=time.perf_counter() - began)
-        await self.telling.result(result)
+        await self.match_observer.result(result)
         return result
 
-    async def _step(
-        self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]
-    ) -> tuple[Report, Snapshot, dict[str, Feedback]]:
+    async def _step(self, at: StepId, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> StepOutcome:
         watch = Stopwatch()
-        answers = await self.asking.ask(self._questions(at, snapshot, feedback))
-        ask_s = watch.lap()
-        speeches = self._speeches(answers)
-        joint = self.actor.joint(self.observer.sight, speeches)
-        post = self._deliver(answers, speeches)
-        act_s = watch.lap()
-        turn = await self.game.act(joint.commands)
-        timings = Timings(
-            observe_s=ask_s - answers.publish_s - answers.wait_s,
-            publish_s=answers.publish_s,
-            wait_s=answers.wait_s,
-            act_s=act_s,
-            game_s=watch.lap(),
-        )
-        heard = self._feedback(joint, turn, post)
-        return self._report(at, answers, heard, turn, timings), turn.snapshot, heard
+        with watch.phase("observe"):
+            observation = self.observer.observe(snapshot, feedback)
+        answers = await self.agents.ask(self._questions(at, observation, feedback, watch))
+        with watch.phase("act"):
+            speeches = self._speeches(answers)
+            joint = self.actor.joint(observation, speeches)
+            messages = self._messages(at, speeches)
+            post = await self._deliver(messages, speeches)
+        with watch.phase("game"):
+            result = await self.game.act(joint.commands)
+        heard = self._feedback(joint, result, post)
+        report = self._report(at, answers, messages, heard, result, watch.timings(answers))
+        return StepOutcome(report, result.snapshot, heard)
 
     async def _begin(self, episode: int) -> None:
         self.observer.begin()
         self.mailbox.clear()
         for agent in self.config.task.agents:
-            await self.telling.brief(briefing(self.config.task, agent, self.config.run, episode))
+            await self.match_observer.brief(briefing(self.config.task, agent, self.config.run, episode))
 
-    def _questions(self, at: At, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> Iterator[Question]:
+    def _questions(
+        self, at: StepId, observation: SideObservation, feedback: Mapping[str, Feedback], watch: Stopwatch
+    ) -> Iterator[Question]:
         """One for each agent, made when it is asked for: the first agent thinks while others are looked for."""
+        for agent in self.config.task.agents:
+            with watch.phase("observe"):
+                seen, heard = observation.agents[agent.name], feedback.get(agent.name, Feedback())
+                question = self._question(at, observation.snapshot.game_loop, seen, heard)
+            yield question
+
+    def _question(self, at: StepId, game_loop: int, seen: AgentObservation, heard: Feedback) -> Question:
         task = self.config.task
-        for seen in self.observer.each(snapshot, feedback):
-            heard = feedback.get(seen.agent.name, Feedback())
-            observation = Observation(
-                run=self.config.run,
-                agent=seen.agent.name,
-                side=task.side,
-                episode=at.episode,
-                step=at.step,
-                game_loop=snapshot.game_loop,
-                answer_within_s=task.clock.max_wait_s,
-                text=seen.text,
-                view=seen.view,
-                images=tuple(picture.ref for picture in seen.pictures),
-                accepted=heard.accepted,
-                rejections=heard.rejections,
-                messages=heard.messages,
-            )
-            yield Question(observation, [picture.data for picture in seen.pictures])
+        observation = Observation(
+            run=self.config.run,
+            agent=seen.agent.name,
+            side=task.side,
+            episode=at.episode,
+            step=at.step,
+            game_loop=game_loop,
+            answer_within_s=task.clock.max_wait_s,
+            text=seen.text,
+            view=seen.view,
+            images=tuple(picture.ref for picture in seen.pictures),
+            accepted=heard.accepted,
+            rejections=heard.rejections,
+            messages=heard.messages,
+        )
+        return Question(observation, [picture.data for picture in seen.pictures])
 
     def _speeches(self, answers: Answers) -> dict[str, Speech]:
+        """What each agent says, in the order of the task: the only place where a reply is parsed."""
         default = self.config.task.default_reply
         texts = {seat.agent: answer.text or default for seat, answer in answers.by_seat.items()}
         return {agent: parse(text) for agent, text in texts.items() if text}
 
-    def _deliver(self, answers: Answers, speeches: Mapping[str, Speech]) -> Post:
+    def _messages(self, at: StepId, speeches: Mapping[str, Speech]) -> Sequence[Message]:
+        """What agents write to each other, in the order of the task and of their words."""
+        return [
+            Message(
+                run=self.config.run,
+                agent=agent,
+                side=self.config.task.side,
+                episode=at.episode,
+                step=at.step,
+                recipient=said.recipient,
+                text=said.text,
+            )
+            for agent, speech in speeches.items()
+            for said in speech.messages
+        ]
+
+    async def _deliver(self, messages: Sequence[Message], speeches: Mapping[str, Speech]) -> Post:
         for agent, speech in speeches.items():
             for listen in speech.listens:
                 self.mailbox.listen(Seat(self.config.task.side, agent), listen.channel)
-        return self.mailbox.deliver(answers.messages)
+        for message in messages:
+            await self.match_observer.message(message)
+        return self.mailbox.deliver(messages)
 
-    def _feedback(self, joint: JointAction, turn: Turn, post: Post) -> dict[str, Feedback]:
+    def _feedback(self, joint: JointAction, result: StepResult, post: Post) -> dict[str, Feedback]:
         feedback = {}
         for agent in self.config.task.agents:
             seat = Seat(self.config.task.side, agent.name)
-            refused = (r.rejection for r in turn.played.refusals if r.agent == agent.name)
+            refused = (r.rejection for r in result.played.refusals if r.agent == agent.name)
             rejections: tuple[Rejection, ...] = (
                 *joint.rejections.get(agent.name, ()),
                 *refused,
@@ -163,7 +216,13 @@ class Match:
         return feedback
 
     def _report(
-        self, at: At, answers: Answers, feedback: Mapping[str, Feedback], turn: Turn, timings: Timings
+        self,
+        at: StepId,
+        answers: Answers,
+        messages: Sequence[Message],
+        feedback: Mapping[str, Feedback],
+        result: StepResult,
+        timings: Timings,
     ) -> Report:
         agents = tuple(
             AgentReport(
@@ -183,23 +242,37 @@ class Match:
             run=self.config.run,
             episode=at.episode,
             step=at.step,
-            game_loop=turn.snapshot.game_loop,
+            game_loop=result.snapshot.game_loop,
             agents=agents,
-            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in answers.messages),
-            functions=turn.played.functions,
-            env_steps=turn.env_steps,
-            score=float(turn.snapshot.response.observation.score.score),
+            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in messages),
+            functions=result.played.functions,
+            env_steps=result.env_steps,
+            score=float(result.snapshot.response.observation.score.score),
             timings=timings,
         )
 
 
 class Stopwatch:
-    """Seconds between laps."""
+    """Seconds that each phase of a step took."""
 
     def __init__(self) -> None:
-        self._last = time.perf_counter()
+        self._took_s: dict[Phase, float] = defaultdict(float)
 
-    def lap(self) -> float:
-        """Seconds since the last lap."""
-        before, self._last = self._last, time.perf_counter()
-        return self._last - before
+    @contextmanager
+    def phase(self, name: Phase) -> Iterator[None]:
+        """Add what happens inside to a phase."""
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._took_s[name] += time.perf_counter() - began
+
+    def timings(self, answers: Answers) -> Timings:
+        """Return all phases of a step; asking is timed where it is done."""
+        return Timings(
+            observe_s=self._took_s["observe"],
+            publish_s=answers.publish_s,
+            wait_s=answers.wait_s,
+            act_s=self._took_s["act"],
+            game_s=self._took_s["game"],
+        )

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from bridge.task import TaskConfig
 from orchestrator.config import MatchConfig
 from orchestrator.host import assemble
+from orchestrator.match import SilentObserver
 from orchestrator.roster import Seat
 from orchestrator.turn import Answer, Answers
 from protocol.codec import encode
 from protocol.errors import RecordingError
-from protocol.messages import Message, Observation, Reply, Report
+from protocol.messages import Observation, Reply, Report
 from protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from bridge.game import OneSide
     from orchestrator.turn import Question
-    from protocol.messages import AgentReport, Briefing, Result
+    from protocol.messages import AgentReport
     from protocol.recording import Recording, Step
 
 
@@ -51,7 +52,7 @@ async def replay(recording: Recording, game: OneSide) -> list[Difference]:
         every observation that is not the recorded one; a replay that went another way ends at its first step.
     """
     turn = RecordedTurn(recording)
-    match = assemble(recorded_config(recording), game, turn, _Nobody())
+    match = assemble(recorded_config(recording), game, turn, SilentObserver())
     try:
         async for _ in match.play():
             pass
@@ -61,7 +62,7 @@ async def replay(recording: Recording, game: OneSide) -> list[Difference]:
 
 
 class RecordedTurn:
-    """`orchestrator.turn.Asking` out of a recording: what was answered in time is answered at once."""
+    """An `AgentPool` out of a recording: what was answered in time is answered at once."""
 
     def __init__(self, recording: Recording) -> None:
         self.differences: list[Difference] = []
@@ -71,32 +72,19 @@ class RecordedTurn:
             self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Compares the observations with the recorded ones, and gives the recorded answers.
+        """Compare the observations with the recorded ones, and give the recorded answers.
 
         Pictures are compared by the hashes under which observations name them.
         """
-        first, *others = (question.observation for question in questions)
+        observations = [question.observation for question in questions]
         step = next(self._steps, None)
         if step is None or not step.of(Report):
             raise _EndOfRecording
-        self._compare(step, [first, *others])
+        self._compare(step, observations)
         if self.differences:
             raise _EndOfRecording
         (report,) = step.of(Report)
-        answers = {Seat(agent.side, agent.agent): self._answer(report, agent) for agent in report.agents}
-        messages = tuple(
-            Message(
-                run=first.run,
-                agent=said.sender,
-                side=first.side,
-                episode=first.episode,
-                step=first.step,
-                recipient=said.recipient,
-                text=said.text,
-            )
-            for said in report.messages
-        )
-        return Answers(answers, messages)
+        return Answers({Seat(agent.side, agent.agent): self._answer(report, agent) for agent in report.agents})
 
     def _answer(self, report: Report, agent: AgentReport) -> Answer:
         taken = agent.status in {"ok", "fallback"}
@@ -121,16 +109,3 @@ class RecordedTurn:
 
 class _EndOfRecording(Exception):
     """There is nothing more to compare."""
-
-
-class _Nobody:
-    """`orchestrator.match.Telling` to nobody."""
-
-    async def brief(self, briefing: Briefing) -> None:
-        """Is not told."""
-
-    async def report(self, report: Report) -> None:
-        """Is not told."""
-
-    async def result(self, result: Result) -> None:
-        """Is not told."""

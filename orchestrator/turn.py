@@ -1,9 +1,9 @@
-"""Asks every agent at once, and waits until all have replied or the deadline has passed.
+"""Ask every agent at once, and wait until all have replied or the deadline has passed.
 
-Below it: publishers of observations and their pictures, and one inbox of replies and messages. Above it:
-`orchestrator.match`. It knows nothing of games. A reply is taken when it is the first valid one of its agent for the
-open step; all others are counted as ignored and never seen again. A wait for an agent ends early when its liveliness
-token goes, or when what it sent is no reply: it may still answer while the step is open.
+Below it: publishers of observations and their pictures, and one inbox of replies. Above it: `orchestrator.match`,
+which reads the text of a reply. It knows nothing of games. A reply is taken when it is the first valid one of its agent
+for the open step; all others are counted as ignored and never seen again. A wait for an agent ends early when its
+liveliness token goes, or when what it sent is no reply: it may still answer while the step is open.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
 from protocol.errors import PeerError, WrongKey
 from protocol.keys import Topic, agent_key, every_agent, image_key, parse
-from protocol.messages import AgentStatus, Message, Observation, Reply, Usage
+from protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -60,10 +60,9 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What came of one step: an answer a seat, and the messages that arrived."""
+    """What came of asking in one step: an answer for each seat that was asked, in the order of the questions."""
 
     by_seat: Mapping[Seat, Answer]
-    messages: tuple[Message, ...] = ()
     publish_s: float = 0.0
     wait_s: float = 0.0
 
@@ -75,11 +74,11 @@ class Question(NamedTuple):
     pictures: Sequence[bytes] = ()
 
 
-class Asking(Protocol):
-    """What a match needs of a turn; a recording can stand in for live agents."""
+class AgentPool(Protocol):
+    """The agents of a match, as it asks them; a recording can stand in for live ones."""
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Puts one observation before each agent and returns what they answered."""
+        """Put one observation before each agent and return what they answered."""
         ...
 
 
@@ -119,7 +118,7 @@ class _Step:
 
 
 class Turn:
-    """`Asking` over a bus. An asynchronous context manager."""
+    """An `AgentPool` over a bus. An asynchronous context manager."""
 
     def __init__(self, bus: Bus, run: str, roster: Roster) -> None:
         self._bus = bus
@@ -127,9 +126,8 @@ class Turn:
         self._roster = roster
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
-        self._inboxes: list[Subscription[Sample]] = []
-        self._pumps: list[asyncio.Task[None]] = []
-        self._messages: list[Message] = []
+        self._inbox: Subscription[Sample] | None = None
+        self._pump: asyncio.Task[None] | None = None
         self._ignored: Counter[Seat] = Counter()
         self._step: _Step | None = None
 
@@ -137,24 +135,22 @@ class Turn:
         for seat in self._roster.seats:
             key = agent_key(self._run, seat.side, seat.agent, Topic.OBSERVATION)
             self._publishers[seat] = await self._bus.publisher(key, Delivery.STATE)
-        for topic, take in ((Topic.MESSAGE, self._take_message), (Topic.REPLY, self._take_reply)):
-            inbox = await self._bus.subscribe(every_agent(self._run, topic), Delivery.SPEECH)
-            self._inboxes.append(inbox)
-            self._pumps.append(asyncio.create_task(_pump(inbox, take), name=f"inbox {topic}"))
+        self._inbox = await self._bus.subscribe(every_agent(self._run, Topic.REPLY), Delivery.SPEECH)
+        self._pump = asyncio.create_task(self._take_replies(self._inbox), name="inbox of replies")
         self._roster.on_gone(self._gone)
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for inbox in self._inboxes:
-            await inbox.close()
-        await asyncio.gather(*self._pumps)
+        assert self._inbox is not None and self._pump is not None
+        await self._inbox.close()
+        await self._pump
         for publisher in (*self._publishers.values(), *self._frames.values()):
             await publisher.close()
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Publishes the observations, each after its pictures, and waits no longer for replies than they allow.
+        """Publish the observations, each after its pictures, and wait no longer for replies than they allow.
 
         Args:
             questions: one a seat, all of the same episode and step and with the same `answer_within_s`. They may be
@@ -181,7 +177,7 @@ class Turn:
         return self._close(step, publish_s=publish_s, wait_s=loop.time() - began)
 
     async def _show(self, seat: Seat, pictures: Sequence[bytes]) -> None:
-        """Publishes pictures, each under the key of its place, so that late joiners find all of the newest ones."""
+        """Publish pictures, each under the key of its place, so that late joiners find all of the newest ones."""
         for place, picture in enumerate(pictures):
             if (seat, place) not in self._frames:
                 key = image_key(self._run, seat.side, seat.agent, place)
@@ -191,9 +187,8 @@ class Turn:
     def _close(self, step: _Step, *, publish_s: float, wait_s: float) -> Answers:
         self._step = None
         answers = {seat: self._answer(step, seat) for seat in step.asked_at}
-        messages, self._messages = tuple(self._messages), []
         self._ignored.clear()
-        return Answers(answers, messages, publish_s, wait_s)
+        return Answers(answers, publish_s, wait_s)
 
     def _answer(self, step: _Step, seat: Seat) -> Answer:
         ignored = self._ignored[seat]
@@ -209,6 +204,16 @@ class Turn:
     def _gone(self, seat: Seat) -> None:
         if self._step is not None:
             self._step.stop_waiting(seat)
+
+    async def _take_replies(self, inbox: Subscription[Sample]) -> None:
+        async for sample in inbox:
+            try:
+                address = parse(sample.key)
+            except WrongKey as error:
+                log.warning("%s", error)
+                continue
+            assert address.side is not None and address.agent is not None
+            self._take_reply(Seat(address.side, address.agent), sample.payload)
 
     def _take_reply(self, seat: Seat, payload: bytes) -> None:
         step = self._step
@@ -229,32 +234,8 @@ class Turn:
         step.taken[seat] = (reply, asyncio.get_running_loop().time())
         step.stop_waiting(seat)
 
-    def _take_message(self, seat: Seat, payload: bytes) -> None:
-        try:
-            message = decode_as(Message, payload)
-            self._check_sender(seat, message)
-        except PeerError as error:
-            log.warning("agent %s sent no valid message: %s", seat, error)
-            return
-        self._messages.append(message)
-
-    def _check_sender(self, seat: Seat, said: Reply | Message) -> None:
-        if (said.run, said.side, said.agent) != (self._run, *seat):
-            raise WrongKey(f"{said.kind} of {said.side}/{said.agent} in run {said.run} stands under the key of {seat}")
+    def _check_sender(self, seat: Seat, reply: Reply) -> None:
+        if (reply.run, reply.side, reply.agent) != (self._run, *seat):
+            raise WrongKey(f"reply of {reply.side}/{reply.agent} in run {reply.run} stands under the key of {seat}")
         if seat not in self._publishers:
             raise WrongKey(f"{seat} is not in this match")
-
-
-class _Take(Protocol):
-    def __call__(self, seat: Seat, payload: bytes) -> None: ...
-
-
-async def _pump(inbox: Subscription[Sample], take: _Take) -> None:
-    async for sample in inbox:
-        try:
-            address = parse(sample.key)
-        except WrongKey as error:
-            log.warning("%s", error)
-            continue
-        assert address.side is not None and address.agent is not None
-        take(Seat(address.side, address.agent), sample.payload)

@@ -21,6 +21,8 @@ from pydantic import BaseModel, ValidationError
 from protocol.errors import ConfigError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pydantic_core import ErrorDetails
 
 M = TypeVar("M", bound=BaseModel)
@@ -29,6 +31,8 @@ Place = tuple[str | int, ...]
 
 LIKE = "like"
 """Field at the top of a file that names another one."""
+ELSEWHERE = "ELSEWHERE"
+"""Class variable of a model: fields that users look for in it, and a sentence without its subject about each."""
 _MAX_DEPTH = 32  # an alias that contains itself would be followed for ever
 
 
@@ -199,7 +203,7 @@ def _sentence(fault: ErrorDetails, model: type[BaseModel]) -> str:
         case "missing":
             return "is required and not given"
         case "extra_forbidden":  # the value is not shown: it may be a key in the wrong place
-            return "no such field" + _did_you_mean(str(fault["loc"][-1]), _fields_at(model, fault["loc"][:-1]))
+            return _unknown(fault, model)
         case "literal_error" | "enum":
             return f"{_shown(fault['input'])} is none of {context['expected']}"
         case "value_error":
@@ -208,6 +212,12 @@ def _sentence(fault: ErrorDetails, model: type[BaseModel]) -> str:
             return f"fields are wanted here, not {_shown(fault['input'])}"
     message = fault["msg"]
     return f"{message[0].lower()}{message[1:]}, not {_shown(fault['input'])}"
+
+
+def _unknown(fault: ErrorDetails, model: type[BaseModel]) -> str:
+    *place, name = fault["loc"]
+    elsewhere: Mapping[str, str] = {} if place else getattr(model, ELSEWHERE, {})
+    return elsewhere.get(str(name)) or "no such field" + _did_you_mean(str(name), _fields_at(model, tuple(place)))
 
 
 def _did_you_mean(word: str, known: list[str]) -> str:

@@ -10,9 +10,9 @@ Lengths are counted in game loops (22.4 a second at the speed called "faster") w
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 SCHEMA_VERSION: Literal[1] = 1
 """Major version of the schema. A peer with another one is refused, not guessed at."""
@@ -44,7 +44,7 @@ RejectionReason = Literal[
 
 AgentStatus = Literal[
     "ok",  # a reply of the policy, in time
-    "fallback",  # the policy failed (see `Reply.detail`) and its default reply was sent
+    "fallback",  # the policy failed (see `Reply.detail`) and said nothing: the task's default reply counts
     "late",  # nothing arrived before the deadline
     "gone",  # its liveliness token went away while the host was waiting
     "malformed",  # something arrived that is no valid reply
@@ -524,9 +524,7 @@ class Reply(Wire):
     episode: int = Field(ge=0)
     step: int = Field(ge=0)
     text: str
-    """The reply as the model gave it; the host reads its calls from here."""
-    calls: tuple[Call, ...] = ()
-    """What the agent itself understood of it, for listeners; the host's own reading decides."""
+    """The reply as the model gave it. The host reads it: what the agent orders, writes to others and listens to."""
     status: Literal["ok", "fallback"] = "ok"
     detail: str = ""
     """Why it is a fallback: `timeout`, `http 500`, `budget`, …"""
@@ -535,9 +533,15 @@ class Reply(Wire):
     attempts: int = Field(default=0, ge=0)
     usage: Usage = Usage()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_calls(cls, data: Any) -> Any:
+        """Recordings of early versions hold the calls beside the text that they stand in."""
+        return {k: v for k, v in data.items() if k != "calls"} if isinstance(data, dict) and "calls" in data else data
+
 
 class Message(Wire):
-    """Agent → host: a `MessageTo`, put into the recipients' next observation by the host's mailbox."""
+    """Host → all: a `MessageTo` that stood in an agent's reply; recipients find it in their next observation."""
 
     kind: Literal["message"] = "message"
     agent: str
@@ -653,7 +657,8 @@ class Report(Wire):
     game_loop: int = Field(ge=0)
     agents: tuple[AgentReport, ...]
     messages: tuple[Received, ...] = ()
-    """What the mailbox took in this step, in order of arrival; what it could deliver is in the next observations."""
+    """What the mailbox took in this step, in the order of the agents; what it could deliver is in the next
+    observations."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from agents.policy import Policy
+
 if TYPE_CHECKING:
-    from protocol.messages import Briefing, Observation
+    from agents.policy import Context
 
 
-class Fixed:
+class Fixed(Policy):
     """Gives the same reply to every observation."""
 
     def __init__(self, text: str) -> None:
         self._text = text
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
-        """The text."""
-        del briefing, observation
+    async def decide(self, context: Context) -> str:
+        """Return the text."""
+        del context
         return self._text
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bridge.act.plan import Executor
     from bridge.act.translate import Command
-    from bridge.observe.sight import AgentSight, Sight
+    from bridge.observe.observation import AgentObservation, SideObservation
     from bridge.task import TaskConfig
     from protocol.speech import Speech
 
@@ -52,7 +52,7 @@ class Actor:
         self._task = task
         self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
 
-    def joint(self, sight: Sight, replies: Mapping[str, Speech]) -> JointAction:
+    def joint(self, sight: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
         """The joint action of a turn.
 
         Args:
@@ -76,7 +76,7 @@ class Actor:
         return JointAction(tuple(commands), accepted, rejections)
 
     def _one(
-        self, translator: Translator, agent: AgentSight, speech: Speech
+        self, translator: Translator, agent: AgentObservation, speech: Speech
     ) -> tuple[list[Command], list[str], list[Rejection]]:
         words = self._words[agent.agent.name]
         addressees = Addressees(agent, words)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bridge.act.vocabulary import Vocabulary
     from bridge.action import Action
-    from bridge.observe.sight import AgentSight, TeamSight
+    from bridge.observe.observation import AgentObservation, TeamObservation
 
 _EVERY_TEAM = (
     "all, all teams, all units, all my teams, every, every team, each, each team, everyone, alle, alle Teams, todos, "
@@ -43,13 +43,13 @@ _TEAM_WORD = re.compile(r"(?:the\s+)?teams?\s+", re.IGNORECASE)
 class Addressees:
     """The teams of one agent, as the calls of a reply may speak to them."""
 
-    def __init__(self, agent: AgentSight, words: Vocabulary) -> None:
+    def __init__(self, agent: AgentObservation, words: Vocabulary) -> None:
         """Takes what the agent sees now, which names its teams, and the names that it may say."""
         self._agent = agent
         self._words = words
         self._by_name = {squashed(team.view.name): team for team in agent.teams}
 
-    def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamSight]:
+    def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamObservation]:
         """The teams that a call speaks to, at least one.
 
         Args:
@@ -70,16 +70,16 @@ class Addressees:
             return of_side if len(of_side) == 1 else named
         return named
 
-    def listening(self, heading: str | None) -> Sequence[TeamSight]:
+    def listening(self, heading: str | None) -> Sequence[TeamObservation]:
         """The team of a heading, or all of them."""
         team = None if heading is None else self._one(heading)
         return self._agent.teams if team is None else [team]
 
-    def _able(self, action: Action) -> list[TeamSight]:
+    def _able(self, action: Action) -> list[TeamObservation]:
         """The teams that may ever be told to do it."""
         return [team for team in self._agent.teams if self._words.has(team, action)]
 
-    def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamSight:
+    def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamObservation:
         """The team that is meant where none is named."""
         teams = self._agent.teams
         if len(teams) == 1:
@@ -91,7 +91,7 @@ class Addressees:
         ask = 'write "Team <name>:" above the action'
         raise Refused("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
 
-    def _named(self, heading: str, action: Action) -> Sequence[TeamSight]:
+    def _named(self, heading: str, action: Action) -> Sequence[TeamObservation]:
         """The teams that a heading names."""
         plain = squashed(heading)
         if team := self._one(heading):
@@ -107,7 +107,7 @@ class Addressees:
         meant = f"did you mean {self._by_name[close[0]].view.name}? Your" if close else "your"
         raise Refused("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
 
-    def _one(self, name: str) -> TeamSight | None:
+    def _one(self, name: str) -> TeamObservation | None:
         """The one team that a name can mean."""
         plain = squashed(name)
         if found := self._by_name.get(plain):

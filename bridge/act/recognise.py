@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bridge.act.addressee import Addressees
     from bridge.act.vocabulary import Vocabulary
     from bridge.action import Action, ArgKind
-    from bridge.observe.sight import TeamSight
+    from bridge.observe.observation import TeamObservation
     from protocol.messages import Call, Point, Rejection
 
 __all__ = ["Recognised", "Refused", "recognise", "reject"]
@@ -43,7 +43,7 @@ class Recognised:
 
     call: Call
     action: Action
-    team: TeamSight
+    team: TeamObservation
     tags: tuple[int, ...]
     """Tags among its arguments, in their order."""
     point: Point | None

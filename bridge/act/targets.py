@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from bridge.act.recognise import Recognised
     from bridge.frames import Camera
-    from bridge.observe.sight import Sight
+    from bridge.observe.observation import SideObservation
 
 _SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
 _WHOSE = {raw_pb2.Self: "your own", raw_pb2.Ally: "your ally's", raw_pb2.Enemy: "an enemy", raw_pb2.Neutral: "nobody's"}
@@ -38,7 +38,7 @@ SHORTEST = 6
 class Targets:
     """What can be aimed at, at the moment of a sight."""
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: SideObservation) -> None:
         self._sight = sight
         self._units = sight.snapshot.units
 

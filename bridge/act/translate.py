@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from bridge.act.recognise import Recognised
     from bridge.functions import Function
-    from bridge.observe.sight import Sight
+    from bridge.observe.observation import SideObservation
     from protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
@@ -60,7 +60,7 @@ class Command:
 class Translator:
     """Translates the calls of one turn, one after the other, those of all agents of a side."""
 
-    def __init__(self, sight: Sight, max_actions: Mapping[str, int]) -> None:
+    def __init__(self, sight: SideObservation, max_actions: Mapping[str, int]) -> None:
         """Takes what the agents see now, and by agent how many actions one team may have in a turn."""
         self._sight = sight
         self._snapshot = sight.snapshot

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bridge.action import Action
-    from bridge.observe.sight import TeamSight
+    from bridge.observe.observation import TeamObservation
     from bridge.task import AgentConfig
 
 CLOSE = 0.8
@@ -45,13 +45,13 @@ class Vocabulary:
         """The action of this name, in any spelling; None if the agent has no such action."""
         return self._actions.get(squashed(name))
 
-    def has(self, team: TeamSight, action: Action) -> bool:
+    def has(self, team: TeamObservation, action: Action) -> bool:
         """Whether a team may ever be told to do an action, with the units that it has now."""
         return action.name in team.team.config.actions or any(
             action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
         )
 
-    def hint(self, name: str, teams: Iterable[TeamSight]) -> str:
+    def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
         """What some teams may be told instead of a wrong name, as the end of a sentence."""
         wanted, words = squashed(name), _words(name)
         known = list(self._sayable(list(teams)))
@@ -65,7 +65,7 @@ class Vocabulary:
         others = f" and {len(known) - NEAREST} others" if len(known) > NEAREST else ""
         return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
 
-    def _sayable(self, teams: list[TeamSight]) -> Iterable[Action]:
+    def _sayable(self, teams: list[TeamObservation]) -> Iterable[Action]:
         """What some teams may be told, in the order in which it is listed; everything if there are none."""
         if not teams:
             return self._catalogue

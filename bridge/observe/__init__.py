@@ -6,13 +6,13 @@
     events     what changed since the snapshot before         chronicle   what is remembered of an episode
     possible   what may be told now, and why not the rest
     side, landmarks   what those are told who lead or build the whole side
-    sight      all of this as a value                         text, image  in words; in pictures
+    observation   all of this as a value                      text, image  in words; in pictures
 
 Everything here is a function of snapshots and of what agents said; no clock, no bus.
 """
 
+from bridge.observe.observation import AgentObservation, SideObservation, TeamObservation
 from bridge.observe.observer import Observer
-from bridge.observe.sight import AgentSight, Sight, TeamSight
 from bridge.observe.text import Feedback
 
-__all__ = ["AgentSight", "Feedback", "Observer", "Sight", "TeamSight"]
+__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation"]

@@ -1,28 +1,30 @@
 """What each agent of a side sees, observation after observation: the outward half of a turn.
 
     observer.begin()                                     a new episode
-    sight = observer.observe(snapshot, feedback)         sight.agents["Zealots"].text, .view
+    seen = observer.observe(snapshot, feedback)          seen.agents["Zealots"].text, .view
 
-An observer remembers who has which unit, the sight before, which enemies were seen and which stages of the task were
-reached, and nothing else; what it says is a function of the snapshots and feedbacks that it was given since `begin`.
-No clock, no bus.
+An observer remembers who has which unit, its last observation, which enemies were seen and which stages of the task
+were reached, and nothing else; what it says is a function of the snapshots and feedbacks that it was given since
+`begin`. No clock, no bus.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from bridge.observe import landmarks, side
 from bridge.observe.chronicle import Chronicle
+from bridge.observe.observation import AgentObservation, SideObservation
 from bridge.observe.scene import Scene
-from bridge.observe.sight import AgentSight, Sight
 from bridge.observe.stages import Stages
 from bridge.observe.teams import Roster
 from bridge.observe.text import Feedback, Page, render, sections_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from bridge.frames import Camera, MapFrame
     from bridge.observe.image.album import Album
@@ -36,7 +38,7 @@ class Observer:
     """The eyes of one side."""
 
     def __init__(self, task: TaskConfig, roster: Callable[[Sequence[AgentConfig]], Roster] = Roster) -> None:
-        """Takes a task, and whoever says which unit answers to which of its agents.
+        """Take a task, and what says which unit answers to which of its agents.
 
         Raises:
             ConfigError: an agent's configuration names a section that does not exist.
@@ -48,45 +50,28 @@ class Observer:
         self.begin()
 
     def begin(self) -> None:
-        """Forgets the episode before."""
+        """Forget the episode before."""
         self._episode = _Episode(self._new_roster(self._task.agents))
 
-    def observe(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> Sight:
-        """What every agent sees now, with what it is told of its last reply.
+    def observe(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> SideObservation:
+        """Return what the side sees now, with what each agent hears about its last reply.
+
+        What an agent sees is made when `agents` is first asked for it, so that one agent can think while the host
+        still looks for the others. What nobody asked for is made when the next observation begins.
 
         Args:
             snapshot: what the game says.
-            feedback: by agent; agents that are not in it are told nothing.
+            feedback: by agent; an agent that is not in it hears nothing.
         """
-        for _ in self.each(snapshot, feedback):
-            pass
-        return self.sight
-
-    def each(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> Iterator[AgentSight]:
-        """The same, agent by agent in the order of the task: the first can be asked while others are still looked for.
-
-        The whole is in `sight` when the last agent has been taken.
-        """
-        episode, told = self._episode, feedback or {}
+        episode = self._episode
+        earlier = episode.complete()
         episode.roster.update(snapshot.own, snapshot.response.observation.player_common)
         scene = Scene(snapshot, self._task.frames, episode.scene)
         episode.chronicle.note(scene.bodies, scene.upgrades, snapshot.dead)
-        album = self._album(snapshot, scene.world)
-        agents: dict[str, AgentSight] = {}
-        conditions: dict[str, str] = {}
-        for config in self._task.agents:
-            seen = self._agent(scene, config)
-            page = Page(seen, self._task, told.get(config.name, Feedback()), conditions)
-            text = render(page, self._sections[config.name], config.text_tokens)
-            agents[config.name] = replace(seen, text=text, pictures=album.pictures(seen) if album else ())
-            yield agents[config.name]
-        episode.scene, episode.sight = scene, Sight(snapshot, scene.world, agents)
-
-    @property
-    def sight(self) -> Sight:
-        """What was seen last."""
-        assert self._episode.sight is not None, "nothing has been observed in this episode"
-        return self._episode.sight
+        moment = _Moment(episode, scene, earlier, feedback or {}, self._album(snapshot, scene.world))
+        agents = _WhenAsked(self._task.agents, partial(self._agent, moment))
+        episode.scene, episode.last = scene, SideObservation(snapshot, scene.world, agents)
+        return episode.last
 
     def _album(self, snapshot: Snapshot, world: MapFrame) -> Album | None:
         """Who draws pictures; None if no agent is shown any, so that OpenCV is loaded only for those who are."""
@@ -96,22 +81,29 @@ class Observer:
 
         return Album(snapshot, world)
 
-    def _agent(self, scene: Scene, agent: AgentConfig) -> AgentSight:
-        episode, parts = self._episode, self._parts[agent.name]
-        before = episode.sight.agents.get(agent.name) if episode.sight else None
+    def _agent(self, moment: _Moment, agent: AgentConfig) -> AgentObservation:
+        """What one agent sees, in words and pictures."""
+        seen = self._seen(moment, agent)
+        page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), moment.conditions)
+        text = render(page, self._sections[agent.name], agent.text_tokens)
+        return replace(seen, text=text, pictures=moment.album.pictures(seen) if moment.album else ())
+
+    def _seen(self, moment: _Moment, agent: AgentConfig) -> AgentObservation:
+        episode, scene = moment.episode, moment.scene
+        before = moment.earlier.agents.get(agent.name) if moment.earlier else None
         earlier = {team.view.name: team for team in before.teams} if before else {}
-        builds = "resources" in parts and agent.kind == "builder"
+        builds = "resources" in self._parts[agent.name] and agent.kind == "builder"
         teams = []
         for team in episode.roster.teams(agent.name):
             seen = scene.team(agent, team, earlier.get(team.name), resources=builds)
             task = episode.stages.task(team, seen.view.minimap, scene.view.time_s)
             teams.append(replace(seen, view=seen.view.but(task=task)) if task else seen)
-        view = self._view(scene, agent, [team.view for team in teams], teams[0].camera if teams else None)
-        return AgentSight(agent, view, tuple(teams), episode.roster.idle_teams(agent.name))
+        view = self._view(moment, agent, [team.view for team in teams], teams[0].camera if teams else None)
+        return AgentObservation(agent, view, tuple(teams), episode.roster.idle_teams(agent.name))
 
-    def _view(self, scene: Scene, agent: AgentConfig, teams: Sequence[TeamView], camera: Camera | None) -> View:
+    def _view(self, moment: _Moment, agent: AgentConfig, teams: Sequence[TeamView], camera: Camera | None) -> View:
         """The view of an agent: that of all, its teams, and the parts that its page shows."""
-        parts, chronicle = self._parts[agent.name], self._episode.chronicle
+        scene, parts, chronicle = moment.scene, self._parts[agent.name], moment.episode.chronicle
         view = scene.view.but(teams=tuple(teams))
         more: dict[str, object] = {}
         if "counts" in parts:
@@ -121,7 +113,7 @@ class Observer:
         if "alerts" in parts:
             more["alerts"], more["warnings"] = side.alerts(scene), side.warnings(scene)
         if "others" in parts:
-            more["others"] = side.others(scene, self._episode.roster, self._task, agent.name)
+            more["others"] = side.others(scene, moment.episode.roster, self._task, agent.name)
         if "power" in parts:
             more["warp_gates"] = side.warp_gates(scene)
         if marks := tuple(_landmarks(scene, parts, camera)):
@@ -137,7 +129,50 @@ class _Episode:
     chronicle: Chronicle = field(default_factory=Chronicle)
     stages: Stages = field(default_factory=Stages)
     scene: Scene | None = None
-    sight: Sight | None = None
+    last: SideObservation | None = None
+
+    def complete(self) -> SideObservation | None:
+        """Return the last observation, with everything made that it could still be asked for."""
+        if self.last is not None:
+            tuple(self.last.agents.values())
+        return self.last
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """What the agents' parts of one observation are made of."""
+
+    episode: _Episode
+    scene: Scene
+    earlier: SideObservation | None
+    feedback: Mapping[str, Feedback]
+    album: Album | None
+    conditions: dict[str, str] = field(default_factory=dict)
+    """By tag, what was written of a unit's condition."""
+
+
+class _WhenAsked(Mapping[str, AgentObservation]):
+    """What each agent sees, in the order of the task; made when it is first asked for."""
+
+    def __init__(self, agents: Sequence[AgentConfig], make: Callable[[AgentConfig], AgentObservation]) -> None:
+        self._agents = {agent.name: agent for agent in agents}
+        self._made: dict[str, AgentObservation] = {}
+        self._make: Callable[[AgentConfig], AgentObservation] | None = make
+
+    def __getitem__(self, name: str) -> AgentObservation:
+        agent = self._agents[name]
+        if name not in self._made:
+            assert self._make is not None
+            self._made[name] = self._make(agent)
+            if len(self._made) == len(self._agents):
+                self._make = None  # it holds the observation before, and that one the one before it
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._agents)
+
+    def __len__(self) -> int:
+        return len(self._agents)
 
 
 def _parts(sections: Sequence[Section]) -> frozenset[Part]:

@@ -27,8 +27,8 @@ from bridge.macro.warp import fields
 from bridge.names import upgrade_name
 from bridge.observe.body import body, rounded
 from bridge.observe.events import Events, Witnessed
+from bridge.observe.observation import TeamObservation
 from bridge.observe.possible import Possible
-from bridge.observe.sight import TeamSight
 from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
@@ -121,7 +121,9 @@ class Scene:
             upgrades=self.upgrades,
         )
 
-    def team(self, agent: AgentConfig, team: Team, before: TeamSight | None, *, resources: bool = False) -> TeamSight:
+    def team(
+        self, agent: AgentConfig, team: Team, before: TeamObservation | None, *, resources: bool = False
+    ) -> TeamObservation:
         """What one team sees.
 
         Args:
@@ -132,7 +134,7 @@ class Scene:
         """
         if not team.tags:
             names = team.config.actions
-            return TeamSight(team, None, _team_view(team.name, None, self.possible.for_side(names)))
+            return TeamObservation(team, None, _team_view(team.name, None, self.possible.for_side(names)))
         members = np.array([self._index[tag] for tag in team.tags])
         head = self._order[members[0]]
         camera = Camera(head.x, head.y, self._screen_size)
@@ -151,7 +153,7 @@ class Scene:
         )
         tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
         events = self.events.of_team(before.view, before.tags, tags) if before else ()
-        return TeamSight(team, camera, view.but(events=events), tags)
+        return TeamObservation(team, camera, view.but(events=events), tags)
 
     def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
         return tuple([self._tags[row] for row in rows.tolist()])

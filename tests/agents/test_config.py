@@ -13,7 +13,7 @@ from agents.config import WorkerSpec, load_agents, load_model, model_files
 from agents.llm.anthropic import Anthropic
 from agents.llm.openai_compatible import OpenAICompatible
 from agents.llm_policy import LLMPolicy
-from agents.policy import FunctionPolicy
+from agents.policy import FunctionPolicy, ObjectPolicy
 from agents.scripted.policies import Silent
 from protocol.configfile import loads
 from protocol.errors import ConfigError
@@ -119,6 +119,10 @@ BAD_AGENTS = [
         ),
     ),
     ("agents:\n  A: {policy: silent}\nbudget: 3", "a.yaml:3 (budget): no such field, did you mean 'budget_usd'?"),
+    (
+        "agents:\n  A: {policy: silent}\ndefault_reply: ''",
+        "a.yaml:3 (default_reply): belongs in the task file: the host says it for all agents",
+    ),
 ]
 
 
@@ -166,6 +170,8 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "my_agent.py").write_text(
         "def decide(briefing, observation):\n    return 'text'\n\n"
         "class Mine:\n    async def decide(self, briefing, observation):\n        return 'text'\n\n"
+        "from agents.policy import Policy\n\n"
+        "class Whole(Policy):\n    async def decide(self, context):\n        return 'text'\n\n"
         "mine = Mine()\nnumber = 3\n",
         encoding="utf-8",
     )
@@ -181,8 +187,12 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_policy_is_found_by_its_module_in_the_current_directory(module: Path) -> None:
     assert isinstance(load_policy("my_agent:decide"), FunctionPolicy)
-    assert type(load_policy("my_agent:Mine")).__name__ == "Mine"
-    assert load_policy("my_agent:mine") is sys.modules["my_agent"].mine
+    made, mine = load_policy("my_agent:Mine"), load_policy("my_agent:mine")
+    assert isinstance(made, ObjectPolicy)
+    assert isinstance(mine, ObjectPolicy)
+    assert type(made.thing).__name__ == "Mine"
+    assert mine.thing is sys.modules["my_agent"].mine
+    assert type(load_policy("my_agent:Whole")).__name__ == "Whole"
     assert isinstance(load_policy("silent"), Silent)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,6 +17,7 @@ from agents.llm.replay import NotRecorded
 from agents.llm.retry import RetryRule
 from agents.llm_policy import LLMPolicy
 from agents.memory import LastSteps
+from agents.policy import Context
 from protocol.codec import decode_as, encode
 from protocol.messages import Exchange, Usage
 
@@ -29,11 +31,20 @@ BUSY = Unavailable("busy", status="http 429")
 NO_JITTER = RetryRule(jitter_s=0)
 
 
-def traced(model: Any, **options: Any) -> tuple[LLMPolicy, list[Exchange]]:
-    policy = LLMPolicy(model, rng=random.Random(0), **({"retry": NO_JITTER} | options))
-    exchanges: list[Exchange] = []
-    policy.trace = exchanges.append
-    return policy, exchanges
+@dataclass
+class Asked:
+    """A policy as a worker asks it, with a list of what is traced."""
+
+    policy: LLMPolicy
+    exchanges: list[Exchange] = field(default_factory=list)
+
+    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+        return await self.policy.decide(Context(briefing, observation, trace=self.exchanges.append))
+
+
+def traced(model: Any, **options: Any) -> tuple[Asked, list[Exchange]]:
+    asked = Asked(LLMPolicy(model, rng=random.Random(0), **({"retry": NO_JITTER} | options)))
+    return asked, asked.exchanges
 
 
 async def test_every_try_is_traced_with_its_times_and_what_it_took(
@@ -105,13 +116,13 @@ async def test_memory_is_of_one_episode_and_of_answered_steps_only(
 ) -> None:
     model = listed_model("one", Unavailable("x", status="http 500"), "three", "four")
     policy, _ = traced(model, memory=LastSteps(5), retry=RetryRule(tries=1))
-    await policy.prepare(briefing())
+    await policy.policy.prepare(briefing())
     await policy.decide(briefing(), observation(0))
     with pytest.raises(LLMError):
         await policy.decide(briefing(), observation(1))
     await policy.decide(briefing(), observation(2))
     assert [message.content for message in model.requests[2][1].messages[3:]] == ["step 0", "one", "step 2"]
-    await policy.prepare(briefing(episode=1))
+    await policy.policy.prepare(briefing(episode=1))
     await policy.decide(briefing(episode=1), observation(0, episode=1))
     assert [message.content for message in model.requests[3][1].messages[3:]] == ["step 0"]
 
@@ -126,12 +137,12 @@ async def test_recorded_exchanges_give_the_recorded_replies_without_a_wait(
     said = [await policy.decide(briefing(), observation(step, within_s=None)) for step in range(2)]
     recorded = [decode_as(Exchange, encode(exchange)) for exchange in exchanges]
     began = asyncio.get_running_loop().time()
-    replayed = replay_policies(recorded)["Stalkers"]
-    again: list[Exchange] = []
-    replayed.trace = again.append
+    replayed = Asked(replay_policies(recorded)["Stalkers"])
     assert [await replayed.decide(briefing(), observation(step, within_s=None)) for step in range(2)] == said
     assert asyncio.get_running_loop().time() == began
-    assert [(e.status, e.completion, e.usage) for e in again] == [(e.status, e.completion, e.usage) for e in exchanges]
+    assert [(e.status, e.completion, e.usage) for e in replayed.exchanges] == [
+        (e.status, e.completion, e.usage) for e in exchanges
+    ]
 
 
 FINAL = ["http 429", "http 500", "connection", "timeout", "malformed"]
@@ -148,7 +159,7 @@ async def test_a_failure_that_was_final_is_final_again(
         await policy.decide(briefing(), observation())
     (replayed,) = replay_policies(exchanges).values()
     with pytest.raises(LLMError) as caught:
-        await replayed.decide(briefing(), observation())
+        await Asked(replayed).decide(briefing(), observation())
     assert (caught.value.status, caught.value.retryable) == (status, False)
 
 
@@ -163,7 +174,7 @@ async def test_a_request_that_the_deadline_cut_off_is_a_timeout_again(
     assert [e.status for e in exchanges] == ["cancelled"]
     (replayed,) = replay_policies(exchanges).values()
     with pytest.raises(LLMError) as caught:
-        await replayed.decide(briefing(), observation())
+        await Asked(replayed).decide(briefing(), observation())
     assert caught.value.status == "timeout"
 
 
@@ -175,9 +186,9 @@ async def test_a_replay_says_what_differs_from_the_recording(
     (replayed,) = replay_policies(exchanges).values()
     where = "of Stalkers in episode 0, step 0"
     with pytest.raises(NotRecorded) as caught:
-        await replayed.decide(briefing(), observation(0, text="Game\n    Time: 0:08"))
+        await Asked(replayed).decide(briefing(), observation(0, text="Game\n    Time: 0:08"))
     assert str(caught.value) == (
         f"the prompt {where} is not the recorded one: message 3, line 2 was '    Time: 0:07', and is '    Time: 0:08'"
     )
     with pytest.raises(NotRecorded, match="no request 1 of Stalkers in episode 0, step 9 was recorded"):
-        await replayed.decide(briefing(), observation(9))
+        await Asked(replayed).decide(briefing(), observation(9))

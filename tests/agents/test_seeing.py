@@ -7,6 +7,7 @@ import hashlib
 import logging
 from base64 import b64encode
 from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -18,6 +19,7 @@ from agents.llm.vision import ANTHROPIC, Vision
 from agents.llm_policy import LLMPolicy
 from agents.memory import LastSteps
 from agents.pictures import Pictures
+from agents.policy import Context, Policy
 from agents.worker import run_worker
 from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
@@ -101,11 +103,21 @@ async def test_a_picture_that_is_too_large_alone_is_kept_until_the_next() -> Non
 # --- the policy ---------------------------------------------------------------------------------------
 
 
-def policy_of(model: Any, **options: Any) -> tuple[LLMPolicy, list[Exchange]]:
-    policy = LLMPolicy(model, **({"vision": SEES} | options))
-    exchanges: list[Exchange] = []
-    policy.trace = exchanges.append
-    return policy, exchanges
+@dataclass
+class Asked:
+    """A policy as a worker asks it: with one place for pictures and one list of what is traced."""
+
+    policy: LLMPolicy
+    pictures: Pictures = field(default_factory=Pictures)
+    exchanges: list[Exchange] = field(default_factory=list)
+
+    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+        return await self.policy.decide(Context(briefing, observation, self.pictures, self.exchanges.append))
+
+
+def policy_of(model: Any, **options: Any) -> tuple[Asked, list[Exchange]]:
+    asked = Asked(LLMPolicy(model, **({"vision": SEES} | options)))
+    return asked, asked.exchanges
 
 
 async def test_a_model_that_sees_is_shown_the_pictures_of_its_observation(
@@ -238,12 +250,10 @@ async def test_recorded_prompts_with_pictures_get_their_recorded_answers(
     await policy.pictures.put(ONE)
     await policy.decide(briefing(), observation(images=(ref(ONE),)))
     recorded = [decode_as(Exchange, encode(exchange)) for exchange in exchanges]
-    replayed = replay_policies(recorded)["Stalkers"]
-    again: list[Exchange] = []
-    replayed.trace = again.append
+    replayed = Asked(replay_policies(recorded)["Stalkers"])
     await replayed.pictures.put(ONE)
     assert await replayed.decide(briefing(), observation(images=(ref(ONE),))) == "go"
-    assert again[0].usage == exchanges[0].usage
+    assert replayed.exchanges[0].usage == exchanges[0].usage
     await replayed.pictures.put(TWO)
     with pytest.raises(
         NotRecorded, match=r"message 3 was sent with screen [0-9a-f]{8}, and is with screen [0-9a-f]{8}"
@@ -254,15 +264,14 @@ async def test_recorded_prompts_with_pictures_get_their_recorded_answers(
 # --- the worker ---------------------------------------------------------------------------------------
 
 
-class Looking:
+class Looking(Policy):
     """A policy that notes what it sees."""
 
     def __init__(self) -> None:
-        self.pictures = Pictures()
         self.seen: list[Mapping[str, bytes]] = []
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
-        self.seen.append(await self.pictures.get(observation.images))
+    async def decide(self, context: Context) -> str:
+        self.seen.append(await context.pictures.get(context.observation.images))
         return "Analysis: I look."
 
 

@@ -12,17 +12,17 @@ from agents.llm.client import LLMError, Refused
 from agents.llm.limits import Budget, Limits
 from agents.llm.pricing import Prices
 from agents.llm_policy import LLMPolicy
-from agents.policy import Answer, Decision, FunctionPolicy
+from agents.policy import Decision, FunctionPolicy, Policy
 from agents.scripted.policies import Fixed
 from agents.worker import Tally, run_worker, run_workers
 from protocol.errors import BusError
 from protocol.keys import Topic, every_agent
-from protocol.messages import Exchange, Message, Reply, Usage
+from protocol.messages import Exchange, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
 
-    from agents.policy import Policy
+    from agents.policy import Context, Said
     from protocol.bus import Delivery
     from protocol.bus.memory import MemoryBroker, MemoryBus
     from protocol.messages import Briefing, Observation, Result, Run
@@ -41,10 +41,10 @@ class Players:
         self._tasks: list[asyncio.Task[Tally]] = []
         self.buses: list[MemoryBus] = []
 
-    async def start(self, policy: Policy, **options: Any) -> asyncio.Task[Tally]:
+    async def start(self, policy: Policy) -> asyncio.Task[Tally]:
         bus = self._broker.session()
         self.buses.append(bus)
-        task = asyncio.create_task(run_worker(bus, RUN, SIDE, AGENT, policy, stop=self._stop, **options))
+        task = asyncio.create_task(run_worker(bus, RUN, SIDE, AGENT, policy, stop=self._stop))
         self._tasks.append(task)
         await asyncio.sleep(0.001)
         return task
@@ -61,7 +61,7 @@ async def players(broker: MemoryBroker) -> AsyncIterator[Players]:
     await made.end()
 
 
-class Slow:
+class Slow(Policy):
     """A policy that takes its time, as told, and notes what becomes of it."""
 
     def __init__(self, *times_s: float, stubborn: bool = False) -> None:
@@ -69,7 +69,8 @@ class Slow:
         self._stubborn = stubborn
         self.cancelled: list[int] = []
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+    async def decide(self, context: Context) -> str:
+        observation = context.observation
         try:
             await asyncio.sleep(self._times_s.pop(0))
         except asyncio.CancelledError:
@@ -92,20 +93,17 @@ async def test_an_observation_is_answered_with_what_the_policy_says(
     (reply,) = await host.replies(1)
     assert (reply.agent, reply.side, reply.episode, reply.step) == (AGENT, SIDE, 0, 3)
     assert (reply.status, reply.text, reply.detail) == ("ok", ATTACK, "")
-    assert [call.name for call in reply.calls] == ["Attack_Unit"]
 
 
-async def test_messages_are_sent_before_the_reply_that_holds_them(
+async def test_a_worker_sends_a_reply_and_nothing_else(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    text = f"{ATTACK}Communications:\n    <MessageTo(Zealots, '''hold''')>\n    <MessageTo(Scout, '''go''')>\n"
+    text = f"{ATTACK}Communications:\n    <MessageTo(Zealots, '''hold''')>\n    <ListenTo(Channel-2)>\n"
     await players.start(Fixed(text))
     await host.say(briefing())
     await host.say(observation())
     await host.replies(1)
-    spoken = [message for message in host.heard if isinstance(message, Message | Reply)]
-    assert [type(message) for message in spoken] == [Message, Message, Reply]
-    assert [(m.recipient, m.text, m.step) for m in host.of(Message)] == [("Zealots", "hold", 0), ("Scout", "go", 0)]
+    assert [(message.kind, message.text) for message in host.heard] == [("reply", text)]
 
 
 async def test_a_worker_that_joins_late_answers_the_observation_that_is_there(
@@ -195,20 +193,20 @@ async def test_what_is_no_observation_is_dropped_and_the_next_one_answered(
 # --- deadlines --------------------------------------------------------------------------------------------
 
 
-async def test_the_default_reply_is_sent_before_the_deadline_when_the_policy_is_late(
+async def test_an_empty_fallback_is_sent_before_the_deadline_when_the_policy_is_late(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     policy = Slow(60.0)
-    await players.start(policy, default_reply="Actions:\n<Stop()>")
+    await players.start(policy)
     await host.say(briefing())
     await host.say(observation(within_s=10.0))
     (reply,) = await host.replies(1)
-    assert (reply.status, reply.detail, reply.text) == ("fallback", "timeout", "Actions:\n<Stop()>")
+    assert (reply.status, reply.detail, reply.text) == ("fallback", "timeout", "")
     assert 9.0 < reply.latency_s < 10.0
     assert policy.cancelled == [0]
 
 
-async def test_a_policy_that_will_not_be_cancelled_does_not_delay_the_default_reply(
+async def test_a_policy_that_will_not_be_cancelled_does_not_delay_the_fallback(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     await players.start(Slow(60.0, 0.5, stubborn=True))
@@ -234,7 +232,7 @@ async def test_without_a_deadline_a_policy_may_take_as_long_as_it_likes(
     assert reply.latency_s == pytest.approx(3600, abs=1)
 
 
-async def test_no_briefing_at_all_ends_in_the_default_reply(
+async def test_no_briefing_at_all_ends_in_a_fallback(
     host: Any, players: Players, observation: Callable[..., Observation]
 ) -> None:
     await players.start(Fixed(ATTACK))
@@ -261,15 +259,15 @@ async def test_a_newer_observation_supersedes_the_one_that_is_being_decided(
 # --- policies that fail -----------------------------------------------------------------------------------
 
 
-def _raises(error: BaseException) -> Callable[[Briefing, Observation], Awaitable[Answer]]:
-    async def decide(briefing: Briefing, observation: Observation) -> Answer:
+def _raises(error: BaseException) -> Callable[[Briefing, Observation], Awaitable[Said]]:
+    async def decide(briefing: Briefing, observation: Observation) -> Said:
         raise error
 
     return decide
 
 
-def _returns(value: Any) -> Callable[[Briefing, Observation], Awaitable[Answer]]:
-    async def decide(briefing: Briefing, observation: Observation) -> Answer:
+def _returns(value: Any) -> Callable[[Briefing, Observation], Awaitable[Said]]:
+    async def decide(briefing: Briefing, observation: Observation) -> Said:
         return value  # type: ignore[no-any-return]  # that it is wrong is the point
 
     return decide
@@ -289,7 +287,7 @@ FAILURES = [
 @pytest.mark.parametrize(("decide", "detail"), FAILURES, ids=[detail for _, detail in FAILURES])
 async def test_a_policy_that_fails_becomes_a_fallback_and_the_worker_lives_on(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation],
-    decide: Callable[[Briefing, Observation], Awaitable[Answer]], detail: str,
+    decide: Callable[[Briefing, Observation], Awaitable[Said]], detail: str,
 ) -> None:  # fmt: skip
     await players.start(FunctionPolicy(decide))
     await host.say(briefing())
@@ -407,19 +405,19 @@ async def test_a_request_that_the_deadline_cut_off_is_counted_as_unknown_and_not
     assert (exchange.status, exchange.completion) == ("cancelled", None)
 
 
-async def test_an_agent_without_money_goes_on_with_its_default_reply(
+async def test_an_agent_without_money_goes_on_with_fallbacks(
     host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing],
     observation: Callable[..., Observation], caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
     model = listed_model("one", "two", "three")
     limits = Limits(prices=Prices(prompt=1, completion=1), budget=Budget(1.0, source="--budget-usd"))
-    await players.start(LLMPolicy(model, limits=limits), default_reply="Actions:")
+    await players.start(LLMPolicy(model, limits=limits))
     await host.say(briefing())
     for step in range(5):
         await host.say(observation(step))
         await host.replies(step + 1)
     said = [(r.text, r.status, r.detail, r.attempts) for r in host.of(Reply)]
-    assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("Actions:", "fallback", "budget", 0)] * 3]
+    assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("", "fallback", "budget", 0)] * 3]
     assert len(model.requests) == 2
     (record,) = caplog.records
     assert "the limit budget_usd = 1 of --budget-usd is reached (1)" in record.getMessage()

@@ -14,7 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from bridge.act import JointAction, Played, Step
 from bridge.act.raw import RawExecutor
 from bridge.errors import GameError, GameHangs, GameMissing
-from bridge.game import GameConfig, GameInfo, GameThread, OneSide, Turn, find_sc2
+from bridge.game import GameConfig, GameInfo, GameThread, OneSide, StepResult, find_sc2
 from bridge.maps import known_maps
 from bridge.pysc2_game import PySC2Game
 from protocol.errors import KhalaError
@@ -47,7 +47,7 @@ class FakeGame:
         self._loop = 0
         return (self._snapshot([], loop=0),)
 
-    def act(self, plans: Sequence[Plan]) -> tuple[Turn, ...]:
+    def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         self._note("act")
         if self._hangs:
             self._killed.wait()
@@ -58,7 +58,7 @@ class FakeGame:
         try:
             plan.send(after)
         except StopIteration as done:
-            return (Turn(after, done.value, 1),)
+            return (StepResult(after, done.value, 1),)
         raise AssertionError
 
     def kill(self) -> None:
@@ -137,7 +137,7 @@ class StubEnv:
         return SimpleNamespace(observation=observation, last=lambda: ended)
 
 
-def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[Turn, ...]]:
+def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[StepResult, ...]]:
     """Plays plans of two players that return how many steps they took."""
 
     def plan(steps: list[Step]) -> Plan:

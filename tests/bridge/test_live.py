@@ -9,7 +9,7 @@ import pytest
 
 from bridge.act import Actor, executor_of
 from bridge.errors import GameError
-from bridge.game import GameConfig, Turn
+from bridge.game import GameConfig, StepResult
 from bridge.maps import known_maps
 from bridge.observe import Feedback, Observer
 from bridge.pysc2_game import PySC2Game
@@ -47,7 +47,7 @@ class Battle:
         self.game, self.task = game, task
         self.actor, self.observer, self.executor = Actor(task), Observer(task), executor_of(task)
         self.texts: list[str] = []
-        self.turns: list[Turn] = []
+        self.turns: list[StepResult] = []
         self.reasons: list[str] = []
         self._feedback: dict[str, Feedback] = {}
         (self.now,) = game.reset()

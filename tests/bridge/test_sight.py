@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import raw_pb2
 
-from bridge.observe import Observer, TeamSight
+from bridge.observe import Observer, TeamObservation
 from protocol.messages import Frames, Resources
 
 if TYPE_CHECKING:
@@ -26,10 +26,10 @@ STALKER, FOE = 0x100040001, 0x100180001
 
 
 @pytest.fixture
-def first_team(task: Task) -> Callable[..., TeamSight]:
+def first_team(task: Task) -> Callable[..., TeamObservation]:
     """The first team of the shipped task 3s_vs_3z, after one or more snapshots."""
 
-    def see(*snapshots: Snapshot, **changed: Any) -> TeamSight:
+    def see(*snapshots: Snapshot, **changed: Any) -> TeamObservation:
         observer = Observer(task("3s_vs_3z", **changed))
         sights = [observer.observe(snapshot) for snapshot in snapshots]
         return sights[-1].agents[AGENT].teams[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import pytest_asyncio
@@ -19,7 +19,7 @@ from protocol.bus import Delivery
 from protocol.bus.memory import MemoryBroker
 from protocol.codec import encode
 from protocol.keys import Topic, agent_key
-from protocol.messages import Reply, Report, Result
+from protocol.messages import Message, Reply, Report, Result
 from protocol.recording import Recording
 from simulator.install import install
 
@@ -48,8 +48,8 @@ async def game(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[OneSid
 class Table:
     """A match of two agents, the Zealots well-behaved."""
 
-    def __init__(self, game: OneSide, steps: int, record: Path | None = None) -> None:
-        task = change(load_task("2s3z_pair"), max_wait_s=WAIT_S, max_steps=steps)
+    def __init__(self, game: OneSide, steps: int, record: Path | None = None, **changes: Any) -> None:
+        task = change(load_task("2s3z_pair"), max_wait_s=WAIT_S, max_steps=steps, **changes)
         self.config = MatchConfig(task=task, run=RUN, assemble_s=5, record=record)
         self.game = game
         self.broker = MemoryBroker()
@@ -194,3 +194,49 @@ async def test_what_one_agent_says_the_other_reads_in_the_next_step(game: OneSid
     assert heard == []  # nobody wrote to the Stalkers but they themselves
     assert [m.text for report in table.reports for m in report.messages] == ["step 0", "go 0", "step 1", "go 1"]
     assert result.rejections == {"unknown_recipient": 2}
+
+
+async def test_what_agents_write_to_each_other_is_on_the_bus_and_recorded_in_its_step(
+    game: OneSide, tmp_path: Path
+) -> None:
+    table = Table(game, steps=2, record=tmp_path / "said.mcap")
+    heard = await table.broker.session().subscribe(agent_key(RUN, "blue", "Stalkers", Topic.MESSAGE), Delivery.LOG)
+
+    def talk(_: Briefing, seen: Observation) -> str:
+        return f"Communications:\n<MessageTo(Zealots, 'go {seen.step}')>"
+
+    await table.play(talk)
+    recording = Recording.open(tmp_path / "said.mcap")
+    for step in recording.by_step():
+        (said,) = step.of(Message)
+        (report,) = step.of(Report)
+        assert (said.agent, said.recipient, said.text, said.step) == (
+            "Stalkers",
+            "Zealots",
+            f"go {step.step}",
+            step.step,
+        )
+        assert [(m.sender, m.recipient, m.text) for m in report.messages] == [(said.agent, said.recipient, said.text)]
+        assert (await anext(heard)).payload == encode(said)
+    assert [[m.text for m in seen.messages] for seen in recording.observations("Zealots")] == [[], ["go 0"]]
+
+
+async def test_the_default_reply_of_the_task_counts_for_an_agent_that_says_nothing(game: OneSide) -> None:
+    async def stall(_: Briefing, seen: Observation) -> str:
+        if seen.step == 1:
+            await asyncio.Event().wait()
+        return "Analysis: I wait."
+
+    table = Table(game, steps=2, default_reply="<Move_Screen([13, 12])>\n<MessageTo(Zealots, 'I am late')>")
+    await table.play(stall)
+    assert table.statuses("Stalkers") == ["ok", "fallback"]
+    assert [report.agents[0].accepted for report in table.reports] == [(), ("Stalker-1 <Move_Screen([13, 12])>",)]
+    assert [[m.text for m in report.messages] for report in table.reports] == [[], ["I am late"]]
+
+
+async def test_the_phases_of_a_step_take_all_of_its_time(game: OneSide) -> None:
+    table = Table(game, steps=20)
+    result = await table.play(attack)
+    phases = [sum(report.timings.model_dump().values()) for report in table.reports]
+    assert all(min(report.timings.model_dump().values()) > 0 for report in table.reports)
+    assert sum(phases) <= result.wall_s

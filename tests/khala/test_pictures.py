@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.pictures import Pictures
+from agents.policy import Policy
 from agents.replay import replay_agent
 from agents.worker import run_worker
 from orchestrator.record import RecordingBus
 from orchestrator.roster import Roster, Seat
-from orchestrator.tell import Selection, save_pictures, summary, tell
+from orchestrator.transcript import Selection, save_pictures, summary, transcript
 from orchestrator.turn import Question, Turn
 from protocol.bus import Delivery
 from protocol.bus.config import BusConfig
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
     from pathlib import Path
 
+    from agents.policy import Context
     from protocol.bus import Bus
 
     Connect = Callable[[], Awaitable[Bus]]
@@ -55,15 +56,14 @@ async def connect(request: pytest.FixtureRequest) -> AsyncIterator[Connect]:
         await session.close()
 
 
-class Looking:
+class Looking(Policy):
     """A policy that says the hashes of what it sees."""
 
     def __init__(self) -> None:
-        self.pictures = Pictures()
         self.seen: list[Mapping[str, bytes]] = []
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
-        found = await self.pictures.get(observation.images, within_s=5)
+    async def decide(self, context: Context) -> str:
+        found = await context.pictures.get(context.observation.images, within_s=5)
         self.seen.append(found)
         return " ".join(sorted(found))
 
@@ -148,7 +148,7 @@ async def test_a_replayed_agent_is_shown_the_recorded_pictures(recording: Path) 
 
 
 async def test_a_recording_is_told_with_its_pictures(recording: Path) -> None:
-    told = [str(part) for part in tell(recording, Selection(), whole=True)]
+    told = [str(part) for part in transcript(recording, Selection(), whole=True)]
     assert [line for line in told if "picture" in line] == [
         "  picture screen-0 (512 x 512 PNG, 0 kB): Screen 0.",
         "  picture screen-1 (512 x 512 PNG, 102 kB): Screen 1.",

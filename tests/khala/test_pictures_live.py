@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from agents.pictures import Pictures
+from agents.policy import Policy
 from agents.worker import run_worker
 from bridge.imagespec import ImageSpec
 from khala.local import one_side
@@ -25,8 +25,8 @@ from simulator.install import install
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from agents.policy import Context
     from bridge.task import TaskConfig
-    from protocol.messages import Briefing
 
 pytestmark = pytest.mark.game
 
@@ -50,15 +50,15 @@ def task_with_pictures() -> TaskConfig:
     return task.model_copy(update={"agents": agents})
 
 
-class Looking:
+class Looking(Policy):
     """A policy that charges, and keeps what it sees."""
 
     def __init__(self) -> None:
-        self.pictures = Pictures()
         self.seen: dict[str, bytes] = {}
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
-        self.seen |= await self.pictures.get(observation.images)
+    async def decide(self, context: Context) -> str:
+        observation = context.observation
+        self.seen |= await context.pictures.get(observation.images)
         teams = "\n".join(f"Team {team.name}:\n<Move_Screen([16, 12])>" for team in observation.view.teams)
         return f"Actions:\n{teams}"
 

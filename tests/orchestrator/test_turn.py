@@ -11,7 +11,7 @@ from orchestrator.turn import Question, Turn
 from protocol.bus import Delivery
 from protocol.codec import decode_as, encode
 from protocol.keys import Topic, agent_key, alive_key
-from protocol.messages import Message, Observation, Reply
+from protocol.messages import Observation, Reply
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -48,11 +48,6 @@ class Peer:
         side, name = self.seat
         said = Reply(run=run, side=side, agent=agent or name, episode=episode, step=step, text=text)
         await self.put(Topic.REPLY, encode(said))
-
-    async def message(self, recipient: str, text: str) -> None:
-        side, name = self.seat
-        said = Message(run=RUN, side=side, agent=name, episode=0, step=0, recipient=recipient, text=text)
-        await self.put(Topic.MESSAGE, encode(said))
 
 
 @asynccontextmanager
@@ -102,16 +97,6 @@ async def test_pictures_are_published_before_the_observation_that_names_them(
         ("observation", b""),
         ("observation", b""),
     ]
-
-
-async def test_messages_sent_before_a_reply_belong_to_its_step(broker: MemoryBroker, observe: Observe) -> None:
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
-        for step in range(20):
-            asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=step, within_s=60)))
-            await zealots.observed()
-            await zealots.message("Stalkers", f"hold {step}")
-            await zealots.reply("", step=step)
-            assert [m.text for m in (await asked).messages] == [f"hold {step}"]
 
 
 async def test_the_first_valid_reply_counts_and_a_second_is_ignored(broker: MemoryBroker, observe: Observe) -> None:
@@ -219,11 +204,9 @@ async def test_an_agent_of_another_match_is_not_heard(broker: MemoryBroker, obse
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
         await zealots.observed()
         await stranger.reply("let me in")
-        await stranger.message("Zealots", "psst")
         await zealots.reply("")
         answers = await asked
     assert list(answers.by_seat) == [ZEALOTS]
-    assert answers.messages == ()
 
 
 async def test_missing_agents_are_named(broker: MemoryBroker) -> None:

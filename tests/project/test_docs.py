@@ -20,7 +20,7 @@ import pytest
 import typer
 
 from agents.config import AgentsFile, ModelConfig
-from agents.policy import FunctionPolicy
+from agents.policy import Context, Policy, as_policy
 from bridge import catalog
 from bridge.errors import CatalogueError
 from bridge.task import TaskConfig
@@ -108,9 +108,9 @@ async def test_a_block_of_python_runs(block: Block, scene: tuple[Briefing, Obser
     namespace = run(block)
     for name, thing in namespace.items():
         if name == "decide":
-            await check_policy(FunctionPolicy(thing), scene)
+            await check_policy(as_policy(thing), scene)
         elif isinstance(thing, type) and thing.__module__ == block.name and hasattr(thing, "decide"):
-            await check_policy(thing(), scene)
+            await check_policy(as_policy(thing()), scene)
         elif name.startswith("test_"):
             await thing(**{fixture: double(fixture) for fixture in inspect.signature(thing).parameters})
 
@@ -126,16 +126,16 @@ def run(block: Block) -> dict[str, Any]:
     return dict(namespace)
 
 
-async def check_policy(policy: Any, scene: tuple[Briefing, Observation]) -> None:
+async def check_policy(policy: Policy, scene: tuple[Briefing, Observation]) -> None:
     """Decides once; what is said must be understood, and be among what the agent may say."""
     briefing, observation = scene
-    if hasattr(policy, "prepare"):
-        await policy.prepare(briefing)
-    said = speech.parse(await policy.decide(briefing, observation))
+    await policy.prepare(briefing)
+    text = await policy.decide(Context(briefing, observation))
+    assert isinstance(text, str)
+    said = speech.parse(text)
     assert not said.faults
     assert {call.name for call in said.calls} <= {action.name for action in briefing.actions}
-    if hasattr(policy, "close"):
-        await policy.close()
+    await policy.close()
 
 
 def double(fixture: str) -> Callable[..., Any]:

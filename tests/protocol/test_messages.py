@@ -91,7 +91,7 @@ def test_a_field_cannot_be_assigned() -> None:
         ({"latency_s": float("nan")}, "Input should be a finite number"),
         ({"latency_s": float("inf")}, "Input should be a finite number"),
         ({"text": b"\xff"}, "Input should be a valid string"),
-        ({"calls": [{"name": "Stop", "start": 0}]}, "Field required"),
+        ({"usage": {"requests": "many"}}, "Input should be a valid integer"),
     ],
 )
 def test_what_the_schema_does_not_allow_cannot_be_built(changes: Mapping[str, object], text: str) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bridge.observe.image.layers import Cells, Layer
     from bridge.observe.image.lettering import Image
     from bridge.observe.image.picture import Picture
-    from bridge.observe.sight import AgentSight
+    from bridge.observe.observation import AgentObservation
     from bridge.snapshot import Snapshot
 
 cv2.setNumThreads(1)  # a picture is too small to share, and agents of other processes want the rest
@@ -58,7 +58,7 @@ class Album:
         self._moment = Moment(snapshot)
         self._world = world
 
-    def pictures(self, seen: AgentSight) -> tuple[Picture, ...]:
+    def pictures(self, seen: AgentObservation) -> tuple[Picture, ...]:
         """All pictures of an agent, in the order of its configuration."""
         return tuple(
             encoded(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
@@ -67,7 +67,7 @@ class Album:
         )
 
 
-def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentSight) -> Iterator[Drawing]:
+def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentObservation) -> Iterator[Drawing]:
     """The pictures that one specification asks for."""
     teams = [_Looker(t.view.name, t.camera, frozenset(t.team.tags)) for t in seen.teams if t.camera is not None]
     if spec.what == "minimap":
@@ -95,7 +95,7 @@ def _screen(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]
 
 
 def _minimap(
-    spec: ImageSpec, moment: Moment, world: MapFrame, teams: list[_Looker], seen: AgentSight
+    spec: ImageSpec, moment: Moment, world: MapFrame, teams: list[_Looker], seen: AgentObservation
 ) -> Iterator[Drawing]:
     pixels = None
     if spec.is_taken:
@@ -112,7 +112,7 @@ def _minimap(
     yield Drawing(image, "minimap", titles.of_minimap(world.minimap_size, legend))
 
 
-def _commanded(moment: Moment, teams: list[_Looker], seen: AgentSight) -> frozenset[int]:
+def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
     """The units that are the agent's own: those of its teams, or all, if it orders the whole side."""
     if any(team.team.kind == "side" for team in seen.teams):
         return frozenset(one.tag for one in moment.subjects if one.side == "own")

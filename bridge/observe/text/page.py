@@ -22,7 +22,7 @@ from protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from bridge.observe.sight import AgentSight
+    from bridge.observe.observation import AgentObservation
     from bridge.task import TaskConfig
     from protocol.messages import Received, Rejection, TeamView, View
 
@@ -46,7 +46,7 @@ class Feedback:
 class Page:
     """All that a section may speak of."""
 
-    sight: AgentSight
+    sight: AgentObservation
     task: TaskConfig
     feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)

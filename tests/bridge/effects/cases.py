@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bridge.action import Action
-    from bridge.observe.sight import Sight, TeamSight
+    from bridge.observe.observation import SideObservation, TeamObservation
     from bridge.snapshot import Snapshot
     from simulator.abilities import Ability
 
@@ -114,7 +114,7 @@ def task_of(case: Case) -> TaskConfig:
 # --- words ------------------------------------------------------------------------------------------------------------
 
 
-def replies(case: Case, stage: Stage, sight: Sight) -> Iterator[str]:
+def replies(case: Case, stage: Stage, sight: SideObservation) -> Iterator[str]:
     """What a model could say so that the action is done, the most promising first."""
     teams = (t for t in sight.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
     team = next(teams, None)
@@ -128,7 +128,7 @@ def replies(case: Case, stage: Stage, sight: Sight) -> Iterator[str]:
         yield f"Actions:\n    Team {team.view.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
 
 
-def _targets(action: Action, stage: Stage, team: TeamSight, sight: Sight) -> Iterator[list[str]]:
+def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObservation) -> Iterator[list[str]]:
     match action.target_kind:
         case None:
             yield []

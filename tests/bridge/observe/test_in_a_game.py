@@ -20,7 +20,7 @@ from bridge.task import TaskConfig
 from simulator.client import Client, command, interface
 
 if TYPE_CHECKING:
-    from bridge.observe import Sight
+    from bridge.observe import SideObservation
 
 RACES = {"protoss": common_pb2.Protoss, "terran": common_pb2.Terran, "zerg": common_pb2.Zerg}
 WORKERS = {"protoss": "Probe", "terran": "SCV", "zerg": "Drone"}
@@ -44,7 +44,7 @@ def everybody(race: str) -> TaskConfig:
 
 
 @pytest.fixture(scope="module", params=sorted(RACES))
-def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[Sight]]:
+def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservation]]:
     """What the agents see at the beginning of a game, and some seconds later, with a worker in training."""
     task = everybody(request.param)
     client = Client()

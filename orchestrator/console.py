@@ -27,8 +27,8 @@ STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "ma
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
 
 
-def console() -> Console:
-    """Where a person reads: stderr."""
+def stderr_console() -> Console:
+    """Return a console on stderr, where a person reads."""
     return Console(stderr=True, highlight=False)
 
 

@@ -1,4 +1,4 @@
-"""Tells a recording to a person: what was seen, said and done, step by step.
+"""Turn a recording into a transcript for a person: what was seen, said and done, step by step.
 
 It reads the file once, in its order, and holds no more than one step of it.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.text import Text
 
-from orchestrator.show import STATUS, card, clock, table
+from orchestrator.console import STATUS, card, clock, table
 from protocol.errors import ConfigError, RecordingError
 from protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
 from protocol.recording import Recording, read
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which part of a recording is told."""
+    """Which part of a recording is shown."""
 
     agent: str | None = None
     first: int = 0
@@ -56,13 +56,13 @@ class Selection:
         return in_time and (agent is None or self.agent in {None, agent})
 
 
-def tell(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[RenderableType]:
-    """Yields what is to be printed of a recording, in its order.
+def transcript(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[RenderableType]:
+    """Yield what is to be printed of a recording, in its order.
 
     Args:
         path: the recording.
         selection: which part.
-        whole: observations and replies word for word, besides what became of them.
+        whole: observations and replies word for word, as well as what became of them.
 
     Raises:
         RecordingError: the file is no recording.

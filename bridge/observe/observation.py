@@ -1,7 +1,7 @@
 """What a side sees at one moment: the views of its agents, and what the host needs to carry out their answers.
 
-Cameras, tags and the snapshot stay on the host; no world coordinate is in a view. Sights are made by
-`bridge.observe.observer`; they are values.
+Cameras, tags and the snapshot stay on the host; no world coordinate is in a view. `bridge.observe.observer` makes
+observations; they are values.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from bridge.observe.events import Witnessed
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from bridge.frames import Camera, MapFrame
     from bridge.observe.image.picture import Picture
     from bridge.observe.teams import Team
@@ -19,11 +21,11 @@ if TYPE_CHECKING:
     from bridge.task import AgentConfig
     from protocol.messages import TeamView, View
 
-__all__ = ["AgentSight", "Sight", "TeamSight"]
+__all__ = ["AgentObservation", "SideObservation", "TeamObservation"]
 
 
 @dataclass(frozen=True, slots=True)
-class TeamSight:
+class TeamObservation:
     """A team, its camera and its view."""
 
     team: Team
@@ -35,12 +37,12 @@ class TeamSight:
 
 
 @dataclass(frozen=True, slots=True)
-class AgentSight:
+class AgentObservation:
     """What one agent sees; `text` is empty until it is written."""
 
     agent: AgentConfig
     view: View
-    teams: tuple[TeamSight, ...]
+    teams: tuple[TeamObservation, ...]
     idle_teams: tuple[str, ...]
     """Teams that have no unit now."""
     text: str = ""
@@ -49,9 +51,10 @@ class AgentSight:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class SideObservation:
     """What a side sees at one moment: the snapshot and what its agents make of it."""
 
     snapshot: Snapshot
     map: MapFrame
-    agents: dict[str, AgentSight]
+    agents: Mapping[str, AgentObservation]
+    """By name, in the order of the task."""
