@@ -1,0 +1,67 @@
+"""One observation as a value: whatever is asked of it, and whenever, it says what was seen at its moment."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from typing import TYPE_CHECKING, Any
+
+from bridge.observe import Feedback, Observer
+from orchestrator.config import load_task
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from bridge.observe import AgentObservation
+    from bridge.snapshot import Snapshot
+
+    Make = Callable[..., Any]
+    Snap = Callable[..., Snapshot]
+
+PAIR = ["Stalkers", "Zealots"]
+
+
+def moments(unit: Make, snapshot: Snap) -> list[Snapshot]:
+    """Three moments of a fight: somebody is hurt, then somebody dies."""
+    stalker, zealot = unit(1, "Stalker", 10, 16), unit(2, "Zealot", 14, 16)
+    foe, hurt = unit(9, "Zealot", 15, 16, alliance="enemy"), unit(2, "Zealot", 14, 16, health=20)
+    return [
+        snapshot([stalker, zealot, foe], loop=0),
+        snapshot([stalker, hurt, foe], loop=8),
+        snapshot([stalker, hurt], loop=16, dead=frozenset({9})),
+    ]
+
+
+def words(agents: Mapping[str, AgentObservation]) -> dict[str, str]:
+    return {name: agents[name].text for name in PAIR}
+
+
+def test_agents_are_observed_when_they_are_asked_for_and_once(unit: Make, snapshot: Snap) -> None:
+    first, *_ = moments(unit, snapshot)
+    seen = Observer(load_task("2s3z_pair")).observe(first)
+    assert list(seen.agents) == PAIR
+    assert len(seen.agents) == 2
+    assert "Nobody" not in seen.agents
+    assert seen.agents["Zealots"] is seen.agents["Zealots"]
+
+
+def test_the_order_of_asking_and_the_moment_of_asking_change_nothing(unit: Make, snapshot: Snap) -> None:
+    feedback = {"Zealots": Feedback(accepted=("Zealot-1 <Attack_Unit(0x9)>",))}
+    at_once, later = Observer(load_task("2s3z_pair")), Observer(load_task("2s3z_pair"))
+    in_order, kept = [], []
+    for moment in moments(unit, snapshot):
+        in_order.append(words(at_once.observe(moment, feedback).agents))
+        kept.append(later.observe(moment, feedback))
+    assert "0:00" in in_order[0]["Stalkers"]
+    assert len({text for texts in in_order for text in texts.values()}) == 6
+    assert [{name: seen.agents[name].text for name in reversed(PAIR)} for seen in reversed(kept)] == in_order[::-1]
+
+
+def test_an_observer_keeps_no_more_than_its_last_observation(unit: Make, snapshot: Snap) -> None:
+    observer = Observer(load_task("2s3z_pair"))
+    first, second, third = moments(unit, snapshot)
+    oldest = weakref.ref(observer.observe(first).agents["Zealots"].view)
+    observer.observe(second)
+    words(observer.observe(third).agents)
+    gc.collect()
+    assert oldest() is None
