@@ -1,4 +1,4 @@
-"""What `khala agent` and `khala llm` do: put things together and run until they are told to end.
+"""What `khala agent` and `khala llm` do: put things together and run until the run or a signal ends them.
 
 `agents.cli` above has the options; it imports this module only when a command is run, since HTTP clients and servers
 take half a second that `--help` need not wait for.
@@ -54,7 +54,7 @@ def play(
     check_name(side, "side")
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     config = BusConfig(connect=tuple(connect))
-    tallies = _until_told(lambda stop: _play(config, run, side, policies, stop))
+    tallies = _until_signal(lambda stop: _play(config, run, side, policies, stop))
     if as_json:
         typer.echo(json.dumps({"run": run, "agents": {name: _plain(tally) for name, tally in tallies.items()}}))
     else:
@@ -76,7 +76,7 @@ def serve(
     """Serves the scripted model until a signal comes."""
     dice = Faults(parse_faults(faults), seed=seed)
     behaviour = Behaviour(latency_s=latency_s, faults=dice, retry_after_s=retry_after_s, seed=seed)
-    _until_told(lambda stop: _serve(Endpoint(behaviour, host=host, port=port), stop, ready_file, as_json=as_json))
+    _until_signal(lambda stop: _serve(Endpoint(behaviour, host=host, port=port), stop, ready_file, as_json=as_json))
 
 
 # --- agent ------------------------------------------------------------------------------------------
@@ -180,7 +180,7 @@ def _write_whole(path: Path, text: str) -> None:
 # --- both -------------------------------------------------------------------------------------------
 
 
-def _until_told(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
+def _until_signal(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
     """Runs `work` with an event that SIGINT and SIGTERM set; a second signal ends the process at once."""
 
     async def main() -> T:

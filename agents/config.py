@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, JsonValue, field_validator, model_validator
 
@@ -23,9 +23,6 @@ from protocol.configfile import load
 from protocol.errors import ConfigError, WrongKey
 from protocol.keys import check_name
 from protocol.messages import Frozen
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 """The shipped configuration: beside the packages in a checkout and in an installed wheel alike."""
@@ -128,9 +125,7 @@ class WorkerSpec(Frozen):
 class AgentsFile(Frozen):
     """A file that says how each of several agents decides."""
 
-    ELSEWHERE: ClassVar[Mapping[str, str]] = {
-        "default_reply": "belongs in the task file: the host says it for all agents"
-    }
+    ELSEWHERE: ClassVar[dict[str, str]] = {"default_reply": "belongs in the task file: the host says it for all agents"}
 
     agents: dict[str, WorkerSpec] = Field(min_length=1)
     """By name of the agent."""

@@ -169,7 +169,7 @@ class Worker:
 
     async def _hear_run(self, links: Links) -> None:
         async for card in self._read(Run, links.runs):
-            if self._card is not None:  # the host began anew under the same name: its steps count from 0 again
+            if self._card is not None:  # the host began again under the same name: its steps count from 0 again
                 self._newest = self._last_result = None
             self._card = card
             self._end_if_over()

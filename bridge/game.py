@@ -216,7 +216,7 @@ def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str
 
     Args:
         source: `simulator`, `starcraft2` (found by SC2PATH, else where its installer puts it), or a directory.
-        simulator: where the simulator is installed; whoever may know it passes it here.
+        simulator: where the simulator is installed; callers that may know it pass it here.
         environ: where SC2PATH is looked up.
 
     Raises:

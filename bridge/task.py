@@ -236,7 +236,7 @@ class TaskConfig(Frozen):
     frames: Frames = Frames()
     auto: AutoConfig = AutoConfig()
     default_reply: str = ""
-    """What an agent is taken to have said that did not answer in time; empty: its units go on with what they do."""
+    """What an agent is taken to have said that said nothing in time; empty: its units go on with what they do."""
     max_actions: int = Field(default=3, ge=1)
     """Actions that one team may have in one reply."""
     max_steps: int | None = Field(default=None, ge=1)

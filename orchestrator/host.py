@@ -1,7 +1,7 @@
 """One host: a game, a bus and a match between them, put together and taken apart in order.
 
 Above it: the command line. What it is given is open already and stays the giver's to close: the bus, because a
-host may be its own router, and the game, because whoever starts it knows which one it is.
+host may be its own router, and the game, because its caller knows which one it is.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Plays a recorded match again without its agents: they say what they said, and must be shown what they were shown.
 
 The match, the bridge and the game are the real ones; `RecordedTurn` takes the place of the bus. With the same map,
-seed and rules, the observations of the replay equal the recorded ones byte for byte, and every difference is told.
+seed and rules, the observations of the replay equal the recorded ones byte for byte, and every difference is returned.
 """
 
 from __future__ import annotations

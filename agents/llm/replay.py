@@ -2,7 +2,7 @@
 
 A request is looked up by its agent, episode, step and attempt, and its prompt must be the recorded one to the
 letter: what differs is said, for an answer to another question would prove nothing. Nothing is waited for; a
-request that was cut off by the deadline fails at once, so that the agent sends the default reply it sent then.
+request that was cut off by the deadline fails at once, so that the agent falls back as it did then.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The loop is tenacity's; here are the table of statuses, the wait that knows `Retry-After` and the stop that
 knows the deadline. An answer that would come after the deadline is paid for and thrown away, so a wait
-that would end after it is not begun: the error goes up at once and the agent sends its default reply early.
+that would end after it is not begun: the error goes up at once and the agent sends its fallback early.
 """
 
 from __future__ import annotations

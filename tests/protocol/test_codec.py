@@ -112,7 +112,7 @@ def test_half_of_a_surrogate_pair_is_replaced_and_offsets_stay() -> None:
 @pytest.mark.parametrize("read", [decode, lambda payload: decode_as(Reply, payload)], ids=["any kind", "one kind"])
 def test_a_recorded_reply_of_an_early_version_is_read_without_its_calls(read: Callable[[bytes], Wire]) -> None:
     reply = Reply(run="r", agent="A", side="p1", episode=0, step=0, text="<Stop()>", usage=Usage(requests=1))
-    calls = [{"name": "Stop", "args": [], "team": None, "start": 0, "end": 8}]
+    calls: list[dict[str, Any]] = [{"name": "Stop", "args": [], "team": None, "start": 0, "end": 8}]
     assert read(json.dumps(json.loads(encode(reply)) | {"calls": calls}).encode()) == reply
 
 
