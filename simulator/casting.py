@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, prices, supply
+from simulator import commands, payments, prices, supply
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
 from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
-from simulator.skills import SKILLS, SMARTS
+from simulator.skills.registry import SKILLS, SMARTS
 from simulator.skills.skill import touching
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.world import NO_TAG, Mishap
@@ -289,7 +289,7 @@ def perform(world: World, cast: Cast) -> None:
     """Take the cost, begin the cooldown and let the ability take effect."""
     slot, ability = cast.slot, cast.ability
     player = world.players[int(world.owner[slot])]
-    prices.charge(world, player.id, prices.cost_of(ability))
+    payments.charge(world, player.id, prices.cost_of(ability))
     if "free" not in player.cheats:
         world.energy[slot] = max(0.0, float(world.energy[slot]) - ability.energy)
         world.life[slot] -= ability.life

@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any, Final
 
 from simulator.abilities import Ability, ability_from
-from simulator.buffs import Buff, buff_from
+from simulator.buff_kinds import Buff, buff_from
 from simulator.prices import priced
 from simulator.records import (
     Affects,

@@ -47,6 +47,7 @@ class Census:
 
 def census(world: World) -> Census:
     """The census of a world, taken now if something has changed."""
-    if world.census is None:
-        world.census = Census.of(world)
-    return world.census
+    known = world.census
+    if not isinstance(known, Census):
+        known = world.census = Census.of(world)
+    return known

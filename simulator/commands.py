@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import harvesting
+from simulator import harvesting, lifecycle
 from simulator.columns import NOBODY
 from simulator.orders import (
     ATTACK,
@@ -28,6 +28,7 @@ from simulator.orders import (
 )
 from simulator.players import GameResult
 from simulator.targets import disengage, engage, weapon_for
+from simulator.traits import refresh
 from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ def debug_kill(world: World, tags: Iterable[int]) -> None:
 def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:
     """Create complete units exactly at a point, all on each other; returns their slots."""
     unit = world.catalog.unit(type_id)
-    return [world.spawn(unit, owner, point) for _ in range(quantity)]
+    return [lifecycle.spawn(world, unit, owner, point) for _ in range(quantity)]
 
 
 def debug_set_value(world: World, tag: int, *, life: float | None = None, shields: float | None = None,
@@ -189,7 +190,7 @@ def debug_switch(world: World, player: int, name: str) -> None:
     else:
         cheats.append(name)
     for slot in world.units_of(player).tolist():
-        world.refresh(slot)
+        refresh(world, slot)
 
 
 def debug_upgrade(world: World, player: int) -> None:
@@ -208,7 +209,7 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
         world.stats.apply(player, owned)
         for slot in np.flatnonzero(world.alive & (world.owner == player)).tolist():
             before = float(world.life_max[slot])
-            world.refresh(slot)
+            refresh(world, slot)
             world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
 
 
@@ -337,13 +338,13 @@ def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> Non
     elif not harvesting.head_for_hall(world, slot):
         begin(world, slot, None)
         return
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def _end_harvest(world: World, slot: int) -> None:
     harvesting.leave(world, slot)
     world.harvest[slot] = harvesting.Phase.NONE
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def begin_next(world: World, slot: int) -> None:

@@ -7,12 +7,6 @@ API tells of it (``effect``, the places, the radius) is in the value, what it do
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-from simulator.columns import NOBODY
-
-if TYPE_CHECKING:
-    from simulator.world import World
 
 Point = tuple[float, float]
 
@@ -60,8 +54,3 @@ class Field:
     def at(self) -> Point:
         """Its middle."""
         return self.points[0]
-
-
-def source_slot(world: World, item: Field) -> int:
-    """The slot of the unit that made a field, or NOBODY when it is gone."""
-    return world.slot_of(item.source) if item.source else NOBODY

@@ -13,9 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from simulator.census import Census
     from simulator.columns import Bools, Ints
-    from simulator.contacts import Bodies
 
 
 class Remembered:
@@ -25,8 +23,8 @@ class Remembered:
         self.population = 0  # counts births and deaths, for what is worth remembering between them
         self.looked_at = -1  # the population that ``visible`` was written for
         self.settled = -1  # the population among which no body touched another when all last stood still
-        self.bodies: Bodies | None = None  # of this population
-        self.census: Census | None = None  # of this population
+        self.bodies: object | None = None  # of this population, for ``contacts``
+        self.census: object | None = None  # of this population, for ``census``
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``needs``
         self.tallied = -1  # the loop in which that was counted
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy

@@ -14,7 +14,7 @@ from docs.pages.markdown import code, codes, head, join, table
 from simulator import stats
 from simulator.casting import ORDINARY, is_modelled
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
-from simulator.skills import DEATHS, PASSIVES, SKILLS
+from simulator.skills.registry import DEATHS, PASSIVES, SKILLS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import error_pb2, query_pb2
 
-from simulator import sites
+from simulator import pathing, sites
 from simulator.api.abilities import result_of, usable
+from simulator.layers import Layer
 from simulator.skills import warpgate
-from simulator.traits import Layer
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
         return 0.0
     if flying:
         return math.dist(start, end)
-    return world.ground.surface(Layer.WALK).distance(np.array(start), np.array(end))
+    return pathing.surface(world.ground, Layer.WALK).distance(np.array(start), np.array(end))
 
 
 def _on_map(world: World, x: float, y: float) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands
+from simulator import commands, lifecycle
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
@@ -67,7 +67,7 @@ def _lands(world: World, item: Field) -> None:
 def hatch(world: World, owner: int, point: Point, count: int) -> list[int]:
     """Let broodlings come into the world around a point, for a few seconds."""
     unit = world.catalog.unit(BROODLING)
-    slots = [world.spawn(unit, owner, place) for place in free_places(world, unit, point, count)]
+    slots = [lifecycle.spawn(world, unit, owner, place) for place in free_places(world, unit, point, count)]
     for slot in slots:
         chance = MECHANICS.broodling_random_loops * world.rng.random()
         teleport.live_until(world, slot, world.loop + world.catalog.buff(LIFE).loops + chance)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, construction, prices, production, sites
+from simulator import commands, construction, payments, prices, production, sites
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
@@ -91,7 +91,7 @@ def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Poi
     if unit is None or point is None:
         return []
     owner = int(world.owner[slots[0]])
-    paid = prices.charge(world, owner, prices.cost_of(ability))
+    paid = payments.charge(world, owner, prices.cost_of(ability))
     construction.begin(world, unit, owner, sites.centre(world, unit, point), loops=ability.loops, paid=paid)
     world.timers.setdefault(slots[0], {})[ability.timer] = world.loop + ability.cooldown_loops
     return slots[:1]

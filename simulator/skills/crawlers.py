@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import sites
+from simulator import lifecycle, sites
 from simulator.refusal import Refusal
-from simulator.skills import room, teleport
+from simulator.skills import teleport
+from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill, place_of
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ def _root(world: World, cast: Cast) -> None:
         return
     unit = world.catalog.unit(cast.ability.unit)
     teleport.to(world, cast.slot, sites.centre(world, unit, place_of(world, cast)))
-    world.become(cast.slot, unit)
-    room.make(world, cast.slot)
+    lifecycle.become(world, cast.slot, unit)
+    push_units_off(world, cast.slot)
 
 
 def _room(world: World, cast: Cast) -> Refusal:

@@ -13,7 +13,7 @@ from simulator import buffs
 from simulator.columns import NOBODY
 from simulator.damage import wound
 from simulator.fields import Field
-from simulator.skills import flight
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, distance, number
 from simulator.stats import ATTRIBUTES
 
@@ -84,7 +84,7 @@ def _shoot(world: World, ability: Ability, slot: int, target: int) -> None:
     owner = int(world.owner[slot])
     weapon = next(w for w in world.unit_type(slot).weapons if w.id == ability.numbers["weapon"])
     if number(ability, "damage_per_tick", 0.0):
-        flight.launch_at(world, ability, slot, target, weapon.hits[0].missile_speed_n or 0.0)
+        projectiles.launch_at(world, ability, slot, target, weapon.hits[0].missile_speed_n or 0.0)
     else:
         world.pending.append(
             1,
@@ -112,7 +112,7 @@ def _hit(world: World, missile: Field, target: int) -> None:
 
 def _release(world: World, lock: Field, ability: Ability) -> None:
     """End a lock; the Cyclone fights as usual again, and the next lock has to wait."""
-    flight.end(world, lock)
+    projectiles.end(world, lock)
     slot, target = world.slot_of(lock.source), world.slot_of(lock.target)
     if slot != NOBODY:
         buffs.remove(world, slot, LOCKING)
@@ -142,4 +142,4 @@ SKILLS: Final = {
 }
 FIELDS: Final[dict[str, FieldRule]] = {"lock_on": _track}
 
-flight.ARRIVALS["lock_on"] = _hit
+projectiles.ARRIVALS["lock_on"] = _hit

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number, place_of
@@ -120,7 +120,9 @@ def _phase_shift(world: World, cast: Cast) -> None:
     slot = cast.slot
     x, y = world.pos[slot].tolist()
     lasts = number(cast, "duration_loops")
-    shade = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
+    shade = lifecycle.spawn(
+        world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y)
+    )
     world.heading[shade] = world.heading[slot]
     world.life[shade], world.shields[shade] = world.life[slot], world.shields[slot]
     buffs.apply(world, slot, SHIFTING, source=slot)
@@ -143,7 +145,7 @@ def _phase_shift(world: World, cast: Cast) -> None:
 
 def _shift(world: World, field: Field) -> None:
     """Send the Adept to its shade when the time has come; let the shade go when the Adept is dead or has given up."""
-    adept, shade = source_slot(world, field), world.slot_of(field.target)
+    adept, shade = world.slot_of(field.source), world.slot_of(field.target)
     held = adept != NOBODY and buffs.has(world, adept, SHIFTING) and world.carrier[adept] == NOBODY
     if shade == NOBODY or not held:
         field.end = world.loop
@@ -172,7 +174,7 @@ def _cancel_shift(world: World, cast: Cast) -> None:
     tag = world.tag_of(cast.slot)
     for field in world.fields:
         if field.does == "phase_shift" and tag in (field.source, field.target):
-            adept = source_slot(world, field)
+            adept = world.slot_of(field.source)
             if adept != NOBODY:
                 buffs.remove(world, adept, SHIFTING)
 

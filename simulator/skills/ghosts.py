@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.skills import flight
-from simulator.skills.drops import dropping
+from simulator.skills import projectiles
+from simulator.skills.cancel import cancelling
 from simulator.skills.skill import Skill, around, distance, number
 from simulator.targets import disengage
 
@@ -69,12 +68,12 @@ def _lower_aim(world: World, cast: Cast) -> None:
 
 def _fire_emp(world: World, cast: Cast) -> None:
     """Send a round that takes shields and energy from all around its point, and uncovers who is cloaked."""
-    flight.launch(world, cast, MECHANICS.emp_speed_n)
+    projectiles.launch(world, cast, MECHANICS.emp_speed_n)
 
 
 def _burst(world: World, missile: Field, _: int) -> None:
     """Take shields and energy from everybody around, friends as well, and uncover who is cloaked."""
-    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):
         wound(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
         world.energy[slot] = max(float(world.energy[slot]) - number(ability, "energy_removed"), 0.0)
@@ -111,11 +110,11 @@ SKILLS: Final = {
         end=_lower_aim,
         estimates=("The distance at which a snipe's target has got away is measured from centre to centre.",),
     ),
-    "cancel_channel_snipe": dropping("channel_snipe"),
+    "cancel_channel_snipe": cancelling("channel_snipe"),
     "emp": Skill(_fire_emp, estimates=("The EMP round's speed.",)),
     "ghost_hold_fire": Skill(_hold_fire),
     "ghost_weapons_free": Skill(_free_weapons),
 }
 TICKS: Final[dict[str, BuffRule]] = {"GhostHoldFireB": _fire_when_told}
 
-flight.ARRIVALS["emp"] = _burst
+projectiles.ARRIVALS["emp"] = _burst

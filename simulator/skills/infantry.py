@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, lifecycle, pathing
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
 from simulator.skills.basics import on_self
 from simulator.skills.skill import Skill, around, lay, number, place_of
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,13 +69,13 @@ def _throw_charge(world: World, cast: Cast) -> None:
     """Lay a charge that goes off after its fuse, hurts all on the ground around it and throws them outwards."""
     point, fuse = place_of(world, cast), number(cast, "fuse_loops")
     owner = int(world.owner[cast.slot])
-    charge = world.spawn(world.catalog.unit("KD8Charge"), owner, point)
+    charge = lifecycle.spawn(world, world.catalog.unit("KD8Charge"), owner, point)
     lay(world, cast, "kd8_charge", end=world.loop + fuse, due=world.loop + fuse).target = world.tag_of(charge)
 
 
 def _explode(world: World, charge: Field) -> None:
     """Hurt everybody on the ground around a charge, friends as well, and throw them outwards."""
-    ability, source = world.catalog.ability(charge.ability), source_slot(world, charge)
+    ability, source = world.catalog.ability(charge.ability), world.slot_of(charge.source)
     body = world.slot_of(charge.target)
     for slot in around(world, charge.at, charge.radius, plane="ground"):
         if world.unit_type(slot).name not in UNTOUCHED:
@@ -121,7 +121,7 @@ def _fly_back(world: World, item: Field) -> None:
         return
     x, y = world.pos[slot].tolist()
     goal = x + item.memory["dx"], y + item.memory["dy"]
-    surface = world.ground.surface(Layer(int(world.layer[slot])))
+    surface = pathing.surface(world.ground, Layer(int(world.layer[slot])))
     there = world.pos[slot] * 0.0 + goal
     if not surface.flat[surface.cell(there[None])][0]:
         item.end = world.loop

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.orders import OrderKind
 from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
+from simulator.skills.projectiles import SPEED_UNKNOWN, throw
 from simulator.skills.skill import Skill, around, foes, gap, lay, number
-from simulator.skills.throws import SPEED_UNKNOWN, throw
 from simulator.targets import disengage
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def _fungal(world: World, cast: Cast) -> None:
 
 
 def _grows_over(world: World, item: Field) -> None:
-    source = source_slot(world, item)
+    source = world.slot_of(item.source)
     for slot in foes(world, around(world, item.at, item.radius, structures=False), item.owner):
         for name in ("FungalGrowth", "FungalGrowthSlowMovement"):
             buffs.apply(world, slot, name, source=source, owner=item.owner)
@@ -67,7 +67,7 @@ def _can_reach(world: World, cast: Cast) -> Refusal:
 
 
 def _arrives(world: World, item: Field) -> None:
-    slot, target = source_slot(world, item), world.slot_of(item.target)
+    slot, target = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (slot, target) or not world.channels[slot] or world.order_target[slot] != target:
         return
     kind, was = world.catalog.buff(NEURAL), int(world.owner[target])
@@ -109,7 +109,7 @@ def _time_is_up(world: World, slot: int, row: np.void) -> None:
 
 def _hand_over(world: World, slot: int, owner: int) -> None:
     """Give a unit to a player: it forgets its orders, and its new friends leave it alone."""
-    world.give(slot, owner)
+    lifecycle.give(world, slot, owner)
     world.queue[slot] = []
     commands.begin(world, slot, None)
     for other in world.units_of(owner).tolist():
@@ -143,7 +143,7 @@ def _egg_lands(world: World, item: Field) -> None:
     ability = world.catalog.ability(item.ability)
     egg = world.catalog.unit(str(ability.numbers["egg"]))
     (place,) = free_places(world, egg, item.at, 1)
-    slot = world.spawn(egg, item.owner, place)
+    slot = lifecycle.spawn(world, egg, item.owner, place)
     hatch = next(a for a in world.catalog.abilities_of(egg.row) if a.unit == "InfestorTerran")
     due = world.loop + hatch.loops
     world.fields.append(
@@ -155,7 +155,7 @@ def _egg_lands(world: World, item: Field) -> None:
 def _hatches(world: World, item: Field) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY:
-        world.become(slot, world.catalog.unit("InfestorTerran"))
+        lifecycle.become(world, slot, world.catalog.unit("InfestorTerran"))
         world.life[slot] = world.life_max[slot]
         teleport.live_until(world, slot, world.loop + number(world.catalog.ability(item.ability), "life_loops"))
 
@@ -172,7 +172,7 @@ def _shroud(world: World, cast: Cast) -> None:
 def _shrouds(world: World, item: Field) -> None:
     for slot in around(world, item.at, item.radius, plane="ground", structures=False):
         if world.owner[slot]:
-            buffs.apply(world, slot, SHROUD, source=source_slot(world, item), owner=item.owner)
+            buffs.apply(world, slot, SHROUD, source=world.slot_of(item.source), owner=item.owner)
 
 
 SKILLS: Final = {

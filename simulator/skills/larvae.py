@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs
+from simulator import buffs, lifecycle
 from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.mechanics import MECHANICS
@@ -52,7 +52,7 @@ def hatch(world: World, hall: int, count: int = 1) -> None:
     x, y = world.pos[hall].tolist()
     for index in range(there, min(there + count, MECHANICS.larva_limit)):
         dx, dy = RING[index % len(RING)]
-        larva = world.spawn(world.catalog.units[_larva(world)], int(world.owner[hall]), (x + dx, y + dy))
+        larva = lifecycle.spawn(world, world.catalog.units[_larva(world)], int(world.owner[hall]), (x + dx, y + dy))
         world.home[larva] = hall
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands
-from simulator.buffs import FOREVER
+from simulator.active_buffs import FOREVER
 from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.orders import Order, OrderKind
-from simulator.skills import flight
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, distance, number
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _guard(world: World, zone: Field) -> None:
     """Let the zone work when it is set up, and end it when its ship is gone, or too far away."""
     slot = world.slot_of(zone.source)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
-        flight.end(world, zone)
+        projectiles.end(world, zone)
         return
     leash = number(world.catalog.ability(zone.ability), "leash_range") + _more_range(world, zone)
     if distance(world, slot, zone.at) > leash:
@@ -84,7 +84,7 @@ def _leave(world: World, slot: int) -> None:
     world.zone_radius[slot] = 0.0
     for zone in world.fields:
         if zone.does == "liberator_zone" and zone.source == world.tag_of(slot):
-            flight.end(world, zone)
+            projectiles.end(world, zone)
             zone.effect = 0
 
 

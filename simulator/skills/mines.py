@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs, commands
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
-from simulator.skills import flight
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
@@ -41,12 +40,12 @@ def _no_larva(world: World, cast: Cast) -> Refusal:
 
 def _fire(world: World, cast: Cast) -> None:
     """Send a missile that hurts its target much and all around it, friends as well, a little."""
-    flight.launch(world, cast, MECHANICS.mine_missile_speed_n)
+    projectiles.launch(world, cast, MECHANICS.mine_missile_speed_n)
 
 
 def _explode(world: World, missile: Field, target: int) -> None:
     """Hurt the target, and whoever is around it, friends as well, but no structure and no mine of the owner's."""
-    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     owner = missile.owner
     wound(world, source, owner, target, number(ability, "damage"), shield_bonus=number(ability, "bonus_vs_shields"))
     amount, more = number(ability, "splash_damage"), number(ability, "splash_bonus_vs_shields")
@@ -98,4 +97,4 @@ SKILLS: Final = {
 }
 PASSIVES: Final[dict[str, UnitRule]] = {BURROWED: _keep_watch, "WidowMine": _climb_out}
 
-flight.ARRIVALS["widow_mine_attack"] = _explode
+projectiles.ARRIVALS["widow_mine_attack"] = _explode

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, friends, lay, number, place_of
@@ -63,7 +63,7 @@ def _recall(world: World, cast: Cast) -> None:
 
 def _bring(world: World, field: Field) -> None:
     """Take the marked units along at the end; without the caster they stay and are free."""
-    caster = source_slot(world, field)
+    caster = world.slot_of(field.source)
     lost = caster == NOBODY or buffs.has(world, caster, SCRAMBLED)
     if not lost and world.loop < field.end:
         return
@@ -78,7 +78,7 @@ def _bring(world: World, field: Field) -> None:
 def _marked(world: World, name: str, field: Field) -> list[int]:
     rows = world.buffs.rows
     mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == field.begun)
-    mine &= (rows["source"] == source_slot(world, field)) | (rows["source"] == NOBODY)
+    mine &= (rows["source"] == world.slot_of(field.source)) | (rows["source"] == NOBODY)
     slots: list[int] = rows["slot"][mine].tolist()
     return slots
 
@@ -112,7 +112,7 @@ def _slow(world: World, field: Field) -> None:
     field.effect = WARP_EFFECT
     plane = str(world.catalog.ability(field.ability).numbers["plane"])
     for slot in foes(world, around(world, field.at, field.radius, plane=plane), field.owner):
-        buffs.apply(world, slot, WARPED, source=source_slot(world, field), owner=field.owner)
+        buffs.apply(world, slot, WARPED, source=world.slot_of(field.source), owner=field.owner)
 
 
 # the cloaking field ---------------------------------------------------------------------------------------------------

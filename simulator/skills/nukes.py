@@ -12,8 +12,8 @@ import numpy as np
 
 from simulator.casts import Cast
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
-from simulator.skills.drops import dropping
+from simulator.fields import Field
+from simulator.skills.cancel import cancelling
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _paint(world: World, cast: Cast) -> bool:
 def _fall(world: World, strike: Field) -> None:
     """Wait for the missile while the Ghost paints, then for the explosion."""
     if world.loop < strike.memory["down"]:
-        painter = world.channelling.get(source_slot(world, strike))
+        painter = world.channelling.get(world.slot_of(strike.source))
         if not (isinstance(painter, Cast) and painter.ability.id == strike.ability and painter.begun == strike.begun):
             strike.end = world.loop
     elif world.loop == strike.memory["down"]:
@@ -69,7 +69,7 @@ def _fall(world: World, strike: Field) -> None:
 
 def _detonate(world: World, strike: Field) -> None:
     """Hurt everything around by the ring it is in, friend and foe, on the ground and in the air."""
-    ability, source = world.catalog.ability(strike.ability), source_slot(world, strike)
+    ability, source = world.catalog.ability(strike.ability), world.slot_of(strike.source)
     struck: set[int] = set()
     for ring in ability.numbers["area"]:
         for slot in around(world, strike.at, ring["radius"]):
@@ -90,5 +90,5 @@ def _detonate(world: World, strike: Field) -> None:
     world.fields.append(afterglow)
 
 
-SKILLS: Final = {"tac_nuke_strike": Skill(_call, hold=_paint), "cancel_tac_nuke_strike": dropping("tac_nuke_strike")}
+SKILLS: Final = {"tac_nuke_strike": Skill(_call, hold=_paint), "cancel_tac_nuke_strike": cancelling("tac_nuke_strike")}
 FIELDS: Final[dict[str, FieldRule]] = {"nuke": _fall}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.placement import free_places
@@ -83,7 +83,7 @@ def _call_mule(world: World, cast: Cast) -> None:
 def _land_mule(world: World, item: Field) -> None:
     ability = world.catalog.ability(item.ability)
     unit = world.catalog.unit(str(ability.numbers["unit"]))
-    mule = world.spawn(unit, item.owner, free_places(world, unit, item.at, 1)[0])
+    mule = lifecycle.spawn(world, unit, item.owner, free_places(world, unit, item.at, 1)[0])
     lasts = number(ability, "duration_loops") + world.rng.random() * number(ability, "duration_random_loops")
     teleport.live_until(world, mule, world.loop + lasts)
     if world.slot_of(item.target) != NOBODY and item.target:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, lifecycle
 from simulator.columns import NOBODY
 from simulator.commands import is_enemy
 from simulator.creep import GENERATING
@@ -67,7 +67,7 @@ def _disguise(world: World, slots: list[int]) -> None:
         if (world.loop - int(world.born_loop[slot])) % period == 0:
             enemy = _enemy_near(world, slot)
             if enemy != NOBODY:
-                world.become(slot, world.catalog.unit(_looks(world, enemy)))
+                lifecycle.become(world, slot, world.catalog.unit(_looks(world, enemy)))
                 world.life[slot], world.shields[slot] = world.life_max[slot], world.shields_max[slot]
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import production
+from simulator import lifecycle, production
 from simulator.refusal import Refusal
-from simulator.skills import growth
+from simulator.skills import morphs
 from simulator.skills.skill import Skill
 from simulator.world import NO_TAG, NOBODY, Rally
 
@@ -32,7 +32,7 @@ def _train(world: World, slots: list[int], ability: Ability, _: int, __: Point |
     """Put a unit into the queue of a structure, or into an egg."""
     slot = min(slots, key=lambda s: (_length(world, s), s))
     if world.unit_type(slot).name in COCOONS:
-        world.become(slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
+        lifecycle.become(world, slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
         world.life[slot] = world.life_max[slot]
     production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
     return [slot]
@@ -72,9 +72,9 @@ def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
 
 def cancel_last(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
     """Call off the last job of a queue; an egg becomes a larva again, and a cocoon what it was."""
-    growing = [slot for slot in slots if growth.grows(world, slot)]
+    growing = [slot for slot in slots if morphs.grows(world, slot)]
     for slot in growing:
-        growth.call_off(world, slot)
+        morphs.call_off(world, slot)
     taken = [slot for slot in slots if production.call_off(world, slot)]
     for slot in taken:
         _hatch_back(world, slot)
@@ -91,13 +91,13 @@ def cancel_at(world: World, slot: int, index: int) -> bool:
 
 def _hatch_back(world: World, slot: int) -> None:
     if world.unit_type(slot).name in COCOONS.values() and slot not in world.jobs:
-        world.become(slot, world.catalog.unit("Larva"))
+        lifecycle.become(world, slot, world.catalog.unit("Larva"))
         world.life[slot] = world.life_max[slot]
 
 
 def has_job(world: World, slot: int, _: Ability) -> Refusal:
     """Whether there is anything to call off."""
-    found = slot in world.jobs or growth.grows(world, slot)
+    found = slot in world.jobs or morphs.grows(world, slot)
     return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
 
 

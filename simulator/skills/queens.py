@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, construction, sites
+from simulator import buffs, commands, construction, lifecycle, sites
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, number, place_of
@@ -73,7 +73,7 @@ def _burrow_when_grown(world: World, slots: list[int]) -> None:
 def _burrow_tumor(world: World, cast: Cast) -> None:
     """Go under the ground, and be able to plant another tumor after a while."""
     slot = cast.slot
-    world.become(slot, world.catalog.unit(cast.ability.unit))
+    lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
     plant = world.catalog.ability(PLANT)
     world.timers.setdefault(slot, {})[plant.timer] = world.loop + number(plant, "first_use_after_loops")
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.skills.skill import Skill, around, number, place_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def _nova(world: World, cast: Cast) -> None:
     """Send out a ball that can be steered and bursts when its time is over."""
     slot, lasts = cast.slot, number(cast, "duration_loops")
     x, y = world.pos[slot].tolist()
-    nova = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
+    nova = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
     world.heading[nova] = world.heading[slot]
     buffs.apply(world, slot, NOVA_CASTER, source=slot)
     buffs.apply(world, nova, NOVA, source=slot)
@@ -63,7 +63,7 @@ def _nova(world: World, cast: Cast) -> None:
 
 def _burn(world: World, field: Field) -> None:
     """Burst at the end; go out without harm when the Disruptor dies, is carried, or is out of its owner's hands."""
-    disruptor, nova = source_slot(world, field), world.slot_of(field.target)
+    disruptor, nova = world.slot_of(field.source), world.slot_of(field.target)
     held = (
         NOBODY not in (nova, disruptor)
         and world.carrier[disruptor] == NOBODY

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, placement, targets
+from simulator import buffs, commands, lifecycle, placement, targets
 from simulator.columns import NOBODY
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,7 +60,7 @@ def _unearth(world: World, slot: int) -> None:
     unit = world.unit_type(slot)
     above = unit.name.replace("Burrowed", "")
     if unit.burrowed and above in world.catalog.row_of_name:
-        world.become(slot, world.catalog.unit(above))
+        lifecycle.become(world, slot, world.catalog.unit(above))
 
 
 def _keep_lifted(world: World, cast: Cast) -> bool:
@@ -152,9 +153,11 @@ def _reveal(world: World, cast: Cast) -> None:
 def _set_trap(world: World, cast: Cast) -> None:
     """Begin a trap, which finishes itself; its energy is paid now."""
     point = _trap_place(world, cast)
-    trap = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[cast.slot]), point)
+    trap = lifecycle.spawn(
+        world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[cast.slot]), point
+    )
     world.build_progress[trap] = 0.0
-    world.refresh(trap)
+    refresh(world, trap)
     end = world.loop + cast.ability.loops
     world.fields.append(
         Field("trap_forms", int(world.owner[trap]), [point], 0.0, world.loop, end, due=end, source=world.tag_of(trap))
@@ -175,12 +178,12 @@ def _cant_set_trap(world: World, cast: Cast) -> Refusal:
 
 
 def _trap_done(world: World, field: Field) -> None:
-    trap = source_slot(world, field)
+    trap = world.slot_of(field.source)
     if trap != NOBODY:
         world.build_progress[trap] = 1.0
         buffs.apply(world, trap, TRAP_LIFE)
         teleport.live_until(world, trap, world.loop + world.catalog.buff(TRAP_LIFE).loops)
-        world.refresh(trap)
+        refresh(world, trap)
 
 
 def _intruder(world: World, slot: int, ability: Ability) -> int:
@@ -222,7 +225,7 @@ def _spring(world: World, cast: Cast) -> None:
 
 
 def _catch(world: World, field: Field) -> None:
-    trap = source_slot(world, field)
+    trap = world.slot_of(field.source)
     if trap == NOBODY:
         return
     near = around(world, field.at, field.radius, plane="ground", structures=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
@@ -67,7 +67,7 @@ def _come_down(world: World, slot: int, point: Point) -> None:
     """Become a locust on the ground that is on its way to a free place there."""
     ground = world.catalog.unit(HATCHED)
     (place,) = free_places(world, ground, point, 1)
-    world.become(slot, ground)
+    lifecycle.become(world, slot, ground)
     buffs.apply(world, slot, SWOOPING, source=slot)
     lasts = world.catalog.buff(SWOOPING).loops
     world.fields.append(
@@ -92,7 +92,7 @@ def _glides(world: World, item: Field) -> None:
 
 def _land(world: World, cast: Cast) -> None:
     """Stand on the ground from now on."""
-    world.become(cast.slot, world.catalog.unit(cast.ability.unit))
+    lifecycle.become(world, cast.slot, world.catalog.unit(cast.ability.unit))
 
 
 LAUNCHERS["LocustMPFlyingSwoopWeapon"] = _swoop_on

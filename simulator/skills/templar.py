@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.arrays import which
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, around, lay, number
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -45,7 +46,7 @@ def _psi_storm(world: World, cast: Cast) -> None:
 
 def _search(world: World, field: Field) -> None:
     """Find whom the storm touches, friends too: who is new to it takes damage at once."""
-    source = source_slot(world, field)
+    source = world.slot_of(field.source)
     for slot in around(world, field.at, field.radius, structures=False):
         fresh = not buffs.has(world, slot, STORM_BUFF)
         buffs.apply(world, slot, STORM_BUFF, source=source, owner=field.owner)
@@ -97,11 +98,11 @@ def _fuse(world: World, cast: Cast) -> None:
     """Become an Archon with another Templar, beside it; it takes its time to form."""
     one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
     x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
-    archon = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
+    archon = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
     world.remove(one)
     world.remove(other)
     world.build_progress[archon] = 0.0
-    world.refresh(archon)
+    refresh(world, archon)
     end = world.loop + cast.ability.loops
     world.fields.append(
         Field("archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon))
@@ -109,13 +110,13 @@ def _fuse(world: World, cast: Cast) -> None:
 
 
 def _form(world: World, field: Field) -> None:
-    archon = source_slot(world, field)
+    archon = world.slot_of(field.source)
     if archon == NOBODY:
         field.end = world.loop
         return
     world.build_progress[archon] = min((world.loop - field.begun) / (field.end - field.begun), 1.0)
     if world.build_progress[archon] >= 1.0:
-        world.refresh(archon)
+        refresh(world, archon)
         world.orders_changed = world.scan_now = True
 
 

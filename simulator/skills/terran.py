@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.damage import IMPACTS
 from simulator.skills import (
+    battlecruiser,
     buildings,
     cloaks,
     cyclone,
-    flight,
     ghosts,
     infantry,
     landing,
@@ -18,9 +18,9 @@ from simulator.skills import (
     mines,
     nukes,
     orbital,
+    projectiles,
     ravens,
     repair,
-    starships,
 )
 
 if TYPE_CHECKING:
@@ -43,11 +43,11 @@ SKILLS: Final[dict[str, Skill]] = {
     **orbital.SKILLS,
     **ravens.SKILLS,
     **repair.SKILLS,
-    **starships.SKILLS,
+    **battlecruiser.SKILLS,
 }
 FIELDS: Final[dict[str, FieldRule]] = {
     **cyclone.FIELDS,
-    **flight.FIELDS,
+    **projectiles.FIELDS,
     **infantry.FIELDS,
     **liberators.FIELDS,
     **nukes.FIELDS,

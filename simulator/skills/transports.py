@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, commands, placement
+from simulator import commands, placement
 from simulator.arrays import which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
@@ -24,6 +24,7 @@ from simulator.orders import Order, OrderKind
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap
+from simulator.traits import kinds_on, refresh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,7 +74,7 @@ def cant_carry(world: World, carrier: int, passenger: int) -> Refusal:
     unit, vessel = world.unit_type(passenger), world.unit_type(carrier)
     if world.owner[passenger] != world.owner[carrier]:
         return Refusal.CANT_LOAD_OTHER_PLAYERS_UNITS
-    bound = any("no_passenger" in kind.flags for kind in buffs.kinds_on(world, passenger))
+    bound = any("no_passenger" in kind.flags for kind in kinds_on(world, passenger))
     alien = vessel.name in WORKERS_ONLY and not unit.worker
     alien |= vessel.name == "Bunker" and "biological" not in unit.attributes
     if not unit.cargo_size or unit.cargo_size > vessel.cargo_max_size or bound or alien or passenger == carrier:
@@ -99,7 +100,7 @@ def take_in(world: World, carrier: int, passenger: int) -> None:
     world.stow(passenger, carrier)
     x, y = world.pos[carrier].tolist()
     teleport.to(world, passenger, (x, y))
-    world.refresh(passenger)
+    refresh(world, passenger)
     if world.unit_type(carrier).name == "Bunker":
         world.holds[passenger] = world.looks_around[passenger] = True
     world.timers.get(carrier, {}).pop(UNLOADING, None)
@@ -195,7 +196,7 @@ def unload_one(world: World, carrier: int, passenger: int) -> bool:
     px, py = places[0].tolist()
     world.unstow(passenger, (px, py))
     teleport.to(world, passenger, (px, py))
-    world.refresh(passenger)
+    refresh(world, passenger)
     commands.begin(world, passenger, None)
     return True
 

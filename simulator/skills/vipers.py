@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.fields import Field
 from simulator.placement import free_places
 from simulator.refusal import Refusal
 from simulator.skills import teleport
+from simulator.skills.projectiles import SPEED_UNKNOWN, flight_loops, throw
 from simulator.skills.skill import Skill, around, foes, lay, number
-from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,7 +42,7 @@ def _cloud(world: World, cast: Cast) -> None:
 
 
 def _blinds(world: World, item: Field) -> None:
-    source = source_slot(world, item)
+    source = world.slot_of(item.source)
     for slot in around(world, item.at, item.radius, plane="ground"):
         if world.owner[slot]:
             name = "BlindingCloudStructure" if world.unit_type(slot).structure else "BlindingCloud"
@@ -64,13 +64,13 @@ def _can_pull(world: World, cast: Cast) -> Refusal:
 
 def _caught(world: World, item: Field) -> None:
     """The tentacle has its victim: that drops everything, comes out of the ground and is on its way."""
-    viper, slot = source_slot(world, item), world.slot_of(item.target)
+    viper, slot = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (viper, slot):
         return
     unit = world.unit_type(slot)
     standing = world.catalog.row_of_id.get(unit.unit_alias)
     if standing is not None and (unit.burrowed or unit.speed_n <= 0.0):
-        world.become(slot, world.catalog.units[standing])
+        lifecycle.become(world, slot, world.catalog.units[standing])
     world.queue[slot] = []
     commands.begin(world, slot, None)
     x, y = world.pos[viper].tolist()
@@ -111,7 +111,7 @@ def _infects(world: World, item: Field) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY and not buffs.has(world, slot, BOMB):
         lasts = world.catalog.buff(BOMB).loops + world.catalog.buff(DELAY).loops
-        buffs.apply(world, slot, BOMB, source=source_slot(world, item), owner=item.owner, loops=lasts)
+        buffs.apply(world, slot, BOMB, source=world.slot_of(item.source), owner=item.owner, loops=lasts)
 
 
 def _spreads(world: World, slot: int, row: np.void) -> None:
@@ -136,7 +136,7 @@ def _lingers(world: World, slot: int, row: np.void) -> None:
     if left <= 0.0:
         return
     x, y = world.pos[slot].tolist()
-    cloud = world.spawn(world.catalog.unit(BOMB_UNIT), int(row["owner"]), (x, y))
+    cloud = lifecycle.spawn(world, world.catalog.unit(BOMB_UNIT), int(row["owner"]), (x, y))
     buffs.apply(world, cloud, AFTER_BOMB, source=int(row["source"]), owner=int(row["owner"]), loops=left)
     teleport.live_until(world, cloud, world.loop + left + 1)
 

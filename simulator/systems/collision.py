@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import geometry, pathing
 from simulator.arrays import some, which
 from simulator.census import census
 from simulator.columns import NOBODY
-from simulator.contacts import OVERLAP_ALLOWED, Bodies, Pairs
+from simulator.contacts import OVERLAP_ALLOWED, Pairs, bodies_of
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
 from simulator.systems import avoidance
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.columns import Bools, Ints
@@ -62,16 +62,15 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
     Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
     that a crowd does not press itself together.
     """
-    if world.bodies is None:
-        world.bodies = Bodies.of(world)
-    found = world.bodies.near(after)
+    bodies = bodies_of(world)
+    found = bodies.near(after)
     if found is None:
         return False
     _part(after, found)
     start = after.copy()
     drifting = False
-    if world.bodies.any_flying:
-        flying = world.bodies.flying
+    if bodies.any_flying:
+        flying = bodies.flying
         soft = flying.take(found.one) | flying.take(found.other)
         drifting = _drift_apart(world, slots, after, _only(found, soft))
         found = _only(found, ~soft)
@@ -204,7 +203,7 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
             mine = _moved(mine, before, after)
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
-        surface = world.ground.surface(layer)
+        surface = pathing.surface(world.ground, layer)
         free = surface.open.take(surface.cell(after.take(mine, 0)))
         if np.count_nonzero(free) < len(free):
             near = _moved(mine[~free], before, after)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.skills import FIELDS
+from simulator.skills.registry import FIELDS
 
 if TYPE_CHECKING:
     from simulator.world import World

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.skills import PASSIVES
+from simulator.skills.registry import PASSIVES
 
 if TYPE_CHECKING:
     from simulator.world import World

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator import geometry
+from simulator.fog import remember
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
-from simulator.snapshots import remember
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting, commands
+from simulator import buffs, casting, commands, lifecycle
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, load_catalog
 from simulator.columns import NOBODY
@@ -51,7 +51,7 @@ class Field:
         unit = self.world.catalog.unit(name)
         if unit.structure and unit.needs_creep:
             self._paint_creep(x, y)
-        return self.world.spawn(unit, owner, (x, y), facing)
+        return lifecycle.spawn(self.world, unit, owner, (x, y), facing)
 
     def still(self, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
         """Put a unit that stays where it is and fights nobody."""

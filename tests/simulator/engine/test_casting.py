@@ -12,7 +12,7 @@ from simulator.abilities import Aim, Filter, Need
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.refusal import Refusal
-from simulator.skills import SKILLS
+from simulator.skills.registry import SKILLS
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -282,7 +282,7 @@ def test_what_a_carrier_holds_dies_with_it(field: Any) -> None:
 def test_timed_life_ends(field: Any) -> None:
     slot = field.put("Marine", 1, 10, 16)
     field.world.expires[slot] = 50
-    field.world._population_changed()
+    field.world.population_changed()
     field.play(49)
     assert field.world.alive[slot]
     field.play(1)

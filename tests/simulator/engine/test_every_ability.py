@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, casting, commands, harvesting, production, targets
+from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
 from simulator.abilities import Aim
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
@@ -20,9 +20,10 @@ from simulator.columns import NOBODY
 from simulator.maps import load_map
 from simulator.players import PlayerSetup
 from simulator.refusal import Refusal
-from simulator.skills import SKILLS
+from simulator.skills.registry import SKILLS
 from simulator.systems import creep
 from simulator.tick import advance
+from simulator.traits import refresh
 from simulator.world import World
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def stage(version: str) -> World:
     world.players[1].cheats += ["free", "tech_tree", "cooldown", "food"]
     for owner, group in ((1, OWN), (2, FOES), (0, NEUTRAL)):
         for name, x, y in group:
-            slot = world.spawn(world.catalog.unit(name), owner, (x, y))
+            slot = lifecycle.spawn(world, world.catalog.unit(name), owner, (x, y))
             world.energy[slot] = world.energy_max[slot]
             if owner and not world.unit_type(slot).structure:
                 world.life[slot] *= 0.6
@@ -75,7 +76,7 @@ def casters(world: World, ability: Ability) -> Iterator[int]:
     for name in ability.users:
         unit = world.catalog.unit(name) if name in world.catalog.row_of_name else None
         if unit is not None and ability in world.catalog.abilities_of(unit.row):
-            slot = world.spawn(unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
+            slot = lifecycle.spawn(world, unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
             world.energy[slot] = world.energy_max[slot]
             yield slot
             world.remove(slot)
@@ -120,7 +121,7 @@ def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], Non
 
 def _fill(world: World, slot: int) -> None:
     """Put a passenger into a carrier."""
-    passenger = world.spawn(world.catalog.unit("SCV"), 1, CENTRE)
+    passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, CENTRE)
     world.stow(passenger, slot)
 
 
@@ -128,29 +129,35 @@ def _man(world: World, slot: int) -> None:
     """Put soldiers with stimpacks into a Bunker, and an enemy before it."""
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     for name in ("Marine", "Marauder"):
-        world.stow(world.spawn(world.catalog.unit(name), 1, CENTRE), slot)
+        world.stow(lifecycle.spawn(world, world.catalog.unit(name), 1, CENTRE), slot)
     x, y = world.pos[slot].tolist()
     for passenger in world.passengers(slot):
         world.pos[passenger] = x, y
-        world.refresh(passenger)
-    targets.engage(world, world.passengers(slot)[0], world.spawn(world.catalog.unit("Roach"), 2, (x, y + 4.0)))
+        refresh(world, passenger)
+    targets.engage(
+        world, world.passengers(slot)[0], lifecycle.spawn(world, world.catalog.unit("Roach"), 2, (x, y + 4.0))
+    )
 
 
 def _worker(world: World, slot: int) -> None:
     """Put a worker beside a structure that calls workers in."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("SCV"), 1, (x, y - 5.0))
+    lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (x, y - 5.0))
 
 
 def _pair(world: World, slot: int) -> None:
     """Tell a second Templar to merge, too."""
-    partner = world.spawn(world.unit_type(slot), 1, (31.0, 33.0))
+    partner = lifecycle.spawn(world, world.unit_type(slot), 1, (31.0, 33.0))
     casting.use(world, [partner], world.catalog.ability(1766))
 
 
 def _split(world: World, slot: int) -> None:
     """Have an Adept shift its phase; a shade becomes that of another Adept."""
-    adept = slot if world.unit_type(slot).name == "Adept" else world.spawn(world.catalog.unit("Adept"), 1, CENTRE)
+    adept = (
+        slot
+        if world.unit_type(slot).name == "Adept"
+        else lifecycle.spawn(world, world.catalog.unit("Adept"), 1, CENTRE)
+    )
     casting.use(world, [adept], world.catalog.ability(2544), point=(36.0, 32.0))
     if adept != slot:
         world.fields[-1].target = world.tag_of(slot)
@@ -159,8 +166,8 @@ def _split(world: World, slot: int) -> None:
 def _power(world: World, slot: int) -> None:
     """Put a Pylon and a Stalker that lacks shields beside a battery."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
-    stalker = world.spawn(world.catalog.unit("Stalker"), 1, (x, y + 4.0))
+    lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    stalker = lifecycle.spawn(world, world.catalog.unit("Stalker"), 1, (x, y + 4.0))
     world.shields[stalker] = 10.0
     world.damaged_loop[stalker] = LONGEST
     advance(world, 2)
@@ -175,7 +182,7 @@ def _recharge(world: World, slot: int) -> None:
 def _battery(world: World, slot: int) -> None:
     """Put a Shield Battery with power beside a Nexus."""
     x, y = world.pos[slot].tolist()
-    _power(world, world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
+    _power(world, lifecycle.spawn(world, world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
 
 
 def _queue(world: World, slot: int) -> None:
@@ -185,15 +192,15 @@ def _queue(world: World, slot: int) -> None:
 
 def _in_the_making(world: World, slot: int) -> None:
     world.build_progress[slot], world.build_loops[slot] = 0.5, 100.0
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def _at_work(world: World, slot: int) -> None:
     """Have an SCV build the structure, or the SCV build another one."""
     worker = world.unit_type(slot).worker
-    site = world.spawn(world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
+    site = lifecycle.spawn(world, world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
     _in_the_making(world, site)
-    world.site[slot if worker else world.spawn(world.catalog.unit("SCV"), 1, (34.0, 42.0))] = site
+    world.site[slot if worker else lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (34.0, 42.0))] = site
 
 
 def _load_up(world: World, slot: int) -> None:
@@ -211,7 +218,7 @@ def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
     """Have the unit begin the morph or add-on that an ability calls off, or else be in the making itself."""
     x, y = world.pos[slot].tolist()
     if world.unit_type(slot).structure:
-        world.spawn(world.catalog.unit("Pylon"), 1, (x - 4.0, y))
+        lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y))
         advance(world, 1)
     card = world.catalog.abilities_of(int(world.type[slot]))
     if not any(a.link == cancel.link and a.does != "cancel" and casting.use(world, [slot], a) for a in card):
@@ -221,7 +228,7 @@ def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
 
 def _near_power(world: World, slot: int) -> None:
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 3.0, y))
     advance(world, 1)
 
 
@@ -244,7 +251,7 @@ def _morphing(*kinds: str) -> Callable[[World, int], None]:
         name = world.unit_type(slot).name
         before = next((a for a in world.catalog.abilities if a.numbers.get("cocoon") == name), None)
         if before is not None:
-            world.become(slot, world.catalog.unit(before.users[0]))
+            lifecycle.become(world, slot, world.catalog.unit(before.users[0]))
         x, y = world.pos[slot].tolist()
         found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.does in kinds)
         found = before or found

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, commands, tick
+from simulator import buffs, commands, lifecycle, tick
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.refusal import Refusal
@@ -81,7 +81,7 @@ def test_a_larva_that_is_used_is_replaced(field: Any) -> None:
     slot = field.put("Hatchery", 1, 32.5, 32.5)
     field.play(100)
     first = int(larvae.of(field.world, slot)[0])
-    field.world.become(first, field.world.catalog.unit("Egg"))
+    lifecycle.become(field.world, first, field.world.catalog.unit("Egg"))
     field.play(MECHANICS.larva_loops)
     assert len(larvae.of(field.world, slot)) == 2
     field.play(2)

@@ -1,4 +1,4 @@
-"""Drops: abilities that call off another one while it is being prepared or goes on."""
+"""Cancel: abilities that call off another one while it is being prepared or goes on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 
-def dropping(does: str) -> Skill:
+def cancelling(does: str) -> Skill:
     """The skill that ends a unit's order to use an ability that ``does`` this; what waits behind it begins."""
 
     def refuse(world: World, cast: Cast) -> Refusal:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Final
 from simulator import buffs
 from simulator.columns import NOBODY
 from simulator.damage import wound
-from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
 from simulator.refusal import Refusal
-from simulator.skills import flight, teleport
+from simulator.skills import projectiles, teleport
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ def _hold_charge(world: World, cast: Cast) -> bool:
     if world.loop < cast.begun + number(cast, "cast_time_loops"):
         return True
     _cool_down(world, cast, cast.ability.cooldown_loops)
-    flight.launch(world, cast, MECHANICS.yamato_speed_n)
+    projectiles.launch(world, cast, MECHANICS.yamato_speed_n)
     return False
 
 
@@ -49,7 +48,7 @@ def _cool_down(world: World, cast: Cast, loops: float) -> None:
 
 def _impact(world: World, missile: Field, target: int) -> None:
     amount = number(world.catalog.ability(missile.ability), "damage")
-    wound(world, source_slot(world, missile), missile.owner, target, amount)
+    wound(world, world.slot_of(missile.source), missile.owner, target, amount)
 
 
 # tactical jump --------------------------------------------------------------------------------------------------------
@@ -103,4 +102,4 @@ SKILLS: Final = {
     ),
 }
 
-flight.ARRIVALS["yamato"] = _impact
+projectiles.ARRIVALS["yamato"] = _impact

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, prices
+from simulator import commands, lifecycle, payments, prices
 from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
@@ -35,14 +35,14 @@ def _grows(world: World, cast: Cast) -> bool:
     if cast.ability.numbers.get("cocoon"):
         _renewed(world, cast.slot, unit)
     else:
-        world.become(cast.slot, unit)
+        lifecycle.become(world, cast.slot, unit)
     world.alert(int(world.owner[cast.slot]), "MorphComplete")
     return False
 
 
 def _renewed(world: World, slot: int, unit: UnitType) -> None:
     """Become another type with all of its life, as what comes into or out of a cocoon has."""
-    world.become(slot, unit)
+    lifecycle.become(world, slot, unit)
     world.life[slot] = world.life_max[slot]
     world.energy[slot] = min(
         float(world.stats.energy_start[world.owner[slot], unit.row]), float(world.energy_max[slot])
@@ -65,7 +65,7 @@ def call_off(world: World, slot: int) -> None:
     was = world.catalog.units[growing.was]
     if world.type[slot] != was.row:
         _renewed(world, slot, was)
-    prices.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), prices.CANCELLED)
+    payments.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), payments.CANCELLED)
     commands.begin_next(world, slot)
 
 

@@ -1,8 +1,10 @@
-"""Flight: missiles of abilities, which chase a unit or head for a point and do something where they arrive.
+"""Projectiles of abilities: they chase a unit or head for a point and do something where they arrive.
 
-A missile of a weapon lives in ``world.missiles``; one of an ability is a field that moves, because what it does on
-arrival is a rule and not damage. Skills call ``launch`` and put a rule of theirs into ``ARRIVALS``; a missile whose
-target has died or can't be touched any more is lost. Speeds are estimates (see ``data/mechanics.yaml``).
+A missile of a weapon lives in ``world.missiles``; one of an ability is a field, because what it does on arrival is a
+rule and not damage. Abilities call ``launch`` for a missile that moves and put a rule of theirs into ``ARRIVALS``; a
+missile whose target has died or can't be touched any more is lost. What is thrown (``throw``) is not seen on its way:
+its rule runs once, when it is due. Speeds are estimates (see ``data/mechanics.yaml`` and ``missile_speed_n`` of the
+abilities, per normal second).
 """
 
 from __future__ import annotations
@@ -10,10 +12,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator.buffs import FOREVER
+from simulator.active_buffs import FOREVER
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.fields import Field
+from simulator.skills.skill import distance, gap, lay, number, place_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 NO_TARGET: Final = 0
+SPEED_UNKNOWN: Final = "How fast the missile flies."
 
 ARRIVALS: Final[dict[str, Callable[[World, Field, int], None]]] = {}
 """What a missile does where it arrives, by the ability's ``does``: a function of the world, the missile (its place is
@@ -99,6 +103,25 @@ def _goal(world: World, missile: Field, target: int) -> Point:
         return missile.memory["x"], missile.memory["y"]
     x, y = world.pos[target].tolist()
     return x, y
+
+
+# thrown ---------------------------------------------------------------------------------------------------------------
+
+
+def flight_loops(world: World, cast: Cast) -> int:
+    """Loops from the throw until it arrives: at the point, or at the edge of the target where it stands now."""
+    step = number(cast, "missile_speed_n") / LOOPS_PER_NORMAL_SECOND
+    if cast.target == NOBODY:
+        return math.ceil(distance(world, cast.slot, place_of(world, cast)) / step)
+    return math.ceil((gap(world, cast.slot, cast.target) + float(world.radius[cast.slot])) / step)
+
+
+def throw(world: World, cast: Cast, does: str, *, radius: float = 0.0, delay_loops: float = 0.0) -> Field:
+    """Send something to where a cast is aimed; the field's rule ``does`` runs once, when it arrives."""
+    due = world.loop + flight_loops(world, cast) + delay_loops
+    item = lay(world, cast, does, end=due, due=due)
+    item.radius, item.target = radius, world.tag_of(cast.target)
+    return item
 
 
 FIELDS: Final[dict[str, FieldRule]] = {"missile": fly}
