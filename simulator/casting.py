@@ -24,7 +24,7 @@ from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.world import NO_TAG, Mishap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from simulator.abilities import Ability, Filter
     from simulator.casts import Point
@@ -246,9 +246,15 @@ def use(
     casts = [Cast(slot, as_is(world, slot, ability), victim, point) for slot in slots]
     casts = [c for c in casts if refusal(world, c.slot, c.ability) is Refusal.SUCCESS]
     casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
+    return order(world, casts, ability, queue=queue) if casts else []
+
+
+def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool = False) -> list[int]:
+    """Have units carry out casts of one ability that nothing stands against; returns the slots that will."""
+    target, point = casts[0].target, casts[0].point
     give = SKILLS[ability.does].give
     if give is not None:
-        return give(world, [cast.slot for cast in casts], ability, target, point, queue) if casts else []
+        return give(world, [cast.slot for cast in casts], ability, world.tag_of(target), point, queue)
     if ability.solo and len(casts) > 1:
         casts = [min(casts, key=lambda c: (_busy(world, c), _away(world, c), c.slot))]
     taken: list[int] = []
@@ -257,8 +263,8 @@ def use(
             perform(world, cast)
             taken.append(cast.slot)
         else:
-            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(victim), point=point)
-            taken += commands.give(world, [cast.slot], order, queue=queue)
+            waiting = Order(OrderKind.CAST, ability.id, target=world.tag_of(target), point=point)
+            taken += commands.give(world, [cast.slot], waiting, queue=queue)
     return taken
 
 

@@ -1,8 +1,8 @@
 """Which way round: free cells, connected parts and shortest ways over a terrain with its structures.
 
 A ``Surface`` is one grid of free cells that never changes, so it remembers the ways it has found, across games too.
-``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go. Positions are world units, cells are
-flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
+``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go. Positions are world
+units, cells are flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
 """
 
 from __future__ import annotations

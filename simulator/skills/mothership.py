@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, friends, lay, number, place_of
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from simulator.abilities import Ability
     from simulator.casts import Cast
+    from simulator.fields import Field
     from simulator.skills.skill import BuffRule, UnitRule
     from simulator.world import World
 

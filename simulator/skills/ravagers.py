@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator.damage import wound
-from simulator.fields import Field
 from simulator.skills.skill import Skill, around, lay, number
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
+    from simulator.fields import Field
     from simulator.world import World
 
 BILE_EFFECT = 11

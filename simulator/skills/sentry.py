@@ -12,7 +12,6 @@ import numpy as np
 
 from simulator import buffs, geometry, lifecycle, placement
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, friends, lay, number, place_of
 from simulator.stats import ATTRIBUTES, GROUND_PLANE
@@ -20,6 +19,7 @@ from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
+    from simulator.fields import Field
     from simulator.skills.skill import UnitRule
     from simulator.world import World
 
