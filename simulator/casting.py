@@ -13,11 +13,11 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands, payments, prices, supply
+from simulator.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
-from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
 from simulator.skills.registry import SKILLS, SMARTS
 from simulator.skills.skill import touching
 from simulator.stats import AIR_PLANE, GROUND_PLANE
@@ -65,49 +65,49 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
 # may it ---------------------------------------------------------------------------------------------------------------
 
 
-def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> Refusal:
+def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
     """Whether a unit could use an ability of its card now, whatever it is aimed at; ``free`` looks at no cost."""
     if not is_modelled(ability):
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     if ability.does in ORDINARY:
         return _ordinary_refusal(world, slot, ability)
     why = _unready(world, slot, ability)
-    return why if free or why is not Refusal.SUCCESS else _unaffordable(world, slot, ability)
+    return why if free or why is not ActionResult.SUCCESS else _unaffordable(world, slot, ability)
 
 
-def _unready(world: World, slot: int, ability: Ability) -> Refusal:
+def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
     skill = SKILLS[ability.does]
     if not (world.powered[slot] or skill.anytime):
-        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
+        return ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
     if not (world.can_cast[slot] or skill.anytime) or world.hallucination[slot]:
-        return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+        return ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
-        return Refusal.TECH_REQUIREMENTS_NOT_MET
-    return Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
+        return ActionResult.TECH_REQUIREMENTS_NOT_MET
+    return ActionResult.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
 
 
-def _ordinary_refusal(world: World, slot: int, ability: Ability) -> Refusal:
+def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
     if world.build_progress[slot] < 1.0:
-        return Refusal.BUILDING_IS_UNDER_CONSTRUCTION
+        return ActionResult.BUILDING_IS_UNDER_CONSTRUCTION
     stuck = ability.does in WALKS and not commands.can_move(world, slot)
-    return Refusal.UNIT_CANT_MOVE if stuck else Refusal.SUCCESS
+    return ActionResult.UNIT_CANT_MOVE if stuck else ActionResult.SUCCESS
 
 
-def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
+def _unaffordable(world: World, slot: int, ability: Ability) -> ActionResult:
     player = world.players[int(world.owner[slot])]
     if "free" not in player.cheats:
         if player.minerals < ability.minerals:
-            return Refusal.NOT_ENOUGH_MINERALS
+            return ActionResult.NOT_ENOUGH_MINERALS
         if player.vespene < ability.vespene:
-            return Refusal.NOT_ENOUGH_VESPENE
+            return ActionResult.NOT_ENOUGH_VESPENE
         if world.energy[slot] < ability.energy:
-            return Refusal.NOT_ENOUGH_ENERGY
+            return ActionResult.NOT_ENOUGH_ENERGY
         if ability.life and world.life[slot] <= ability.life:
-            return Refusal.NOT_ENOUGH_LIFE
+            return ActionResult.NOT_ENOUGH_LIFE
     if not supply.has_room(world, player.id, ability.supply):
-        return Refusal.NOT_ENOUGH_FOOD
+        return ActionResult.NOT_ENOUGH_FOOD
     waits = "cooldown" not in player.cheats and cooldown_left(world, slot, ability) > 0.0
-    return Refusal.COOLDOWN if waits else Refusal.SUCCESS
+    return ActionResult.COOLDOWN if waits else ActionResult.SUCCESS
 
 
 def cooldown_left(world: World, slot: int, ability: Ability) -> float:
@@ -116,30 +116,30 @@ def cooldown_left(world: World, slot: int, ability: Ability) -> float:
     return max(0.0, timers.get(ability.timer, 0.0) - world.loop)
 
 
-def aim_refusal(world: World, cast: Cast) -> Refusal:
+def aim_refusal(world: World, cast: Cast) -> ActionResult:
     """Whether a unit may aim an ability like this; the way there is not looked at, unless it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
-        if wrong is not Refusal.SUCCESS:
+        if wrong is not ActionResult.SUCCESS:
             return wrong
     far = (
         SKILLS[ability.does].give is None and ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
     )
     if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
-        return Refusal.TARGET_IS_OUT_OF_RANGE
+        return ActionResult.TARGET_IS_OUT_OF_RANGE
     return SKILLS[ability.does].refuse(world, cast)
 
 
-def fits(world: World, slot: int, target: int, words: Filter) -> Refusal:
+def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
     """Whether a unit may be the target of another one's ability by the catalog's filter."""
     for word in words.required:
         if not _is(world, slot, target, word):
-            return NOT_REQUIRED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
+            return NOT_REQUIRED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
     for word in words.excluded:
         if _is(world, slot, target, word):
-            return EXCLUDED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
-    return Refusal.SUCCESS
+            return EXCLUDED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
+    return ActionResult.SUCCESS
 
 
 def _is(world: World, slot: int, target: int, word: str) -> bool:
@@ -244,8 +244,8 @@ def use(
     """
     victim = world.slot_of(target)
     casts = [Cast(slot, as_is(world, slot, ability), victim, point) for slot in slots]
-    casts = [c for c in casts if refusal(world, c.slot, c.ability) is Refusal.SUCCESS]
-    casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
+    casts = [c for c in casts if refusal(world, c.slot, c.ability) is ActionResult.SUCCESS]
+    casts = [c for c in casts if aim_refusal(world, c) is ActionResult.SUCCESS]
     return order(world, casts, ability, queue=queue) if casts else []
 
 
@@ -317,7 +317,7 @@ def skill_of(ability: Ability) -> Skill:
     return SKILLS[ability.does]
 
 
-def fail(world: World, cast: Cast, why: Refusal) -> None:
+def fail(world: World, cast: Cast, why: ActionResult) -> None:
     """Tell a player that an order could not be carried out in the end."""
     owner = int(world.owner[cast.slot])
     world.mishaps.append(Mishap(world.loop, owner, world.tag_of(cast.slot), cast.ability.id, why))

@@ -1,6 +1,6 @@
-"""One game loop, as a table of contents: the laws of the world in the order in which they apply.
+"""One game loop, as a table of contents: the systems of the world in the order in which they run.
 
-Each system is a function of the world and the only place of its law. Above: whoever advances the game. Below: one
+Each system is a function of the world and the only place of its rule. Above: what advances the game. Below: one
 file of ``systems`` per line.
 """
 

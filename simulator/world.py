@@ -18,6 +18,7 @@ import numpy as np
 
 from simulator import geometry
 from simulator.active_buffs import ActiveBuffs
+from simulator.caches import WorldCaches
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from simulator.creep import Creep
@@ -25,7 +26,6 @@ from simulator.ground import Ground
 from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
-from simulator.remembered import Remembered
 from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.snapshots import Memory
 from simulator.stats import Stats
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from simulator.action_result import ActionResult
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
     from simulator.fields import Field
     from simulator.jobs import Job
     from simulator.maps import GameMap
-    from simulator.refusal import Refusal
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
@@ -68,7 +68,7 @@ class Mishap:
     player: int
     tag: int
     ability: int
-    refusal: Refusal
+    refusal: ActionResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Rally:
     target: int = NO_TAG
 
 
-class World(UnitColumns, Remembered):
+class World(UnitColumns, WorldCaches):
     """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
 
     The world grows by itself; keep no reference to a column across ``spawn``.
@@ -98,7 +98,7 @@ class World(UnitColumns, Remembered):
         self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
     ) -> None:
         UnitColumns.__init__(self)
-        Remembered.__init__(self)
+        WorldCaches.__init__(self)
         self.map: GameMap = game_map
         self.catalog: Catalog = catalog or load_catalog()
         self.seed = seed

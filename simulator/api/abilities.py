@@ -17,8 +17,8 @@ from s2clientprotocol import error_pb2
 
 from simulator import casting, commands
 from simulator.abilities import Aim
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
-from simulator.refusal import Refusal
 from simulator.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Outcome:
     slots: tuple[int, ...] = ()
 
 
-def result_of(why: Refusal) -> Result:
+def result_of(why: ActionResult) -> Result:
     """The API's word for a refusal."""
     result: Result = error_pb2.ActionResult.Value(error_pb2.ActionResult.Name(int(why)))  # type: ignore[arg-type]  # same numbers
     return result
@@ -94,17 +94,17 @@ def meant(world: World, slot: int, requested: int) -> Ability | None:
     return _meant(world, slot, requested)[0]
 
 
-def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, Refusal | None]:
+def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
     """As ``meant``, and whether the unit can use it now; None where that did not have to be looked at."""
     card = world.catalog.abilities_of(int(world.type[slot])) if requested > 0 else ()
     exact = next((a for a in card if a.id == requested), None)
     if exact is not None:
         return exact, None
-    first: tuple[Ability | None, Refusal | None] = None, None
+    first: tuple[Ability | None, ActionResult | None] = None, None
     for ability in card:
         if ability.general == requested and casting.is_modelled(ability):
             why = casting.refusal(world, slot, ability)
-            if why is Refusal.SUCCESS:
+            if why is ActionResult.SUCCESS:
                 return ability, why
             first = first if first[0] is not None else (ability, why)
     return first
@@ -113,7 +113,7 @@ def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, Ref
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
     """What a unit can be told to do now, by ascending id; ``free`` looks at no cost and no cooldown."""
     card = world.catalog.abilities_of(int(world.type[slot]))
-    return [a for a in card if casting.refusal(world, slot, a, free=free) is Refusal.SUCCESS]
+    return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
 
 
 def judge(world: World, player: int, command: Command) -> Plan:
@@ -122,21 +122,21 @@ def judge(world: World, player: int, command: Command) -> Plan:
     all_obey = "control_enemy" in world.players[player].cheats
     own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
     if not own:
-        return _refused(command, Refusal.YOU_CANT_CONTROL_THAT_UNIT if slots else Refusal.ERROR)
+        return _refused(command, ActionResult.YOU_CANT_CONTROL_THAT_UNIT if slots else ActionResult.ERROR)
     aimed = _without_snapshot(world, player, command)
     if aimed.point is not None and not all(map(math.isfinite, aimed.point)):
-        return _refused(command, Refusal.MUST_TARGET_VISIBLE_LOCATION)
+        return _refused(command, ActionResult.MUST_TARGET_VISIBLE_LOCATION)
     groups = _groups(world, own, command.ability)
     if not groups:
-        return _refused(command, Refusal.NOT_SUPPORTED)
+        return _refused(command, ActionResult.NOT_SUPPORTED)
     parts: list[tuple[Ability, tuple[Cast, ...]]] = []
-    why = Refusal.ERROR
+    why = ActionResult.ERROR
     for ability, some in groups:
         results = [_judged(world, player, slot, ability, aimed, known) for slot, known in some]
         casts = tuple(result for result in results if isinstance(result, Cast))
         if casts:
             parts.append((ability, casts))
-        elif not parts and isinstance(results[0], Refusal):
+        elif not parts and isinstance(results[0], ActionResult):
             why = results[0]
     if not parts:
         return _refused(command, why)
@@ -156,11 +156,11 @@ def carry_out(world: World, plan: Plan) -> Outcome:
         else:
             taken += _give(world, ability, casts, plan)
     if not taken:
-        return Outcome(result_of(Refusal.ORDER_QUEUE_IS_FULL if plan.asked.queue else Refusal.ERROR))
+        return Outcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if plan.asked.queue else ActionResult.ERROR))
     return Outcome(error_pb2.Success, plan.ability, tuple(taken))
 
 
-def _refused(command: Command, why: Refusal) -> Plan:
+def _refused(command: Command, why: ActionResult) -> Plan:
     return Plan(command, result_of(why))
 
 
@@ -179,12 +179,14 @@ def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
     return max(parts, key=lambda part: (part[0].does == "attack", -part[0].id))[0].id
 
 
-def _groups(world: World, slots: list[int], requested: int) -> list[tuple[Ability, list[tuple[int, Refusal | None]]]]:
+def _groups(
+    world: World, slots: list[int], requested: int
+) -> list[tuple[Ability, list[tuple[int, ActionResult | None]]]]:
     """The specific abilities that a requested id stands for, by ascending id.
 
     With each go the units that have it, and whether they can use it now where that is known already.
     """
-    groups: dict[int, tuple[Ability, list[tuple[int, Refusal | None]]]] = {}
+    groups: dict[int, tuple[Ability, list[tuple[int, ActionResult | None]]]] = {}
     for slot in slots:
         ability, known = _meant(world, slot, requested)
         if ability is not None and casting.is_modelled(ability):
@@ -193,34 +195,34 @@ def _groups(world: World, slots: list[int], requested: int) -> list[tuple[Abilit
 
 
 def _judged(
-    world: World, player: int, slot: int, ability: Ability, command: Command, known: Refusal | None
-) -> Cast | Refusal:
+    world: World, player: int, slot: int, ability: Ability, command: Command, known: ActionResult | None
+) -> Cast | ActionResult:
     """What a unit is to do with its ability, or why it can't; ``known`` is what is known of the latter."""
     if not command.aim & ability.aim:
         aimless = Aim.POINT not in ability.aim
-        return Refusal.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
-            Refusal.ERROR if aimless else Refusal.MUST_TARGET_VISIBLE_LOCATION
+        return ActionResult.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
+            ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
         )  # fmt: skip
     target = NOBODY
     if command.aim is Aim.UNIT:
         target = world.slot_of(command.target)
         remembered = target != NOBODY and command.target in world.memories[player].of_unit
         if target == NOBODY or not (remembered or world.visible[player, target]):
-            return Refusal.MUST_TARGET_VISIBLE_UNIT
+            return ActionResult.MUST_TARGET_VISIBLE_UNIT
     why = casting.refusal(world, slot, ability) if known is None else known
     cast = Cast(slot, casting.as_is(world, slot, ability), target, command.point)
-    if why is Refusal.SUCCESS and ability.does == "attack" and target != NOBODY:
+    if why is ActionResult.SUCCESS and ability.does == "attack" and target != NOBODY:
         why = _cant_attack(world, slot, target)
-    elif why is Refusal.SUCCESS and ability.does not in casting.ORDINARY:
+    elif why is ActionResult.SUCCESS and ability.does not in casting.ORDINARY:
         why = casting.aim_refusal(world, cast)
-    return cast if why is Refusal.SUCCESS else why
+    return cast if why is ActionResult.SUCCESS else why
 
 
-def _cant_attack(world: World, slot: int, target: int) -> Refusal:
+def _cant_attack(world: World, slot: int, target: int) -> ActionResult:
     if slot != target and commands.can_reach(world, slot, target):
-        return Refusal.SUCCESS
+        return ActionResult.SUCCESS
     flies = world.unit_type(target).flying
-    return Refusal.CANT_TARGET_AIR_UNITS if flies else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.CANT_TARGET_AIR_UNITS if flies else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # giving ---------------------------------------------------------------------------------------------------------------

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, lifecycle, pathing
+from simulator.action_result import ActionResult
 from simulator.layers import Layer
-from simulator.refusal import Refusal
 from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill
 
@@ -57,12 +57,14 @@ def _morph(world: World, cast: Cast) -> None:
     push_units_off(world, cast.slot)
 
 
-def _can_morph(world: World, cast: Cast) -> Refusal:
+def _can_morph(world: World, cast: Cast) -> ActionResult:
     row = world.catalog.row_of_name.get(cast.ability.unit)
     if row is None:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     lands = world.unit_type(cast.slot).flying and not world.catalog.units[row].flying
-    return Refusal.CANT_LAND_LOCATION_INVALID if lands and not _walkable(world, cast.slot) else Refusal.SUCCESS
+    return (
+        ActionResult.CANT_LAND_LOCATION_INVALID if lands and not _walkable(world, cast.slot) else ActionResult.SUCCESS
+    )
 
 
 def _walkable(world: World, slot: int) -> bool:

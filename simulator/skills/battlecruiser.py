@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.skills import projectiles, teleport
 from simulator.skills.skill import Skill, gap, number
 
@@ -48,7 +48,7 @@ def _cool_down(world: World, cast: Cast, loops: float) -> None:
 
 def _impact(world: World, missile: Field, target: int) -> None:
     amount = number(world.catalog.ability(missile.ability), "damage")
-    wound(world, world.slot_of(missile.source), missile.owner, target, amount)
+    apply_damage(world, world.slot_of(missile.source), missile.owner, target, amount)
 
 
 # tactical jump --------------------------------------------------------------------------------------------------------
@@ -60,9 +60,9 @@ AWAY: Final = "HyperjumpTeleport"
 COMING: Final = "HyperjumpTeleportIn"
 
 
-def _may_jump(world: World, cast: Cast) -> Refusal:
+def _may_jump(world: World, cast: Cast) -> ActionResult:
     held = any(buffs.has(world, cast.slot, name) for name in HELD)
-    return Refusal.ERROR if held else Refusal.SUCCESS
+    return ActionResult.ERROR if held else ActionResult.SUCCESS
 
 
 def _begin_jump(world: World, cast: Cast) -> None:

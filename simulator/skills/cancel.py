@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simulator import commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 def cancelling(does: str) -> Skill:
     """The skill that ends a unit's order to use an ability that ``does`` this; what waits behind it begins."""
 
-    def refuse(world: World, cast: Cast) -> Refusal:
+    def refuse(world: World, cast: Cast) -> ActionResult:
         current = world.casts[cast.slot] and world.catalog.ability(int(world.order_ability[cast.slot])).does == does
-        return Refusal.SUCCESS if current else Refusal.CANT_FIND_CANCEL_ORDER
+        return ActionResult.SUCCESS if current else ActionResult.CANT_FIND_CANCEL_ORDER
 
     def effect(world: World, cast: Cast) -> None:
         """Call off what the unit is doing."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands, lifecycle, production
+from simulator.action_result import ActionResult
 from simulator.arrays import which
 from simulator.columns import NOBODY
 from simulator.orders import ATTACK, MOVE, Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number
 from simulator.traits import refresh
@@ -57,13 +57,13 @@ def _arm(world: World, slots: list[int], ability: Ability, _: int, __: Point | N
     return slots
 
 
-def _has_place(world: World, slot: int, ability: Ability) -> Refusal:
+def _has_place(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether the hangar and its queue take one more."""
     queued = len(world.jobs.get(slot, ()))
     if queued >= production.QUEUE:
-        return Refusal.QUEUE_IS_FULL
+        return ActionResult.QUEUE_IS_FULL
     full = queued + len(crew_of(world, slot)) >= number(ability, "max")
-    return Refusal.CANT_HOLD_ANY_MORE_AMMO if full else Refusal.SUCCESS
+    return ActionResult.CANT_HOLD_ANY_MORE_AMMO if full else ActionResult.SUCCESS
 
 
 # sending them ---------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.skills import projectiles
 from simulator.skills.skill import Skill, distance, number
@@ -107,7 +107,7 @@ def _hit(world: World, missile: Field, target: int) -> None:
     armored = world.stats.attribute_bits[world.type[target]] & 1 << ATTRIBUTES.index("armored")
     more = world.stats.changed(owner, "effect", TICK, UPGRADE_FIELD, 0.0) if armored else 0.0
     source = world.slot_of(missile.source)
-    wound(world, source, owner, target, number(ability, "damage_per_tick") + more)
+    apply_damage(world, source, owner, target, number(ability, "damage_per_tick") + more)
 
 
 def _release(world: World, lock: Field, ability: Ability) -> None:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number, place_of
 
@@ -58,10 +58,10 @@ def _stride(world: World, cast: Cast) -> None:
         buffs.apply(world, cast.slot, STRIDE_DELAY, source=cast.slot)
 
 
-def _cant_blink(world: World, cast: Cast) -> Refusal:
+def _cant_blink(world: World, cast: Cast) -> ActionResult:
     if buffs.has(world, cast.slot, "FungalGrowth"):
-        return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
-    return Refusal.CANT_FIND_TELEPORT_LOCATION if _landing(world, cast) is None else Refusal.SUCCESS
+        return ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+    return ActionResult.CANT_FIND_TELEPORT_LOCATION if _landing(world, cast) is None else ActionResult.SUCCESS
 
 
 # Charge ---------------------------------------------------------------------------------------------------------------
@@ -84,14 +84,14 @@ def _charge(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.slot, CHARGING, source=cast.slot)
 
 
-def _cant_charge(world: World, cast: Cast) -> Refusal:
+def _cant_charge(world: World, cast: Cast) -> ActionResult:
     slot, target = cast.slot, cast.target
     if target == NOBODY or not commands.can_reach(world, slot, target):
-        return Refusal.CANT_TARGET_THAT_UNIT
+        return ActionResult.CANT_TARGET_THAT_UNIT
     away = gap(world, slot, target)
     if away >= number(cast, "max_range"):
-        return Refusal.TARGET_IS_OUT_OF_RANGE
-    return Refusal.TARGET_IS_TOO_CLOSE if away <= number(cast, "min_range") else Refusal.SUCCESS
+        return ActionResult.TARGET_IS_OUT_OF_RANGE
+    return ActionResult.TARGET_IS_TOO_CLOSE if away <= number(cast, "min_range") else ActionResult.SUCCESS
 
 
 def _strike_home(world: World, slots: list[int]) -> None:
@@ -109,7 +109,7 @@ def _strike_home(world: World, slots: list[int]) -> None:
 def _impact(world: World, slot: int) -> None:
     damage = number(world.catalog.ability(CHARGE), "damage")
     factor = float(world.dealt_factor[slot])
-    wound(world, slot, int(world.owner[slot]), int(world.target[slot]), damage * factor)
+    apply_damage(world, slot, int(world.owner[slot]), int(world.target[slot]), damage * factor)
 
 
 # Phase Shift ----------------------------------------------------------------------------------------------------------

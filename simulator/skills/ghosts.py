@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.skills import projectiles
@@ -51,7 +51,7 @@ def _hold_aim(world: World, cast: Cast) -> bool:
     psionic = "psionic" in world.unit_type(target).attributes
     amount = number(cast, "damage") + (number(cast, "bonus_psionic", 0.0) if psionic else 0.0)
     buffs.remove(world, slot, REFUNDABLE)
-    wound(world, slot, int(world.owner[slot]), target, amount)
+    apply_damage(world, slot, int(world.owner[slot]), target, amount)
     return False
 
 
@@ -75,7 +75,7 @@ def _burst(world: World, missile: Field, _: int) -> None:
     """Take shields and energy from everybody around, friends as well, and uncover who is cloaked."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):
-        wound(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
+        apply_damage(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
         world.energy[slot] = max(float(world.energy[slot]) - number(ability, "energy_removed"), 0.0)
         if not world.burrowed[slot]:
             loops = number(ability, "decloak_loops")

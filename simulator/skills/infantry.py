@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, lifecycle, pathing
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
@@ -79,7 +79,7 @@ def _explode(world: World, charge: Field) -> None:
     body = world.slot_of(charge.target)
     for slot in around(world, charge.at, charge.radius, plane="ground"):
         if world.unit_type(slot).name not in UNTOUCHED:
-            wound(world, source, charge.owner, slot, number(ability, "damage"))
+            apply_damage(world, source, charge.owner, slot, number(ability, "damage"))
             _throw(world, charge, slot)
     if body != NOBODY:
         world.life[body] = 0.0
@@ -128,7 +128,7 @@ def _fly_back(world: World, item: Field) -> None:
         return
     world.pos[slot] = world.guard[slot] = there
     world.nav_loop[slot] = 0
-    world.settled = -1
+    world.resting_version = -1
 
 
 SKILLS: Final = {

@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.orders import OrderKind
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.projectiles import SPEED_UNKNOWN, throw
 from simulator.skills.skill import Skill, around, foes, gap, lay, number
@@ -49,7 +49,7 @@ def _grows_over(world: World, item: Field) -> None:
 
 def _fungal_tick(world: World, slot: int, row: np.void) -> None:
     damage = number(world.catalog.ability(FUNGAL_GROWTH), "damage_per_tick")
-    wound(world, int(row["source"]), int(row["owner"]), slot, damage)
+    apply_damage(world, int(row["source"]), int(row["owner"]), slot, damage)
 
 
 # Neural Parasite ------------------------------------------------------------------------------------------------------
@@ -60,10 +60,10 @@ def _reach_out(world: World, cast: Cast) -> None:
     throw(world, cast, "neural_parasite")
 
 
-def _can_reach(world: World, cast: Cast) -> Refusal:
+def _can_reach(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     free = not (buffs.frenzied(world, target) or buffs.has(world, target, NEURAL) or world.passengers(target))
-    return Refusal.SUCCESS if free else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if free else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _arrives(world: World, item: Field) -> None:
@@ -125,10 +125,10 @@ def _break_off(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _is_holding(world: World, slot: int, _: Ability) -> Refusal:
+def _is_holding(world: World, slot: int, _: Ability) -> ActionResult:
     held = world.channelling.get(slot)
     holding = held is not None and held.ability.does == "neural_parasite"
-    return Refusal.SUCCESS if holding else Refusal.CANT_FIND_CANCEL_ORDER
+    return ActionResult.SUCCESS if holding else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # Infested Terrans -----------------------------------------------------------------------------------------------------

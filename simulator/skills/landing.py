@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import lifecycle, sites
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills import addons, teleport
 from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill
@@ -31,22 +31,22 @@ def _lift(world: World, cast: Cast) -> None:
     lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
 
 
-def _can_lift(world: World, cast: Cast) -> Refusal:
+def _can_lift(world: World, cast: Cast) -> ActionResult:
     """Refuse a structure that is at work or has an add-on in the making."""
-    return Refusal.CANT_QUEUE_THAT_ORDER if cast.slot in world.jobs else Refusal.SUCCESS
+    return ActionResult.CANT_QUEUE_THAT_ORDER if cast.slot in world.jobs else ActionResult.SUCCESS
 
 
-def _can_land(world: World, cast: Cast) -> Refusal:
+def _can_land(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_LAND_LOCATION_INVALID
+        return ActionResult.CANT_LAND_LOCATION_INVALID
     why = sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
-    return Refusal.SUCCESS if why is Refusal.SUCCESS else Refusal.CANT_LAND_LOCATION_INVALID
+    return ActionResult.SUCCESS if why is ActionResult.SUCCESS else ActionResult.CANT_LAND_LOCATION_INVALID
 
 
 def _settle(world: World, cast: Cast) -> None:
     """Come down, unless something has come under it by now, and take up an add-on that stands at the right place."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
-    if cast.point is None or _can_land(world, cast) is not Refusal.SUCCESS:
+    if cast.point is None or _can_land(world, cast) is not ActionResult.SUCCESS:
         return
     teleport.to(world, slot, sites.centre(world, unit, cast.point))
     lifecycle.become(world, slot, unit)

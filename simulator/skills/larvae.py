@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs, lifecycle
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, distance, number
 
 if TYPE_CHECKING:
@@ -100,9 +100,9 @@ def _inject(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, WAITING if buffs.has(world, cast.target, INJECTED) else INJECTED, source=cast.slot)
 
 
-def _is_hall(world: World, cast: Cast) -> Refusal:
+def _is_hall(world: World, cast: Cast) -> ActionResult:
     fits = world.unit_type(cast.target).name in HALLS and not buffs.has(world, cast.target, CONTAMINATED)
-    return Refusal.SUCCESS if fits else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if fits else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _injection_is_over(world: World, slot: int, row: np.void) -> None:

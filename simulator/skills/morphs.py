@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands, lifecycle, payments, prices
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ def _renewed(world: World, slot: int, unit: UnitType) -> None:
     )
 
 
-def _can_grow(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.CANT_QUEUE_THAT_ORDER if slot in world.jobs or grows(world, slot) else Refusal.SUCCESS
+def _can_grow(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.CANT_QUEUE_THAT_ORDER if slot in world.jobs or grows(world, slot) else ActionResult.SUCCESS
 
 
 def grows(world: World, slot: int) -> bool:
@@ -75,8 +75,8 @@ def _call_off_growth(world: World, cast: Cast) -> None:
         call_off(world, cast.slot)
 
 
-def _grows_now(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if grows(world, slot) else Refusal.CANT_FIND_CANCEL_ORDER
+def _grows_now(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if grows(world, slot) else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 def _call_off_morph(world: World, cast: Cast) -> None:
@@ -84,9 +84,9 @@ def _call_off_morph(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _morphs_now(world: World, slot: int, _: Ability) -> Refusal:
+def _morphs_now(world: World, slot: int, _: Ability) -> ActionResult:
     under_way = world.casts[slot] and world.bound[slot] and not world.channels[slot]
-    return Refusal.SUCCESS if under_way else Refusal.CANT_FIND_CANCEL_ORDER
+    return ActionResult.SUCCESS if under_way else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 SKILLS: Final = {

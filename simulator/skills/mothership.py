@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, friends, lay, number, place_of
 
@@ -95,8 +95,8 @@ def _arrive(world: World, slot: int, field: Field) -> None:
     buffs.apply(world, slot, RECALLED)
 
 
-def _nobody_to_recall(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if _taken(world, cast) else Refusal.CANT_TARGET_THAT_UNIT
+def _nobody_to_recall(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if _taken(world, cast) else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # Time Warp ------------------------------------------------------------------------------------------------------------
@@ -151,11 +151,11 @@ def _chrono_boost(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, str(cast.ability.numbers["buff"]), source=cast.slot)
 
 
-def _cant_boost(world: World, cast: Cast) -> Refusal:
+def _cant_boost(world: World, cast: Cast) -> ActionResult:
     if world.build_progress[cast.target] < 1.0:
-        return Refusal.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
+        return ActionResult.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
     card = world.catalog.abilities_of(int(world.type[cast.target]))
-    return Refusal.SUCCESS if any(map(_makes_something, card)) else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if any(map(_makes_something, card)) else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _makes_something(ability: Ability) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator.casts import Cast
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.skills.cancel import cancelling
 from simulator.skills.skill import Skill, around, number
@@ -76,7 +76,7 @@ def _detonate(world: World, strike: Field) -> None:
             if slot not in struck:
                 struck.add(slot)
                 extra = number(ability, "bonus_structure") if world.unit_type(slot).structure else 0.0
-                wound(world, source, strike.owner, slot, (number(ability, "damage") + extra) * ring["fraction"])
+                apply_damage(world, source, strike.owner, slot, (number(ability, "damage") + extra) * ring["fraction"])
     afterglow = Field(
         "afterglow",
         owner=strike.owner,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.fields import Field
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
 
@@ -52,14 +52,14 @@ def _sweep(world: World, cast: Cast) -> None:
 SEEN: Final = 2
 
 
-def _can_call(world: World, cast: Cast) -> Refusal:
+def _can_call(world: World, cast: Cast) -> ActionResult:
     """Refuse units that hold no minerals, and places that the player does not see now."""
     target = cast.target
     if target != NOBODY and world.unit_type(target).resource != "minerals":
-        return Refusal.MUST_TARGET_RESOURCES
+        return ActionResult.MUST_TARGET_RESOURCES
     x, y = place_of(world, cast)
     seen = not world.fog or world.visibility[int(world.owner[cast.slot]), int(y), int(x)] == SEEN
-    return Refusal.SUCCESS if seen else Refusal.MUST_TARGET_VISIBLE_LOCATION
+    return ActionResult.SUCCESS if seen else ActionResult.MUST_TARGET_VISIBLE_LOCATION
 
 
 def _call_mule(world: World, cast: Cast) -> None:
@@ -103,11 +103,11 @@ ON_ITS_WAY: Final = "SupplyDropEnRoute"
 DROPPED: Final = "SupplyDrop"
 
 
-def _is_plain_depot(world: World, cast: Cast) -> Refusal:
+def _is_plain_depot(world: World, cast: Cast) -> ActionResult:
     slot = cast.target
     depot = slot != NOBODY and world.unit_type(slot).name in DEPOTS
     taken = depot and any(buffs.has(world, slot, name) for name in (ON_ITS_WAY, DROPPED))
-    return Refusal.SUCCESS if depot and not taken else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if depot and not taken else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _drop_supplies(world: World, cast: Cast) -> None:

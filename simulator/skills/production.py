@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import lifecycle, production
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills import morphs
 from simulator.skills.skill import Skill
 from simulator.world import NO_TAG, NOBODY, Rally
@@ -42,16 +42,16 @@ def _length(world: World, slot: int) -> float:
     return len(world.jobs.get(slot, ())) / production.parallel(world, slot)
 
 
-def has_place(world: World, slot: int, ability: Ability) -> Refusal:
+def has_place(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether a queue takes one more job of this kind."""
     if ability.unit and ability.unit not in world.catalog.row_of_name:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     jobs = world.jobs.get(slot, [])
     if any(job.kind in MORPHS for job in jobs) or (world.casts[slot] and world.bound[slot]):
-        return Refusal.CANT_QUEUE_THAT_ORDER
+        return ActionResult.CANT_QUEUE_THAT_ORDER
     if not world.powered[slot]:
-        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
-    return Refusal.SUCCESS if production.room(world, slot) else Refusal.QUEUE_IS_FULL
+        return ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
+    return ActionResult.SUCCESS if production.room(world, slot) else ActionResult.QUEUE_IS_FULL
 
 
 def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
@@ -61,9 +61,9 @@ def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point 
     return slots
 
 
-def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
+def _can_change(world: World, slot: int, ability: Ability) -> ActionResult:
     if slot in world.jobs:
-        return Refusal.CANT_QUEUE_THAT_ORDER
+        return ActionResult.CANT_QUEUE_THAT_ORDER
     return has_place(world, slot, ability)
 
 
@@ -95,10 +95,10 @@ def _hatch_back(world: World, slot: int) -> None:
         world.life[slot] = world.life_max[slot]
 
 
-def has_job(world: World, slot: int, _: Ability) -> Refusal:
+def has_job(world: World, slot: int, _: Ability) -> ActionResult:
     """Whether there is anything to call off."""
     found = slot in world.jobs or morphs.grows(world, slot)
-    return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
+    return ActionResult.SUCCESS if found else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # rally points ---------------------------------------------------------------------------------------------------------
@@ -140,15 +140,15 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
     return taken
 
 
-def _sends_units(world: World, slot: int, ability: Ability) -> Refusal:
+def _sends_units(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether units come of it: a structure, an egg, or a unit that is itself still in the making."""
     finished = world.build_progress[slot] >= 1.0
-    return Refusal.ERROR if ability.link == "ProgressRally" and finished else Refusal.SUCCESS
+    return ActionResult.ERROR if ability.link == "ProgressRally" and finished else ActionResult.SUCCESS
 
 
-def _can_rally(_: World, cast: Cast) -> Refusal:
+def _can_rally(_: World, cast: Cast) -> ActionResult:
     aimed = cast.target != NOBODY or cast.point is not None
-    return Refusal.SUCCESS if aimed else Refusal.MUST_TARGET_VISIBLE_LOCATION
+    return ActionResult.SUCCESS if aimed else ActionResult.MUST_TARGET_VISIBLE_LOCATION
 
 
 SMARTS: Final = (rally_by_click,)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.skills.skill import Skill, around, lay, number
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def _bile(world: World, cast: Cast) -> None:
 def _falls(world: World, item: Field) -> None:
     damage = number(world.catalog.ability(item.ability), "damage")
     for slot in around(world, item.at, item.radius):
-        wound(world, world.slot_of(item.source), item.owner, slot, damage)
+        apply_damage(world, world.slot_of(item.source), item.owner, slot, damage)
     fields_of_force = world.live[world.type[world.live] == world.catalog.unit("ForceField").row]
     for slot in fields_of_force.tolist():
         x, y = world.pos[slot].tolist()

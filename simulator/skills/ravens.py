@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, lifecycle, sites
+from simulator.action_result import ActionResult
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.skills import projectiles, teleport
 from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill, around, number
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 # auto-turret ----------------------------------------------------------------------------------------------------------
 
 
-def _has_room(world: World, cast: Cast) -> Refusal:
+def _has_room(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_BUILD_LOCATION_INVALID
+        return ActionResult.CANT_BUILD_LOCATION_INVALID
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     return sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
 
@@ -50,15 +50,15 @@ MATRIX: Final = ("RavenScramblerMissile", "RavenScramblerMissileCarrier")
 MARKED: Final = "ScramblerMarker"
 
 
-def _can_be_jammed(world: World, cast: Cast) -> Refusal:
+def _can_be_jammed(world: World, cast: Cast) -> ActionResult:
     """Refuse what is neither mechanical nor psionic, and where markers are known, what is jammed or about to be."""
     if cast.target == NOBODY:
-        return Refusal.MUST_TARGET_UNIT
+        return ActionResult.MUST_TARGET_UNIT
     if not {"mechanical", "psionic"} & set(world.unit_type(cast.target).attributes):
-        return Refusal.MUST_TARGET_MECHANICAL_UNITS
+        return ActionResult.MUST_TARGET_MECHANICAL_UNITS
     known = [name for name in (*MATRIX, MARKED) if name in world.catalog.buff_of_name]
     taken = MARKED in known and any(buffs.has(world, cast.target, name) for name in known)
-    return Refusal.ALREADY_TARGETED if taken else Refusal.SUCCESS
+    return ActionResult.ALREADY_TARGETED if taken else ActionResult.SUCCESS
 
 
 def _jam(world: World, cast: Cast) -> None:

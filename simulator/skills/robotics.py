@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.skills.skill import Skill, around, number, place_of
 
@@ -85,7 +85,7 @@ def _burst(world: World, field: Field, disruptor: int, nova: int) -> None:
     for slot in around(world, (x, y), field.radius, plane="ground"):
         own = int(world.owner[slot]) == field.owner
         if not (own and world.unit_type(slot).name == "Disruptor"):
-            wound(world, disruptor, field.owner, slot, amount, shield_bonus=bonus)
+            apply_damage(world, disruptor, field.owner, slot, amount, shield_bonus=bonus)
 
 
 # the barrier ----------------------------------------------------------------------------------------------------------

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle, placement, targets
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.fields import Field
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
 from simulator.traits import refresh
@@ -94,8 +94,8 @@ def _retarget(world: World, slot: int) -> None:
             targets.disengage(world, fighter)
 
 
-def _cant_lift(world: World, cast: Cast) -> Refusal:
-    return Refusal.ALREADY_TARGETED if buffs.has(world, cast.target, "Yoink") else Refusal.SUCCESS
+def _cant_lift(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.ALREADY_TARGETED if buffs.has(world, cast.target, "Yoink") else ActionResult.SUCCESS
 
 
 def _let_go(world: World, cast: Cast) -> None:
@@ -103,8 +103,8 @@ def _let_go(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _cant_let_go(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if cast.slot in world.channelling else Refusal.CANT_FIND_CANCEL_ORDER
+def _cant_let_go(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if cast.slot in world.channelling else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # Oracle ---------------------------------------------------------------------------------------------------------------
@@ -126,12 +126,12 @@ def _disarm(world: World, slot: int) -> None:
     targets.disengage(world, slot)
 
 
-def _pulses(world: World, cast: Cast) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, cast.slot, PULSAR) else Refusal.SUCCESS
+def _pulses(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.ERROR if buffs.has(world, cast.slot, PULSAR) else ActionResult.SUCCESS
 
 
-def _does_not_pulse(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, cast.slot, PULSAR) else Refusal.ERROR
+def _does_not_pulse(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if buffs.has(world, cast.slot, PULSAR) else ActionResult.ERROR
 
 
 def _mind_energy(world: World, slots: list[int]) -> None:
@@ -169,12 +169,12 @@ def _trap_place(world: World, cast: Cast) -> Point:
     return placement.snapped(place_of(world, cast), world.catalog.footprints[unit.footprint].size)
 
 
-def _cant_set_trap(world: World, cast: Cast) -> Refusal:
+def _cant_set_trap(world: World, cast: Cast) -> ActionResult:
     x, y = _trap_place(world, cast)
     height, width = world.ground.walk.shape
     inside = 0 <= x < width and 0 <= y < height
     free = inside and bool(world.ground.walk[int(y), int(x)] and world.map.terrain.build[int(y), int(x)])
-    return Refusal.SUCCESS if free else Refusal.CANT_BUILD_LOCATION_INVALID
+    return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_LOCATION_INVALID
 
 
 def _trap_done(world: World, field: Field) -> None:
@@ -203,9 +203,9 @@ def _catchable(world: World, trap: int, slots: list[int]) -> list[int]:
     ]
 
 
-def _cant_spring(world: World, cast: Cast) -> Refusal:
+def _cant_spring(world: World, cast: Cast) -> ActionResult:
     sprung = buffs.has(world, cast.slot, "OracleStasisTrapCaster")
-    return Refusal.COOLDOWN if sprung else Refusal.SUCCESS
+    return ActionResult.COOLDOWN if sprung else ActionResult.SUCCESS
 
 
 def _spring(world: World, cast: Cast) -> None:

@@ -28,7 +28,7 @@ def to(world: World, slot: int, point: Point) -> None:
     world.aside[slot] = 0.0
     world.nav_end[slot] = world.returning[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
-    world.settled = world.looked_at = -1
+    world.resting_version = world.looked_at = -1
     world.scan_now = True
 
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.arrays import which
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, around, lay, number
 from simulator.traits import refresh
 
@@ -59,7 +59,7 @@ def _storm_tick(world: World, slot: int, row: np.void) -> None:
 
 
 def _hurt(world: World, slot: int, source: int, owner: int) -> None:
-    wound(world, source, owner, slot, number(world.catalog.ability(STORM_ABILITY), "damage"))
+    apply_damage(world, source, owner, slot, number(world.catalog.ability(STORM_ABILITY), "damage"))
 
 
 # Feedback -------------------------------------------------------------------------------------------------------------
@@ -70,12 +70,12 @@ def _feedback(world: World, cast: Cast) -> None:
     energy = float(world.energy[cast.target])
     amount = energy * number(cast, "damage_per_energy")
     world.energy[cast.target] = energy * (1.0 - number(cast, "energy_drained_fraction"))
-    wound(world, cast.slot, int(world.owner[cast.slot]), cast.target, amount)
+    apply_damage(world, cast.slot, int(world.owner[cast.slot]), cast.target, amount)
 
 
-def _cant_feed_back(world: World, cast: Cast) -> Refusal:
+def _cant_feed_back(world: World, cast: Cast) -> ActionResult:
     spared = world.unit_type(cast.target).name in SPARED_BY_FEEDBACK
-    return Refusal.CANT_TARGET_THAT_UNIT if spared else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if spared else ActionResult.SUCCESS
 
 
 # Archons --------------------------------------------------------------------------------------------------------------
@@ -120,9 +120,9 @@ def _form(world: World, field: Field) -> None:
         world.orders_changed = world.scan_now = True
 
 
-def _cant_merge(world: World, cast: Cast) -> Refusal:
+def _cant_merge(world: World, cast: Cast) -> ActionResult:
     fits = cast.target == NOBODY or world.unit_type(cast.target).name in TEMPLARS
-    return Refusal.SUCCESS if fits else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if fits else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 SKILLS: Final = {

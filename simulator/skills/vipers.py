@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.fields import Field
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.projectiles import SPEED_UNKNOWN, flight_loops, throw
 from simulator.skills.skill import Skill, around, foes, lay, number
@@ -57,9 +57,9 @@ def _reach_out(world: World, cast: Cast) -> None:
     throw(world, cast, "abduct")
 
 
-def _can_pull(world: World, cast: Cast) -> Refusal:
+def _can_pull(world: World, cast: Cast) -> ActionResult:
     held = buffs.frenzied(world, cast.target) or buffs.has(world, cast.target, PULLED)
-    return Refusal.CANT_TARGET_THAT_UNIT if held else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if held else ActionResult.SUCCESS
 
 
 def _caught(world: World, item: Field) -> None:
@@ -127,7 +127,7 @@ def _spreads(world: World, slot: int, row: np.void) -> None:
 
 def _harms(world: World, slot: int, row: np.void) -> None:
     damage = number(world.catalog.ability(PARASITIC_BOMB), "damage_per_tick")
-    wound(world, int(row["source"]), int(row["owner"]), slot, damage)
+    apply_damage(world, int(row["source"]), int(row["owner"]), slot, damage)
 
 
 def _lingers(world: World, slot: int, row: np.void) -> None:
@@ -149,10 +149,10 @@ def _consume(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, DRAINED, source=cast.slot)
 
 
-def _can_consume(world: World, cast: Cast) -> Refusal:
+def _can_consume(world: World, cast: Cast) -> ActionResult:
     full = world.energy[cast.slot] >= world.energy_max[cast.slot]
     unfit = world.unit_type(cast.target).name == "CreepTumorBurrowed"
-    return Refusal.CANT_TARGET_THAT_UNIT if full or unfit else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if full or unfit else ActionResult.SUCCESS
 
 
 def _drains(world: World, cast: Cast) -> bool:

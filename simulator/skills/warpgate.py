@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import construction, pathing, payments, power, prices
+from simulator.action_result import ActionResult
 from simulator.layers import layer_of
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -44,17 +44,17 @@ def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Po
     return [slot]
 
 
-def _can_warp_in(world: World, cast: Cast) -> Refusal:
+def _can_warp_in(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_FIND_PLACEMENT_LOCATION
+        return ActionResult.CANT_FIND_PLACEMENT_LOCATION
     return refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
 
 
-def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
+def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
     """Why a player can't warp a unit in at a point, or success."""
     if power.best(world, player, point) is None:
-        return Refusal.CANT_BUILD_TOO_FAR_FROM_POWER
-    return Refusal.SUCCESS if _is_free(world, unit, point) else Refusal.CANT_WARP_IN_UNITS_THERE
+        return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
+    return ActionResult.SUCCESS if _is_free(world, unit, point) else ActionResult.CANT_WARP_IN_UNITS_THERE
 
 
 def _is_free(world: World, unit: UnitType, point: Point) -> bool:

@@ -155,7 +155,7 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
     wanted = gap <= sight
-    if census(world).picky:
+    if census(world).weapons_with_filters:
         wanted &= (gap >= world.least_range[seekers, None]) | (world.least_range[seekers, None] <= 0.0)
         wanted &= ~(world.spares_structures[seekers, None] & world.walled.take(foes))
     if world.fields and some(world.zone_radius.take(seekers) > 0.0):

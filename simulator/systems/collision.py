@@ -43,16 +43,16 @@ EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 
 
 def separate(world: World) -> None:
     """Carry out this loop's steps, push bodies apart and remember who could not get on."""
-    if not world.stirred and world.settled == world.population:
+    if not world.anyone_moved and world.resting_version == world.population:
         return
     slots = world.live
     before = world.pos.take(slots, 0)
-    after = before + world.intended.take(slots, 0) if world.stirred else before.copy()
+    after = before + world.intended.take(slots, 0) if world.anyone_moved else before.copy()
     crowded = _push_apart(world, slots, before, after)
     _keep_on_surfaces(world, slots, before, after)
     world.pos[slots] = after
-    world.settled = -1 if world.stirred or crowded else world.population
-    if world.stirred:
+    world.resting_version = -1 if world.anyone_moved or crowded else world.population
+    if world.anyone_moved:
         _note_blocked(world, slots, before, after)
 
 
@@ -180,7 +180,7 @@ def _left(world: World, slots: Ints) -> Floats:
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
     """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
     firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
-    if census(world).pushovers:
+    if census(world).low_priority_bodies:
         firm *= world.lightness.take(slots)
     immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
     if some(immobile):

@@ -10,11 +10,11 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator import casting
 from simulator.abilities import Ability
+from simulator.action_result import ActionResult
 from simulator.api import game
 from simulator.casting import is_modelled
 from simulator.catalog import load_catalog
 from simulator.client import Client, command, interface
-from simulator.refusal import Refusal
 from simulator.status import Status
 from simulator.world import World
 
@@ -221,7 +221,7 @@ def judgements(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     asked: list[int] = []
     refusal = casting.refusal
 
-    def counted(world: World, slot: int, ability: Ability, *, free: bool = False) -> Refusal:
+    def counted(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
         asked.append(ability.id)
         return refusal(world, slot, ability, free=free)
 

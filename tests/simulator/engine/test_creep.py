@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from simulator import casting, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.systems.creep import makers, needy
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def test_an_overlords_creep_recedes(ground: Any, overlord: int, how: str) -> Non
 def test_creep_from_overlords_needs_a_lair(ground: Any) -> None:
     slot = ground.put("Overlord", 1, 45.5, 45.5)
     ability = ground.world.catalog.ability(GENERATE)
-    assert casting.refusal(ground.world, slot, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(ground.world, slot, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_creep_is_part_of_what_decides_the_future(ground: Any) -> None:

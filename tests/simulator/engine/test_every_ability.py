@@ -14,12 +14,12 @@ import pytest
 
 from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
 from simulator.abilities import Aim
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
 from simulator.columns import NOBODY
 from simulator.maps import load_map
 from simulator.players import PlayerSetup
-from simulator.refusal import Refusal
 from simulator.skills.registry import SKILLS
 from simulator.systems import creep
 from simulator.tick import advance
@@ -307,10 +307,10 @@ def attempt(world: World, ability: Ability) -> list[int]:
             begin_what_it_cancels(world, slot, ability)
         if ability.does in PREPARE:
             PREPARE[ability.does](world, slot)
-        if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+        if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
             continue
         for target, point in aims(world, slot, ability):
-            if casting.aim_refusal(world, Cast(slot, ability, target, point)) is Refusal.SUCCESS:
+            if casting.aim_refusal(world, Cast(slot, ability, target, point)) is ActionResult.SUCCESS:
                 taken = casting.use(world, [slot], ability, target=world.tag_of(target), point=point)
                 if taken:
                     return taken

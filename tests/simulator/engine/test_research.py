@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -35,13 +35,13 @@ def test_research_costs_lasts_and_is_done_once(field: Field) -> None:
     field.play(1)
     assert casting.use(field.world, [core, other], ability) == [core]
     assert (player.minerals, player.vespene) == (500.0 - ability.minerals, 500.0 - ability.vespene)
-    assert casting.refusal(field.world, other, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, other, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.play(int(ability.loops) - 1)
     assert player.upgrades == []
     field.play(1)
     assert player.upgrades == [CATALOG.upgrade(ability.upgrade).id]
     assert field.world.alerts[-1].name == "ResearchComplete"
-    assert casting.refusal(field.world, other, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, other, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_research_that_is_called_off_can_be_begun_again(field: Field) -> None:
@@ -53,7 +53,7 @@ def test_research_that_is_called_off_can_be_begun_again(field: Field) -> None:
     casting.use(field.world, [core], ability)
     casting.use(field.world, [core], CATALOG.ability(306))
     assert (player.minerals, player.vespene, player.underway) == (50.0, 50.0, [])
-    assert casting.refusal(field.world, core, ability) is Refusal.SUCCESS
+    assert casting.refusal(field.world, core, ability) is ActionResult.SUCCESS
 
 
 def test_a_finished_upgrade_counts_for_units_that_are_there(field: Field) -> None:
