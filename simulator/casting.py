@@ -43,7 +43,7 @@ PAID_FIRST: Final = frozenset({"grow"})
 
 def is_modelled(ability: Ability) -> bool:
     """Whether the simulator has a rule for this ability."""
-    return ability.does in ORDINARY or ability.does in SKILLS
+    return ability.effect in ORDINARY or ability.effect in SKILLS
 
 
 def as_is(world: World, slot: int, ability: Ability) -> Ability:
@@ -55,9 +55,9 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
     """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
     ability = as_is(world, slot, ability)
     loops = ability.intro_loops + ability.prep_loops
-    if ability.does not in MORPHS:
+    if ability.effect not in MORPHS:
         return loops
-    if ability.does not in PAID_FIRST:
+    if ability.effect not in PAID_FIRST:
         loops += ability.loops
     return loops + (world.rng.random() * ability.random_loops if ability.random_loops else 0.0)
 
@@ -69,14 +69,14 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
     """Whether a unit could use an ability of its card now, whatever it is aimed at; ``free`` looks at no cost."""
     if not is_modelled(ability):
         return ActionResult.NOT_SUPPORTED
-    if ability.does in ORDINARY:
+    if ability.effect in ORDINARY:
         return _ordinary_refusal(world, slot, ability)
     why = _unready(world, slot, ability)
     return why if free or why is not ActionResult.SUCCESS else _unaffordable(world, slot, ability)
 
 
 def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
-    skill = SKILLS[ability.does]
+    skill = SKILLS[ability.effect]
     if not (world.powered[slot] or skill.anytime):
         return ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
     if not (world.can_cast[slot] or skill.anytime) or world.hallucination[slot]:
@@ -89,7 +89,7 @@ def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
 def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
     if world.build_progress[slot] < 1.0:
         return ActionResult.BUILDING_IS_UNDER_CONSTRUCTION
-    stuck = ability.does in WALKS and not commands.can_move(world, slot)
+    stuck = ability.effect in WALKS and not commands.can_move(world, slot)
     return ActionResult.UNIT_CANT_MOVE if stuck else ActionResult.SUCCESS
 
 
@@ -124,11 +124,13 @@ def aim_refusal(world: World, cast: Cast) -> ActionResult:
         if wrong is not ActionResult.SUCCESS:
             return wrong
     far = (
-        SKILLS[ability.does].give is None and ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
+        SKILLS[ability.effect].give is None
+        and ability.range < ANYWHERE
+        and (target != NOBODY or cast.point is not None)
     )
     if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
         return ActionResult.TARGET_IS_OUT_OF_RANGE
-    return SKILLS[ability.does].refuse(world, cast)
+    return SKILLS[ability.effect].refuse(world, cast)
 
 
 def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
@@ -252,7 +254,7 @@ def use(
 def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool = False) -> list[int]:
     """Have units carry out casts of one ability that nothing stands against; returns the slots that will."""
     target, point = casts[0].target, casts[0].point
-    give = SKILLS[ability.does].give
+    give = SKILLS[ability.effect].give
     if give is not None:
         return give(world, [cast.slot for cast in casts], ability, world.tag_of(target), point, queue)
     if ability.solo and len(casts) > 1:
@@ -300,7 +302,7 @@ def perform(world: World, cast: Cast) -> None:
         world.energy[slot] = max(0.0, float(world.energy[slot]) - ability.energy)
         world.life[slot] -= ability.life
     start_cooldown(world, slot, ability)
-    SKILLS[ability.does].effect(world, cast)
+    SKILLS[ability.effect].effect(world, cast)
 
 
 def start_cooldown(world: World, slot: int, ability: Ability, loops: float | None = None) -> None:
@@ -314,7 +316,7 @@ def start_cooldown(world: World, slot: int, ability: Ability, loops: float | Non
 
 def skill_of(ability: Ability) -> Skill:
     """The rule behind an ability; raises ``KeyError`` for one that is not modelled."""
-    return SKILLS[ability.does]
+    return SKILLS[ability.effect]
 
 
 def fail(world: World, cast: Cast, why: ActionResult) -> None:

@@ -196,7 +196,7 @@ def debug_switch(world: World, player: int, name: str) -> None:
 def debug_upgrade(world: World, player: int) -> None:
     """Give a player every upgrade that can be researched."""
     for ability in world.catalog.abilities:
-        if ability.does == "research":
+        if ability.effect == "research":
             grant_upgrade(world, player, world.catalog.upgrade(ability.upgrade).id)
 
 
@@ -295,8 +295,8 @@ GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
 
 def _of_its_own(world: World, slot: int, order: Order) -> Order:
     """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
-    does = ORDINARY.get(order.kind) if order.ability in GENERAL else None
-    own = None if does is None else world.catalog.ordinary[int(world.type[slot])].get(does)
+    effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
+    own = None if effect is None else world.catalog.ordinary[int(world.type[slot])].get(effect)
     return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
 
 

@@ -34,18 +34,18 @@ def priced(
 
 
 def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]) -> Ability:
-    if ability.does == "research":
+    if ability.effect == "research":
         return _priced_research(ability, upgrades.get(ability.upgrade))
     product = units.get(ability.unit)
-    if ability.does not in BY_PRODUCT:
+    if ability.effect not in BY_PRODUCT:
         return ability
     if product is None:
-        return dataclasses.replace(ability, does="")
+        return dataclasses.replace(ability, effect="")
     ways = [way for way in product.made_by if way.ability == ability.id]
     if not ways or ability.minerals or ability.vespene:
         return ability
     way = ways[0]
-    reach = product.radius + BUILD_REACH if ability.does == "build" and not ability.range else ability.range
+    reach = product.radius + BUILD_REACH if ability.effect == "build" and not ability.range else ability.range
     minerals, vespene = way.cost
     return dataclasses.replace(
         ability,
@@ -60,7 +60,7 @@ def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[s
 
 def _priced_research(ability: Ability, upgrade: Upgrade | None) -> Ability:
     if upgrade is None or not ability.loops:
-        return dataclasses.replace(ability, does="")
+        return dataclasses.replace(ability, effect="")
     if ability.minerals or ability.vespene:
         return ability
     minerals, vespene = upgrade.cost

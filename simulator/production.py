@@ -46,7 +46,7 @@ def enqueue(world: World, slot: int, ability: Ability, *, makes: str, loops: flo
     owner = int(world.owner[slot])
     paid = payments.charge(world, owner, prices.cost_of(ability))
     job = Job(
-        ability.id, ability.does, makes, owner, loops, paid, supply=ability.supply, count=ability.count, site=site
+        ability.id, ability.effect, makes, owner, loops, paid, supply=ability.supply, count=ability.count, site=site
     )
     world.jobs.setdefault(slot, []).append(job)
     world.players[owner].underway.append(makes)

@@ -141,7 +141,7 @@ def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
             continue
         for order in world.orders_of(slot):
             ability = world.catalog.ability_of_id.get(order.ability)
-            unit = product(world, ability) if ability is not None and ability.does == "build" else None
+            unit = product(world, ability) if ability is not None and ability.effect == "build" else None
             victim = world.slot_of(order.target)
             if unit is not None and order.kind is OrderKind.CAST and (order.point is not None or victim != NOBODY):
                 x, y = order.point or world.pos[victim].tolist()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.systems import (
     acquire,
+    area_effects,
     autocast,
     avoidance,
     buffs,
@@ -19,7 +20,6 @@ from simulator.systems import (
     creep,
     death,
     engagement,
-    fields,
     harvest,
     hits,
     idleness,
@@ -67,7 +67,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     missiles.fly,
     sweeps.run,  # lines that are being drawn through the ranks
     hits.fall_due,
-    fields.run,  # storms, scans and whatever else lies on the ground
+    area_effects.run,  # storms, scans and whatever else lies on the ground
     buffs.run_out,
     idleness.count,
     regeneration.regenerate,

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from simulator.action_result import ActionResult
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
-    from simulator.fields import Field
     from simulator.jobs import Job
     from simulator.maps import GameMap
 
@@ -120,7 +120,7 @@ class World(UnitColumns, WorldCaches):
         self.pending = PendingHits()
         self.sweeps: list[Sweep] = []
         self.buffs = ActiveBuffs()
-        self.fields: list[Field] = []
+        self.area_effects: list[AreaEffect] = []
         self.timers: dict[int, dict[str, float]] = {}  # slot -> cooldown's name -> loop at which it is over
         self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
@@ -331,7 +331,7 @@ class World(UnitColumns, WorldCaches):
         sha.update(repr(self.script.content()).encode())
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
         sha.update(repr((self.jobs, self.rallies, self.invested)).encode())
-        sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
+        sha.update(repr((self.area_effects, self.timers, self.autocast, self.sweeps)).encode())
         channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
         sha.update(repr(channels).encode())
         sha.update(self.growth.content())

@@ -149,7 +149,7 @@ def carry_out(world: World, plan: Plan) -> Outcome:
         return Outcome(plan.result)
     taken: list[int] = []
     for ability, casts in plan.parts:
-        if ability.does not in GIVE and taken:  # what an earlier part has cost may be missing now
+        if ability.effect not in GIVE and taken:  # what an earlier part has cost may be missing now
             slots = [cast.slot for cast in casts]
             queue = plan.asked.queue
             taken += casting.use(world, slots, ability, target=plan.target, point=plan.point, queue=queue)
@@ -176,7 +176,7 @@ def _without_snapshot(world: World, player: int, command: Command) -> Command:
 
 def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
     """The id by which a command of several kinds is reported: that of a fight before that of a walk."""
-    return max(parts, key=lambda part: (part[0].does == "attack", -part[0].id))[0].id
+    return max(parts, key=lambda part: (part[0].effect == "attack", -part[0].id))[0].id
 
 
 def _groups(
@@ -211,9 +211,9 @@ def _judged(
             return ActionResult.MUST_TARGET_VISIBLE_UNIT
     why = casting.refusal(world, slot, ability) if known is None else known
     cast = Cast(slot, casting.as_is(world, slot, ability), target, command.point)
-    if why is ActionResult.SUCCESS and ability.does == "attack" and target != NOBODY:
+    if why is ActionResult.SUCCESS and ability.effect == "attack" and target != NOBODY:
         why = _cant_attack(world, slot, target)
-    elif why is ActionResult.SUCCESS and ability.does not in casting.ORDINARY:
+    elif why is ActionResult.SUCCESS and ability.effect not in casting.ORDINARY:
         why = casting.aim_refusal(world, cast)
     return cast if why is ActionResult.SUCCESS else why
 
@@ -229,7 +229,7 @@ def _cant_attack(world: World, slot: int, target: int) -> ActionResult:
 
 
 def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: Plan) -> list[int]:
-    give = GIVE.get(ability.does)
+    give = GIVE.get(ability.effect)
     if give is None:
         return casting.order(world, casts, ability, queue=plan.asked.queue)
     return give(world, [cast.slot for cast in casts], plan)

@@ -192,12 +192,12 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
     if command.target and point is None:
         x, y = seat.world.pos[seat.world.slot_of(command.target)].tolist()
         point = x, y
-    does = seat.world.catalog.ability(outcome.ability).does
+    effect = seat.world.catalog.ability(outcome.ability).effect
     for spatial, view in _images(seat, action):
         spatial.unit_command.ability_id = outcome.ability
         spatial.unit_command.queue_command = command.queue
         if point is not None:
-            pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=does in ON_MINIMAP)
+            pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=effect in ON_MINIMAP)
 
 
 def _press(seat: Seat, ui: ui_pb2.ActionUI, loop: int) -> None:

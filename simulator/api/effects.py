@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from simulator.api.sight import Sight
     from simulator.api.types import Types
-    from simulator.fields import Field
+    from simulator.area_effects import AreaEffect
     from simulator.skills.buildings import Radar
     from simulator.world import World
 
@@ -58,9 +58,9 @@ class Power(NamedTuple):
     radius: Floats
 
 
-def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[Field]:
+def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[AreaEffect]:
     """Fields that the API has an effect id for and that the player perceives: his own, and those in his sight."""
-    told = [field for field in world.fields if field.effect]
+    told = [field for field in world.area_effects if field.effect]
     if through_fog or not told:
         return told
     return [f for f in told if f.owner == player or sees(world, player, np.array(f.points, float)).any()]

@@ -86,5 +86,5 @@ def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> err
     point = (question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1])
     if not (all(map(math.isfinite, point)) and _on_map(world, *point)):
         return error_pb2.CantBuildLocationInvalid
-    rule = warpgate.refusal if ability.does == "warp_in" else sites.refusal
+    rule = warpgate.refusal if ability.effect == "warp_in" else sites.refusal
     return result_of(rule(world, seat.player, unit, point))

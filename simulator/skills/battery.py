@@ -102,7 +102,7 @@ def recharge_by_click(
     taken: list[int] = []
     for slot in slots if target != NOBODY else ():
         card = world.catalog.abilities_of(int(world.type[slot]))
-        ability = next((a for a in card if a.does == "recharge_shields"), None)
+        ability = next((a for a in card if a.effect == "recharge_shields"), None)
         if ability is None or world.owner[target] != world.owner[slot] or gap(world, slot, target) > ability.range:
             continue
         if _cant_recharge(world, Cast(slot, ability, target)) is ActionResult.SUCCESS:

@@ -13,8 +13,8 @@ from simulator.skills import projectiles, teleport
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.world import World
 
 # Yamato cannon --------------------------------------------------------------------------------------------------------
@@ -46,7 +46,7 @@ def _cool_down(world: World, cast: Cast, loops: float) -> None:
     world.timers.setdefault(cast.slot, {})[cast.ability.timer] = world.loop + loops
 
 
-def _impact(world: World, missile: Field, target: int) -> None:
+def _impact(world: World, missile: AreaEffect, target: int) -> None:
     amount = number(world.catalog.ability(missile.ability), "damage")
     apply_damage(world, world.slot_of(missile.source), missile.owner, target, amount)
 

@@ -77,7 +77,7 @@ def _not_yet(world: World, cast: Cast) -> ActionResult:
 def _take_down(world: World, slot: int, row: np.void) -> None:
     """Give back a part of what a structure cost; it leaves the world, and no score counts it as lost."""
     owner = int(row["owner"])
-    ability = next(a for a in world.catalog.abilities if a.does == "salvage_shared_on")
+    ability = next(a for a in world.catalog.abilities if a.effect == "salvage_shared_on")
     share = number(ability, "refund")
     minerals, vespene = world.unit_type(slot).cost
     world.players[owner].minerals += minerals * share

@@ -13,12 +13,13 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 
-def cancelling(does: str) -> Skill:
-    """The skill that ends a unit's order to use an ability that ``does`` this; what waits behind it begins."""
+def cancelling(cancelled: str) -> Skill:
+    """The skill that ends an order to use an ability with the effect ``cancelled``; what waits behind it begins."""
 
     def refuse(world: World, cast: Cast) -> ActionResult:
-        current = world.casts[cast.slot] and world.catalog.ability(int(world.order_ability[cast.slot])).does == does
-        return ActionResult.SUCCESS if current else ActionResult.CANT_FIND_CANCEL_ORDER
+        used = world.catalog.ability_of_id.get(int(world.order_ability[cast.slot]))
+        under_way = world.casts[cast.slot] and used is not None and used.effect == cancelled
+        return ActionResult.SUCCESS if under_way else ActionResult.CANT_FIND_CANCEL_ORDER
 
     def effect(world: World, cast: Cast) -> None:
         """Call off what the unit is doing."""

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number, place_of
 
@@ -128,8 +128,8 @@ def _phase_shift(world: World, cast: Cast) -> None:
     buffs.apply(world, slot, SHIFTING, source=slot)
     buffs.apply(world, shade, SHADE, source=slot)
     commands.move(world, [shade], place_of(world, cast))
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "phase_shift",
             int(world.owner[slot]),
             [(x, y)],
@@ -143,7 +143,7 @@ def _phase_shift(world: World, cast: Cast) -> None:
     )
 
 
-def _shift(world: World, field: Field) -> None:
+def _shift(world: World, field: AreaEffect) -> None:
     """Send the Adept to its shade when the time has come; let the shade go when the Adept is dead or has given up."""
     adept, shade = world.slot_of(field.source), world.slot_of(field.target)
     held = adept != NOBODY and buffs.has(world, adept, SHIFTING) and world.carrier[adept] == NOBODY
@@ -172,8 +172,8 @@ def _arrive(world: World, adept: int, shade: int) -> None:
 def _cancel_shift(world: World, cast: Cast) -> None:
     """Give up the shift: told to the Adept or to its shade."""
     tag = world.tag_of(cast.slot)
-    for field in world.fields:
-        if field.does == "phase_shift" and tag in (field.source, field.target):
+    for field in world.area_effects:
+        if field.rule == "phase_shift" and tag in (field.source, field.target):
             adept = world.slot_of(field.source)
             if adept != NOBODY:
                 buffs.remove(world, adept, SHIFTING)
@@ -197,5 +197,5 @@ SKILLS: Final = {
     ),
     "cancel_phase_shift": Skill(_cancel_shift),
 }
-FIELDS: Final = {"phase_shift": _shift}
+AREA_EFFECTS: Final = {"phase_shift": _shift}
 PASSIVES: Final[dict[str, UnitRule]] = {"Zealot": _strike_home}

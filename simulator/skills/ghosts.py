@@ -17,8 +17,8 @@ from simulator.targets import disengage
 if TYPE_CHECKING:
     import numpy as np
 
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.skills.skill import BuffRule
     from simulator.world import World
 
@@ -71,7 +71,7 @@ def _fire_emp(world: World, cast: Cast) -> None:
     projectiles.launch(world, cast, MECHANICS.emp_speed_n)
 
 
-def _burst(world: World, missile: Field, _: int) -> None:
+def _burst(world: World, missile: AreaEffect, _: int) -> None:
     """Take shields and energy from everybody around, friends as well, and uncover who is cloaked."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):

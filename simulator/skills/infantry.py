@@ -10,9 +10,9 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, lifecycle, pathing
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
 from simulator.skills.basics import on_self
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from simulator.casts import Cast
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 # stimpack -------------------------------------------------------------------------------------------------------------
@@ -73,7 +73,7 @@ def _throw_charge(world: World, cast: Cast) -> None:
     lay(world, cast, "kd8_charge", end=world.loop + fuse, due=world.loop + fuse).target = world.tag_of(charge)
 
 
-def _explode(world: World, charge: Field) -> None:
+def _explode(world: World, charge: AreaEffect) -> None:
     """Hurt everybody on the ground around a charge, friends as well, and throw them outwards."""
     ability, source = world.catalog.ability(charge.ability), world.slot_of(charge.source)
     body = world.slot_of(charge.target)
@@ -86,7 +86,7 @@ def _explode(world: World, charge: Field) -> None:
         world.attacker[body] = NOBODY
 
 
-def _throw(world: World, charge: Field, slot: int) -> None:
+def _throw(world: World, charge: AreaEffect, slot: int) -> None:
     unit = world.unit_type(slot)
     firm = unit.structure or "massive" in unit.attributes or bool(world.burrowed[slot]) or unit.name in STAYS_PUT
     if firm or world.life[slot] <= 0.0 or buffs.has(world, slot, "Frenzy"):
@@ -98,8 +98,8 @@ def _throw(world: World, charge: Field, slot: int) -> None:
     away = math.hypot(x - from_x, y - from_y)
     across, along = ((x - from_x) / away, (y - from_y) / away) if away > 0.0 else (1.0, 0.0)
     step = number(ability, "knockback_distance") / loops
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "knockback",
             owner=charge.owner,
             points=[(x, y)],
@@ -113,7 +113,7 @@ def _throw(world: World, charge: Field, slot: int) -> None:
     )
 
 
-def _fly_back(world: World, item: Field) -> None:
+def _fly_back(world: World, item: AreaEffect) -> None:
     """Carry a thrown unit on, until something is in its way that it can't walk on."""
     slot = world.slot_of(item.target)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
@@ -142,5 +142,5 @@ SKILLS: Final = {
         ),
     ),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"kd8_charge": _explode, "knockback": _fly_back}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"kd8_charge": _explode, "knockback": _fly_back}
 IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {"PunisherGrenadesU": _slow}

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.orders import OrderKind
 from simulator.placement import free_places
 from simulator.skills import teleport
@@ -40,7 +40,7 @@ def _fungal(world: World, cast: Cast) -> None:
     throw(world, cast, "fungal_growth", radius=number(cast, "radius"))
 
 
-def _grows_over(world: World, item: Field) -> None:
+def _grows_over(world: World, item: AreaEffect) -> None:
     source = world.slot_of(item.source)
     for slot in foes(world, around(world, item.at, item.radius, structures=False), item.owner):
         for name in ("FungalGrowth", "FungalGrowthSlowMovement"):
@@ -66,7 +66,7 @@ def _can_reach(world: World, cast: Cast) -> ActionResult:
     return ActionResult.SUCCESS if free else ActionResult.CANT_TARGET_THAT_UNIT
 
 
-def _arrives(world: World, item: Field) -> None:
+def _arrives(world: World, item: AreaEffect) -> None:
     slot, target = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (slot, target) or not world.channels[slot] or world.order_target[slot] != target:
         return
@@ -83,7 +83,7 @@ def _controls(world: World, cast: Cast) -> bool:
     if world.order_target[slot] != target:
         return False
     tag = world.tag_of(slot)
-    if any(item.does == "neural_parasite" and item.source == tag for item in world.fields):
+    if any(item.rule == "neural_parasite" and item.source == tag for item in world.area_effects):
         return True
     return _holder(world, target) == slot and gap(world, slot, target) <= number(cast, "leash_range")
 
@@ -127,7 +127,7 @@ def _break_off(world: World, cast: Cast) -> None:
 
 def _is_holding(world: World, slot: int, _: Ability) -> ActionResult:
     held = world.channelling.get(slot)
-    holding = held is not None and held.ability.does == "neural_parasite"
+    holding = held is not None and held.ability.effect == "neural_parasite"
     return ActionResult.SUCCESS if holding else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
@@ -139,20 +139,20 @@ def _infested_terrans(world: World, cast: Cast) -> None:
     throw(world, cast, "infested_terran_egg")
 
 
-def _egg_lands(world: World, item: Field) -> None:
+def _egg_lands(world: World, item: AreaEffect) -> None:
     ability = world.catalog.ability(item.ability)
     egg = world.catalog.unit(str(ability.numbers["egg"]))
     (place,) = free_places(world, egg, item.at, 1)
     slot = lifecycle.spawn(world, egg, item.owner, place)
     hatch = next(a for a in world.catalog.abilities_of(egg.row) if a.unit == "InfestorTerran")
     due = world.loop + hatch.loops
-    world.fields.append(
-        Field("infested_terran", item.owner, [place], 0.0, world.loop, due, due=due, ability=item.ability,
+    world.area_effects.append(
+        AreaEffect("infested_terran", item.owner, [place], 0.0, world.loop, due, due=due, ability=item.ability,
               target=world.tag_of(slot))
     )  # fmt: skip
 
 
-def _hatches(world: World, item: Field) -> None:
+def _hatches(world: World, item: AreaEffect) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY:
         lifecycle.become(world, slot, world.catalog.unit("InfestorTerran"))
@@ -169,7 +169,7 @@ def _shroud(world: World, cast: Cast) -> None:
     lay(world, cast, "microbial_shroud", end=end, due=world.loop, period=period)
 
 
-def _shrouds(world: World, item: Field) -> None:
+def _shrouds(world: World, item: AreaEffect) -> None:
     for slot in around(world, item.at, item.radius, plane="ground", structures=False):
         if world.owner[slot]:
             buffs.apply(world, slot, SHROUD, source=world.slot_of(item.source), owner=item.owner)
@@ -188,7 +188,7 @@ SKILLS: Final = {
     "infested_terrans": Skill(_infested_terrans, estimates=(SPEED_UNKNOWN, "An infested terran lives for 480 loops.")),
     "amorphous_armorcloud": Skill(_shroud),
 }
-FIELDS: Final = {
+AREA_EFFECTS: Final = {
     "fungal_growth": _grows_over,
     "neural_parasite": _arrives,
     "infested_terran_egg": _egg_lands,

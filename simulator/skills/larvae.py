@@ -12,8 +12,8 @@ import numpy as np
 
 from simulator import buffs, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
 from simulator.skills.skill import Skill, distance, number
@@ -110,8 +110,8 @@ def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     world.alert(int(world.owner[slot]), "LarvaHatched")
     numbers = world.catalog.ability(INJECT)
     count, gap = int(number(numbers, "larva")), MECHANICS.injected_larva_loops
-    world.fields.append(
-        Field("injected_larvae", int(row["owner"]), [(0.0, 0.0)], 0.0, world.loop, world.loop + count * gap,
+    world.area_effects.append(
+        AreaEffect("injected_larvae", int(row["owner"]), [(0.0, 0.0)], 0.0, world.loop, world.loop + count * gap,
               due=world.loop + gap, period=gap, target=world.tag_of(slot))
     )  # fmt: skip
     at = world.buffs.find(slot, world.catalog.buff(WAITING).row)
@@ -123,7 +123,7 @@ def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     buffs.apply(world, slot, INJECTED, owner=int(row["owner"]))
 
 
-def _one_hatches(world: World, item: Field) -> None:
+def _one_hatches(world: World, item: AreaEffect) -> None:
     hall = world.slot_of(item.target)
     if hall >= 0:
         hatch(world, hall)
@@ -163,6 +163,6 @@ def _step(world: World, slot: int, x: float, y: float) -> None:
 SKILLS: Final = {
     "spawn_larva": Skill(_inject, refuse=_is_hall, estimates=("How larvae wander.",)),
 }
-FIELDS: Final = {"injected_larvae": _one_hatches}
+AREA_EFFECTS: Final = {"injected_larvae": _one_hatches}
 ENDS: Final = {INJECTED: _injection_is_over}
 PASSIVES: Final = {**dict.fromkeys(HALLS, _hatch_by_nature), "Larva": _wander}

@@ -17,8 +17,8 @@ from simulator.skills import projectiles
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast, Point
-    from simulator.fields import Field
     from simulator.skills.skill import SmartRule, UnitRule
     from simulator.world import World
 
@@ -43,7 +43,7 @@ def _fire(world: World, cast: Cast) -> None:
     projectiles.launch(world, cast, MECHANICS.mine_missile_speed_n)
 
 
-def _explode(world: World, missile: Field, target: int) -> None:
+def _explode(world: World, missile: AreaEffect, target: int) -> None:
     """Hurt the target, and whoever is around it, friends as well, but no structure and no mine of the owner's."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     owner = missile.owner

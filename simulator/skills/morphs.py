@@ -56,7 +56,7 @@ def _can_grow(world: World, slot: int, _: Ability) -> ActionResult:
 def grows(world: World, slot: int) -> bool:
     """Whether a unit is in the midst of such a morph."""
     growing = world.channelling.get(slot)
-    return growing is not None and growing.ability.does == "grow"
+    return growing is not None and growing.ability.effect == "grow"
 
 
 def call_off(world: World, slot: int) -> None:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from simulator.abilities import Ability
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.skills.skill import BuffRule, UnitRule
     from simulator.world import World
 
@@ -61,7 +61,7 @@ def _recall(world: World, cast: Cast) -> None:
     lay(world, cast, "recall", end=world.loop + lasts, due=world.loop + 1).points.append((x, y))
 
 
-def _bring(world: World, field: Field) -> None:
+def _bring(world: World, field: AreaEffect) -> None:
     """Take the marked units along at the end; without the caster they stay and are free."""
     caster = world.slot_of(field.source)
     lost = caster == NOBODY or buffs.has(world, caster, SCRAMBLED)
@@ -75,7 +75,7 @@ def _bring(world: World, field: Field) -> None:
     field.end = world.loop
 
 
-def _marked(world: World, name: str, field: Field) -> list[int]:
+def _marked(world: World, name: str, field: AreaEffect) -> list[int]:
     rows = world.buffs.rows
     mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == field.begun)
     mine &= (rows["source"] == world.slot_of(field.source)) | (rows["source"] == NOBODY)
@@ -83,7 +83,7 @@ def _marked(world: World, name: str, field: Field) -> list[int]:
     return slots
 
 
-def _arrive(world: World, slot: int, field: Field) -> None:
+def _arrive(world: World, slot: int, field: AreaEffect) -> None:
     """Stand as far from the destination as it stood from the middle of the recall, or as near to there as it fits."""
     (from_x, from_y), (to_x, to_y) = field.points
     x, y = world.pos[slot].tolist()
@@ -108,7 +108,7 @@ def _time_warp(world: World, cast: Cast) -> None:
     lay(world, cast, "time_warp", end=grown + number(cast, "duration_loops"), due=grown, effect=GROWING_EFFECT)
 
 
-def _slow(world: World, field: Field) -> None:
+def _slow(world: World, field: AreaEffect) -> None:
     field.effect = WARP_EFFECT
     plane = str(world.catalog.ability(field.ability).numbers["plane"])
     for slot in foes(world, around(world, field.at, field.radius, plane=plane), field.owner):
@@ -159,7 +159,7 @@ def _cant_boost(world: World, cast: Cast) -> ActionResult:
 
 
 def _makes_something(ability: Ability) -> bool:
-    return ability.does in ("train", "research", "warp_in") or bool(ability.upgrade)
+    return ability.effect in ("train", "research", "warp_in") or bool(ability.upgrade)
 
 
 SKILLS: Final = {
@@ -175,6 +175,6 @@ SKILLS: Final = {
     "mothership_cloak": Skill(_cloak),
     "chrono_boost": Skill(_chrono_boost, refuse=_cant_boost),
 }
-FIELDS: Final = {"recall": _bring, "time_warp": _slow}
+AREA_EFFECTS: Final = {"recall": _bring, "time_warp": _slow}
 TICKS: Final[dict[str, BuffRule]] = {CLOAK_FIELD: _cloak_around}
 PASSIVES: Final[dict[str, UnitRule]] = {"Mothership": _always_cloaks}

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.placement import free_places
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from simulator.casts import Cast
-    from simulator.skills.skill import BuffRule, FieldRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule
     from simulator.world import World
 
 SWEEP: Final = 6  # the API's ScannerSweep
@@ -29,8 +29,8 @@ SWEEP: Final = 6  # the API's ScannerSweep
 def _sweep(world: World, cast: Cast) -> None:
     """See everything in a circle anywhere on the map for a while, what is cloaked or burrowed as well."""
     lasts, radius = number(cast, "duration_loops"), number(cast, "radius")
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "scanner_sweep",
             owner=int(world.owner[cast.slot]),
             points=[place_of(world, cast)],
@@ -65,8 +65,8 @@ def _can_call(world: World, cast: Cast) -> ActionResult:
 def _call_mule(world: World, cast: Cast) -> None:
     """Have a MULE come down, which mines for the time it lives."""
     falls = number(cast, "delay_loops")
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "calldown_mule",
             owner=int(world.owner[cast.slot]),
             points=[place_of(world, cast)],
@@ -80,7 +80,7 @@ def _call_mule(world: World, cast: Cast) -> None:
     )
 
 
-def _land_mule(world: World, item: Field) -> None:
+def _land_mule(world: World, item: AreaEffect) -> None:
     ability = world.catalog.ability(item.ability)
     unit = world.catalog.unit(str(ability.numbers["unit"]))
     mule = lifecycle.spawn(world, unit, item.owner, free_places(world, unit, item.at, 1)[0])
@@ -131,5 +131,5 @@ SKILLS: Final = {
     "supply_drop": Skill(_drop_supplies, refuse=_is_plain_depot),
 }
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {"MULE": _expire}
-FIELDS: Final[dict[str, FieldRule]] = {"calldown_mule": _land_mule}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"calldown_mule": _land_mule}
 ENDS: Final[dict[str, BuffRule]] = {ON_ITS_WAY: _arrive}

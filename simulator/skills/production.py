@@ -130,7 +130,7 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
     taken = []
     for slot in slots:
         card = world.catalog.abilities_of(int(world.type[slot]))
-        kinds = {"workers" if a.general == WORKERS else "units" for a in card if a.does == "rally"}
+        kinds = {"workers" if a.general == WORKERS else "units" for a in card if a.effect == "rally"}
         if not world.unit_type(slot).structure or not kinds:
             continue
         resource = target != NOBODY and bool(world.unit_type(target).resource)

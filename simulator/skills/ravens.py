@@ -17,9 +17,9 @@ from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 # auto-turret ----------------------------------------------------------------------------------------------------------
@@ -68,7 +68,7 @@ def _jam(world: World, cast: Cast) -> None:
     projectiles.launch(world, cast, MECHANICS.matrix_speed_n)
 
 
-def _jammed(world: World, missile: Field, target: int) -> None:
+def _jammed(world: World, missile: AreaEffect, target: int) -> None:
     carrier = world.unit_type(target).name == "Carrier" and MATRIX[1] in world.catalog.buff_of_name
     loops = number(world.catalog.ability(missile.ability), "duration_loops")
     source = world.slot_of(missile.source)
@@ -90,10 +90,10 @@ RESEARCHED_RADIUS: Final = ("effect", "RavenShredderMissileImpactSearchArea", "A
 def _send_shredder(world: World, cast: Cast) -> None:
     """Send a missile that chases its target and weakens the armor of all around it, friends as well."""
     missile = projectiles.launch(world, cast, MECHANICS.shredder_speed_n)
-    missile.does = "shredder"
+    missile.rule = "shredder"
 
 
-def _chase(world: World, missile: Field) -> None:
+def _chase(world: World, missile: AreaEffect) -> None:
     """Fly on; the target can tell, and a missile that was led too far for too long gives up."""
     ability = world.catalog.ability(missile.ability)
     target = world.slot_of(missile.target)
@@ -106,7 +106,7 @@ def _chase(world: World, missile: Field) -> None:
     projectiles.fly(world, missile)
 
 
-def _shred(world: World, missile: Field, _: int) -> None:
+def _shred(world: World, missile: AreaEffect, _: int) -> None:
     """Weaken the armor of everybody around, friends as well, but of no structure."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     radius = world.stats.changed(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
@@ -126,7 +126,7 @@ SKILLS: Final = {
     "raven_scrambler_missile": Skill(_jam, refuse=_can_be_jammed, estimates=("The interference matrix' speed.",)),
     "raven_shredder_missile": Skill(_send_shredder, estimates=("The anti-armor missile's speed.",)),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"shredder": _chase}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"shredder": _chase}
 
 projectiles.ARRIVALS["raven_scrambler_missile"] = _jammed
 projectiles.ARRIVALS["raven_shredder_missile"] = _shred

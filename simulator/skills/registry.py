@@ -2,8 +2,8 @@
 
 One module per group of units. Each offers some of these tables, and here they are joined:
 
-* ``SKILLS``: an ability's ``does`` → ``Skill``
-* ``FIELDS``: a field's ``does`` → what it does at each period
+* ``SKILLS``: an ability's ``effect`` → ``Skill``
+* ``AREA_EFFECTS``: an area effect's ``rule`` → what it does at each period
 * ``TICKS`` and ``ENDS``: a buff's name → what it does at each of its periods, and when it has run out
 * ``FINALS``: a buff's name → what it does when its bearer dies, called with the slot while it is still there
 * ``SMARTS``: what a right click means to some units, called with the slots, the target's slot, the point and whether to
@@ -43,7 +43,7 @@ from simulator.skills import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule, Skill, SmartRule, UnitRule
     from simulator.world import World
 
 
@@ -88,15 +88,15 @@ SKILLS: Final[dict[str, Skill]] = {
     **carrier.SKILLS,
     **zerg.SKILLS,
 }
-FIELDS: Final[dict[str, FieldRule]] = {
-    **sentry.FIELDS,
-    **templar.FIELDS,
-    **gateway.FIELDS,
-    **robotics.FIELDS,
-    **stargate.FIELDS,
-    **mothership.FIELDS,
-    **terran.FIELDS,
-    **zerg.FIELDS,
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
+    **sentry.AREA_EFFECTS,
+    **templar.AREA_EFFECTS,
+    **gateway.AREA_EFFECTS,
+    **robotics.AREA_EFFECTS,
+    **stargate.AREA_EFFECTS,
+    **mothership.AREA_EFFECTS,
+    **terran.AREA_EFFECTS,
+    **zerg.AREA_EFFECTS,
 }
 TICKS: Final[dict[str, BuffRule]] = {
     **templar.TICKS,

@@ -102,7 +102,7 @@ def _repair_by_click(world: World, slots: list[int], target: int, _: Point | Non
     taken: list[int] = []
     for slot in slots:
         card = world.catalog.abilities_of(int(world.type[slot]))
-        ability = next((a for a in card if a.does in REPAIRS), None)
+        ability = next((a for a in card if a.effect in REPAIRS), None)
         if ability is not None and slot != target and world.owner[slot] == world.owner[target]:
             order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
             taken += commands.give(world, [slot], order, queue=queue)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.skills.skill import Skill, around, number, place_of
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def _nova(world: World, cast: Cast) -> None:
     buffs.apply(world, slot, NOVA_CASTER, source=slot)
     buffs.apply(world, nova, NOVA, source=slot)
     commands.move(world, [nova], place_of(world, cast))
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "purification_nova",
             int(world.owner[slot]),
             [(x, y)],
@@ -61,7 +61,7 @@ def _nova(world: World, cast: Cast) -> None:
     )
 
 
-def _burn(world: World, field: Field) -> None:
+def _burn(world: World, field: AreaEffect) -> None:
     """Burst at the end; go out without harm when the Disruptor dies, is carried, or is out of its owner's hands."""
     disruptor, nova = world.slot_of(field.source), world.slot_of(field.target)
     held = (
@@ -77,7 +77,7 @@ def _burn(world: World, field: Field) -> None:
         world.remove(nova)
 
 
-def _burst(world: World, field: Field, disruptor: int, nova: int) -> None:
+def _burst(world: World, field: AreaEffect, disruptor: int, nova: int) -> None:
     """Hurt everybody on the ground around the nova, friends too; only the owner's own Disruptors are spared."""
     ability = world.catalog.ability(field.ability)
     x, y = world.pos[nova].tolist()
@@ -162,6 +162,6 @@ SKILLS: Final = {
         estimates=("Hits in the same loop as the first one get past a barrier that they raise.",),
     ),
 }
-FIELDS: Final = {"purification_nova": _burn}
+AREA_EFFECTS: Final = {"purification_nova": _burn}
 PASSIVES: Final[dict[str, UnitRule]] = {"Immortal": _guard}
 ENDS: Final[dict[str, BuffRule]] = {BARRIER: _barrier_over, BARRIER_ACTIVE: _active_over}

@@ -18,8 +18,8 @@ from simulator.stats import ATTRIBUTES, GROUND_PLANE
 from simulator.traits import refresh
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.skills.skill import UnitRule
     from simulator.world import World
 
@@ -40,7 +40,7 @@ def _guardian_shield(world: World, cast: Cast) -> None:
     lay(world, cast, "guardian_shield", end=end, due=world.loop + 1, effect=SHIELD_EFFECT)
 
 
-def _cover(world: World, field: Field) -> None:
+def _cover(world: World, field: AreaEffect) -> None:
     """Follow the Sentry, and every period cover its owner's units around it; structures are not covered."""
     sentry = world.slot_of(field.source)
     if sentry == NOBODY or buffs.has(world, sentry, SCRAMBLED):
@@ -149,5 +149,5 @@ SKILLS: Final = {
     ),
     "hallucination": Skill(_hallucinate, estimates=("Images appear at the nearest free places around the Sentry.",)),
 }
-FIELDS: Final = {"guardian_shield": _cover}
+AREA_EFFECTS: Final = {"guardian_shield": _cover}
 PASSIVES: Final[dict[str, UnitRule]] = {"ForceField": _shatter_near_massive}

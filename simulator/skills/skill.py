@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 Effect: TypeAlias = Callable[["World", "Cast"], None]
-FieldRule: TypeAlias = Callable[["World", "Field"], None]
+AreaEffectRule: TypeAlias = Callable[["World", "AreaEffect"], None]
 BuffRule: TypeAlias = Callable[["World", int, "np.void"], None]
 Give: TypeAlias = Callable[["World", "list[int]", "Ability", int, "Point | None", bool], "list[int]"]
 SmartRule: TypeAlias = Callable[["World", "list[int]", int, "Point | None", bool], "list[int]"]
@@ -124,13 +124,15 @@ def place_of(world: World, cast: Cast) -> Point:
     return x, y
 
 
-def lay(world: World, cast: Cast, does: str, *, end: float, due: float, effect: int = 0, period: float = 1.0) -> Field:
+def lay(
+    world: World, cast: Cast, rule: str, *, end: float, due: float, effect: int = 0, period: float = 1.0
+) -> AreaEffect:
     """Lay a field where a cast is aimed, as wide as the ability says; whoever lays it may change it on.
 
-    Its rule ``does`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
+    Its ``rule`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
     """
-    laid = Field(
-        does,
+    laid = AreaEffect(
+        rule,
         owner=int(world.owner[cast.slot]),
         points=[place_of(world, cast)],
         radius=number(cast, "radius", 0.0),
@@ -142,7 +144,7 @@ def lay(world: World, cast: Cast, does: str, *, end: float, due: float, effect: 
         ability=cast.ability.id,
         source=world.tag_of(cast.slot),
     )
-    world.fields.append(laid)
+    world.area_effects.append(laid)
     return laid
 
 

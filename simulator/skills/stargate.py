@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle, placement, targets
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
 from simulator.traits import refresh
@@ -159,8 +159,10 @@ def _set_trap(world: World, cast: Cast) -> None:
     world.build_progress[trap] = 0.0
     refresh(world, trap)
     end = world.loop + cast.ability.loops
-    world.fields.append(
-        Field("trap_forms", int(world.owner[trap]), [point], 0.0, world.loop, end, due=end, source=world.tag_of(trap))
+    world.area_effects.append(
+        AreaEffect(
+            "trap_forms", int(world.owner[trap]), [point], 0.0, world.loop, end, due=end, source=world.tag_of(trap)
+        )
     )
 
 
@@ -177,7 +179,7 @@ def _cant_set_trap(world: World, cast: Cast) -> ActionResult:
     return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_LOCATION_INVALID
 
 
-def _trap_done(world: World, field: Field) -> None:
+def _trap_done(world: World, field: AreaEffect) -> None:
     trap = world.slot_of(field.source)
     if trap != NOBODY:
         world.build_progress[trap] = 1.0
@@ -216,15 +218,17 @@ def _spring(world: World, cast: Cast) -> None:
     buffs.apply(world, slot, "OracleStasisTrapCaster", source=slot)
     teleport.live_until(world, slot, world.loop + number(cast, "gone_loops"))
     owner, tag = int(world.owner[slot]), world.tag_of(slot)
-    spot = Field("trap_springs", owner, [(x, y)], number(cast, "radius"), world.loop, world.loop + delay, source=tag)
+    spot = AreaEffect(
+        "trap_springs", owner, [(x, y)], number(cast, "radius"), world.loop, world.loop + delay, source=tag
+    )
     spot.due, spot.period = spot.end, delay
     sight_end = world.loop + number(cast, "sight_loops")
-    seen = Field("sight", owner, [(x, y)], number(cast, "sight_radius"), world.loop, sight_end)
+    seen = AreaEffect("sight", owner, [(x, y)], number(cast, "sight_radius"), world.loop, sight_end)
     seen.due, seen.sights = sight_end, number(cast, "sight_radius")
-    world.fields += [spot, seen]
+    world.area_effects += [spot, seen]
 
 
-def _catch(world: World, field: Field) -> None:
+def _catch(world: World, field: AreaEffect) -> None:
     trap = world.slot_of(field.source)
     if trap == NOBODY:
         return
@@ -258,6 +262,6 @@ SKILLS: Final = {
     "prismatic_alignment": Skill(_align),
     "cancel_prismatic_alignment": Skill(_unalign),
 }
-FIELDS: Final = {"trap_forms": _trap_done, "trap_springs": _catch, "sight": lambda _, __: None}
+AREA_EFFECTS: Final = {"trap_forms": _trap_done, "trap_springs": _catch, "sight": lambda _, __: None}
 PASSIVES: Final[dict[str, UnitRule]] = {"Oracle": _mind_energy}
 ENDS: Final[dict[str, BuffRule]] = {LIFT: _put_down}

@@ -12,10 +12,10 @@ import numpy as np
 
 from simulator import buffs, commands, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.arrays import which
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.orders import Order, OrderKind
 from simulator.skills.skill import Skill, around, lay, number
 from simulator.traits import refresh
@@ -44,7 +44,7 @@ def _psi_storm(world: World, cast: Cast) -> None:
     lay(world, cast, "psi_storm", end=end, due=world.loop, effect=STORM_EFFECT, period=period)
 
 
-def _search(world: World, field: Field) -> None:
+def _search(world: World, field: AreaEffect) -> None:
     """Find whom the storm touches, friends too: who is new to it takes damage at once."""
     source = world.slot_of(field.source)
     for slot in around(world, field.at, field.radius, structures=False):
@@ -104,12 +104,14 @@ def _fuse(world: World, cast: Cast) -> None:
     world.build_progress[archon] = 0.0
     refresh(world, archon)
     end = world.loop + cast.ability.loops
-    world.fields.append(
-        Field("archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon))
+    world.area_effects.append(
+        AreaEffect(
+            "archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon)
+        )
     )
 
 
-def _form(world: World, field: Field) -> None:
+def _form(world: World, field: AreaEffect) -> None:
     archon = world.slot_of(field.source)
     if archon == NOBODY:
         field.end = world.loop
@@ -137,5 +139,5 @@ SKILLS: Final = {
         estimates=("An Archon in the making has full life and shields and can be attacked.",),
     ),
 }
-FIELDS: Final = {"psi_storm": _search, "archon_merge": _form}
+AREA_EFFECTS: Final = {"psi_storm": _search, "archon_merge": _form}
 TICKS: Final[dict[str, BuffRule]] = {STORM_BUFF: _storm_tick}

@@ -26,7 +26,7 @@ from simulator.skills import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule, Skill, SmartRule, UnitRule
     from simulator.world import World
 
 SKILLS: Final[dict[str, Skill]] = {
@@ -45,14 +45,14 @@ SKILLS: Final[dict[str, Skill]] = {
     **repair.SKILLS,
     **battlecruiser.SKILLS,
 }
-FIELDS: Final[dict[str, FieldRule]] = {
-    **cyclone.FIELDS,
-    **projectiles.FIELDS,
-    **infantry.FIELDS,
-    **liberators.FIELDS,
-    **nukes.FIELDS,
-    **orbital.FIELDS,
-    **ravens.FIELDS,
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
+    **cyclone.AREA_EFFECTS,
+    **projectiles.AREA_EFFECTS,
+    **infantry.AREA_EFFECTS,
+    **liberators.AREA_EFFECTS,
+    **nukes.AREA_EFFECTS,
+    **orbital.AREA_EFFECTS,
+    **ravens.AREA_EFFECTS,
 }
 TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts.TICKS}
 ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}

@@ -230,7 +230,7 @@ def _carry(world: World, slots: list[int]) -> None:
 def _boards(world: World, slot: int, carrier: int) -> bool:
     ability = world.catalog.ability(int(world.order_ability[slot]))
     reach = max(world.unit_type(carrier).cargo_range, BOARDING_GAP)
-    return ability.does in ("load", "load_all") and gap(world, slot, carrier) <= reach
+    return ability.effect in ("load", "load_all") and gap(world, slot, carrier) <= reach
 
 
 def _let_in(world: World, slot: int, carrier: int) -> None:
@@ -308,7 +308,7 @@ def _may_board(world: World, slot: int, carrier: int) -> bool:
 
 def _load_of(world: World, slot: int) -> Ability | None:
     card = world.catalog.abilities_of(int(world.type[slot]))
-    return next((ability for ability in card if ability.does == "load"), None)
+    return next((ability for ability in card if ability.effect == "load"), None)
 
 
 SKILLS: Final = {

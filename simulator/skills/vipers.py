@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands, lifecycle
 from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
-from simulator.fields import Field
 from simulator.placement import free_places
 from simulator.skills import teleport
 from simulator.skills.projectiles import SPEED_UNKNOWN, flight_loops, throw
@@ -41,7 +41,7 @@ def _cloud(world: World, cast: Cast) -> None:
     lay(world, cast, "blinding_cloud", end=end, due=world.loop, effect=CLOUD_EFFECT, period=period)
 
 
-def _blinds(world: World, item: Field) -> None:
+def _blinds(world: World, item: AreaEffect) -> None:
     source = world.slot_of(item.source)
     for slot in around(world, item.at, item.radius, plane="ground"):
         if world.owner[slot]:
@@ -62,7 +62,7 @@ def _can_pull(world: World, cast: Cast) -> ActionResult:
     return ActionResult.CANT_TARGET_THAT_UNIT if held else ActionResult.SUCCESS
 
 
-def _caught(world: World, item: Field) -> None:
+def _caught(world: World, item: AreaEffect) -> None:
     """The tentacle has its victim: that drops everything, comes out of the ground and is on its way."""
     viper, slot = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (viper, slot):
@@ -79,13 +79,13 @@ def _caught(world: World, item: Field) -> None:
     loops = number(ability, "max_disable_loops")
     buffs.apply(world, slot, PULLED, source=viper, owner=item.owner, loops=loops)
     step = number(ability, "pull_speed_n") / LOOPS_PER_NORMAL_SECOND
-    world.fields.append(
-        Field("pull", item.owner, [place], step, world.loop, world.loop + loops, due=world.loop + 1,
+    world.area_effects.append(
+        AreaEffect("pull", item.owner, [place], step, world.loop, world.loop + loops, due=world.loop + 1,
               ability=item.ability, target=item.target)
     )  # fmt: skip
 
 
-def _pulls(world: World, item: Field) -> None:
+def _pulls(world: World, item: AreaEffect) -> None:
     """Bring the victim one step nearer; its ``radius`` is the step."""
     slot = world.slot_of(item.target)
     if slot == NOBODY or not buffs.has(world, slot, PULLED):
@@ -107,7 +107,7 @@ def _bomb(world: World, cast: Cast) -> None:
     throw(world, cast, "parasitic_bomb")
 
 
-def _infects(world: World, item: Field) -> None:
+def _infects(world: World, item: AreaEffect) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY and not buffs.has(world, slot, BOMB):
         lasts = world.catalog.buff(BOMB).loops + world.catalog.buff(DELAY).loops
@@ -185,6 +185,6 @@ SKILLS: Final = {
         _consume, refuse=_can_consume, hold=_drains, end=_ends_draining, estimates=(SPEED_UNKNOWN,)
     ),
 }
-FIELDS: Final = {"blinding_cloud": _blinds, "abduct": _caught, "pull": _pulls, "parasitic_bomb": _infects}
+AREA_EFFECTS: Final = {"blinding_cloud": _blinds, "abduct": _caught, "pull": _pulls, "parasitic_bomb": _infects}
 TICKS: Final = {BOMB: _spreads, AFTER_BOMB: _spreads, INFECTED: _harms}
 FINALS: Final = {BOMB: _lingers}

@@ -229,7 +229,7 @@ def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> Non
     """Each transport among the slots unloads everybody at the point."""
     for slot in slots:
         card = world.catalog.cards[int(world.type[slot])]
-        ability = next((ability for ability in card if ability.does == "unload_all_at"), None)
+        ability = next((ability for ability in card if ability.effect == "unload_all_at"), None)
         if ability is not None:
             casting.use(world, [slot], ability, point=point, queue=queue)
 

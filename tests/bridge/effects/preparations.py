@@ -30,11 +30,11 @@ LONG = 1.0e6
 
 def prepare_for(caster: str, ability: Ability) -> Preparation | None:
     """What has to happen before a unit of this type can use an ability; None for nothing."""
-    if ability.does in {"cancel", "cancel_growth", "cancel_morph"}:
-        return _begin(ability.link, ability.does)
-    if (caster, ability.does) in OF_UNIT:
-        return OF_UNIT[caster, ability.does]
-    return PREPARE.get(ability.does)
+    if ability.effect in {"cancel", "cancel_growth", "cancel_morph"}:
+        return _begin(ability.link, ability.effect)
+    if (caster, ability.effect) in OF_UNIT:
+        return OF_UNIT[caster, ability.effect]
+    return PREPARE.get(ability.effect)
 
 
 # --- what the unit does already -----------------------------------------------------------------------------------
@@ -77,11 +77,11 @@ def _begin(link: str, does: str) -> Preparation:
             lifecycle.become(world, slot, world.catalog.unit(before.users[0]))
         x, y = world.pos[slot].tolist()
         for ability in world.catalog.abilities_of(int(world.type[slot])):
-            wanted = before is ability or (before is None and ability.link == link and ability.does != does)
+            wanted = before is ability or (before is None and ability.link == link and ability.effect != does)
             if does == "cancel_morph":
-                wanted = ability.does in {"morph", "root"} and ability.loops + ability.prep_loops > 0
+                wanted = ability.effect in {"morph", "root"} and ability.loops + ability.prep_loops > 0
             if does == "cancel_growth" and before is None:
-                wanted = ability.does == "grow"
+                wanted = ability.effect == "grow"
             point = (x, y) if Aim.POINT in ability.aim and Aim.NONE not in ability.aim else None
             if wanted and casting.use(world, [slot], ability, point=point):
                 advance(world, 4 if does == "cancel" else 16)
@@ -162,7 +162,7 @@ def _split(world: World, slot: int) -> None:
     casting.use(world, [adept], world.catalog.ability(2544), point=(x + 4.0, y))
     advance(world, 4)
     if adept != slot:
-        world.fields[-1].target = world.tag_of(slot)
+        world.area_effects[-1].target = world.tag_of(slot)
 
 
 def _worker(world: World, slot: int) -> None:

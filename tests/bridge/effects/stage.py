@@ -221,7 +221,7 @@ class _Opener(pickle.Unpickler):
 
 def _grant_all(world: World) -> None:
     """Gives the player every upgrade at once, which is much faster than one after the other."""
-    names = (ability.upgrade for ability in world.catalog.abilities if ability.does == "research")
+    names = (ability.upgrade for ability in world.catalog.abilities if ability.effect == "research")
     world.players[1].upgrades = sorted({world.catalog.upgrade(name).id for name in names})
     world.stats.apply(1, world.players[1].upgrades)
     for slot in world.units_of(1).tolist():

@@ -50,7 +50,7 @@ NEUTRAL = (("MineralField", 8, 32.5), ("VespeneGeyser", 8.5, 40.5), ("VespeneGey
 def modelled(version: str) -> list[Ability]:
     catalog = load_catalog(version)
     found = {a.id: a for unit in catalog.units if not unit.not_in_melee for a in catalog.abilities_of(unit.row)}
-    return [a for _, a in sorted(found.items()) if a.does in SKILLS]
+    return [a for _, a in sorted(found.items()) if a.effect in SKILLS]
 
 
 def stage(version: str) -> World:
@@ -160,7 +160,7 @@ def _split(world: World, slot: int) -> None:
     )
     casting.use(world, [adept], world.catalog.ability(2544), point=(36.0, 32.0))
     if adept != slot:
-        world.fields[-1].target = world.tag_of(slot)
+        world.area_effects[-1].target = world.tag_of(slot)
 
 
 def _power(world: World, slot: int) -> None:
@@ -221,7 +221,7 @@ def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
         lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y))
         advance(world, 1)
     card = world.catalog.abilities_of(int(world.type[slot]))
-    if not any(a.link == cancel.link and a.does != "cancel" and casting.use(world, [slot], a) for a in card):
+    if not any(a.link == cancel.link and a.effect != "cancel" and casting.use(world, [slot], a) for a in card):
         _in_the_making(world, slot)
     advance(world, 2)
 
@@ -253,7 +253,7 @@ def _morphing(*kinds: str) -> Callable[[World, int], None]:
         if before is not None:
             lifecycle.become(world, slot, world.catalog.unit(before.users[0]))
         x, y = world.pos[slot].tolist()
-        found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.does in kinds)
+        found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.effect in kinds)
         found = before or found
         casting.use(world, [slot], found, point=(x, y) if found.requires_point else None)
         advance(world, 12 if before is not None else 3)
@@ -303,10 +303,10 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
 def attempt(world: World, ability: Ability) -> list[int]:
     """Give the order to the first caster and at the first aim that takes it; returns who did."""
     for slot in casters(world, ability):
-        if ability.does == "cancel":
+        if ability.effect == "cancel":
             begin_what_it_cancels(world, slot, ability)
-        if ability.does in PREPARE:
-            PREPARE[ability.does](world, slot)
+        if ability.effect in PREPARE:
+            PREPARE[ability.effect](world, slot)
         if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
             continue
         for target, point in aims(world, slot, ability):
@@ -319,7 +319,7 @@ def attempt(world: World, ability: Ability) -> list[int]:
 
 def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch, *, inert: bool) -> tuple[str, int]:
     """The world's digest soon after the effect, and how often it took effect."""
-    skill, calls = SKILLS[ability.does], 0
+    skill, calls = SKILLS[ability.effect], 0
 
     def effect(world: World, cast: Cast) -> None:
         nonlocal calls
@@ -329,7 +329,7 @@ def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch,
 
     with monkeypatch.context() as patch:
         world = stage(version)
-        patch.setitem(SKILLS, ability.does, dataclasses.replace(skill, effect=effect))
+        patch.setitem(SKILLS, ability.effect, dataclasses.replace(skill, effect=effect))
         assert attempt(world, ability), "no unit could use it"
         for _ in range(LONGEST):
             if calls:
@@ -346,14 +346,14 @@ def cases() -> Iterator[Any]:
             known = usual.get(a.id)
             same = version != DEFAULT_VERSION and known == a and known.numbers == a.numbers
             marks = [pytest.mark.slow] if same else []
-            yield pytest.param(version, a, id=f"{version}-{a.id}-{a.does}", marks=marks)
+            yield pytest.param(version, a, id=f"{version}-{a.id}-{a.effect}", marks=marks)
 
 
 @pytest.mark.parametrize(("version", "ability"), list(cases()))
 def test_an_ability_with_a_rule_changes_the_world(
     version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if getattr(SKILLS[ability.does], "give", None) is not None:
+    if getattr(SKILLS[ability.effect], "give", None) is not None:
         world, idle = stage(version), stage(version)
         assert attempt(world, ability), "no unit could use it"
         assert world.digest() != idle.digest()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CATALOG = load_catalog()
 LATER = ("HighCapacityBarrels", "LurkerRange")  # their upgrade's own row has the price of a later version
-RESEARCHES = [a for a in CATALOG.abilities if a.does == "research" and a.users and a.loops]
+RESEARCHES = [a for a in CATALOG.abilities if a.effect == "research" and a.users and a.loops]
 WARP_GATE = 1568
 
 

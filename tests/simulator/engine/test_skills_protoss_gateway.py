@@ -217,7 +217,7 @@ def test_an_adept_stands_after_160_loops_where_its_shade_has_gone(make_field: An
     assert place(field, adept) == pytest.approx((20.0, 8.0), abs=0.1)
     assert field.world.life[adept] == 33.0
     assert field.world.players[1].score.lost_units == 0
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 def test_a_shade_walks_where_it_is_told_and_can_neither_fight_nor_be_hurt(field: Any) -> None:

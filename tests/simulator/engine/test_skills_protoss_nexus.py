@@ -111,7 +111,7 @@ def test_a_time_warp_grows_and_then_slows_enemies_for_160_loops(
     usual = {s: float(field.world.step_max[s]) for s in (roach, beyond, flyer, friend)}
     assert field.order(ship, TIME_WARP, point=(16.0, 8.0))
     field.play(1)
-    (warp,) = field.world.fields
+    (warp,) = field.world.area_effects
     assert (warp.effect, warp.radius) == (3, radius)
     field.play(grows - 1)
     assert field.world.step_max[roach] == usual[roach]
@@ -124,7 +124,7 @@ def test_a_time_warp_grows_and_then_slows_enemies_for_160_loops(
     assert field.world.step_max[roach] < usual[roach]
     field.play(5)
     assert field.world.step_max[roach] == usual[roach]
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 # the cloaking field ---------------------------------------------------------------------------------------------------

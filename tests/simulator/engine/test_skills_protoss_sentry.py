@@ -38,7 +38,7 @@ def test_a_guardian_shield_lasts_as_long_as_the_version_says_and_then_its_buff_r
     assert field.order(slot, GUARDIAN_SHIELD)
     last_seen = last_covered = 0
     for loop in field.loops(loops + 30):
-        if field.world.fields:
+        if field.world.area_effects:
             last_seen = loop
         if buffs.has(field.world, slot, "GuardianShield"):
             last_covered = loop
@@ -66,7 +66,7 @@ def test_clients_are_told_of_the_shield_as_effect_2_with_its_radius_where_the_se
     field.order(slot, GUARDIAN_SHIELD)
     commands.move(field.world, [slot], (14.0, 10.0))
     field.play(20)
-    (shield,) = field.world.fields
+    (shield,) = field.world.area_effects
     assert (shield.effect, shield.radius, shield.owner) == (2, 4.5, 1)
     assert shield.at == pytest.approx(tuple(field.world.pos[slot]), abs=2.25 / 16 + 1e-6)
     assert field.world.catalog.buff("GuardianShield").id == 18
@@ -117,7 +117,7 @@ def test_a_guardian_shield_ends_with_its_sentry(field: Any, how: str) -> None:
     else:
         buffs.apply(field.world, slot, "RavenScramblerMissile")
     field.play(12)
-    assert not field.world.fields
+    assert not field.world.area_effects
     assert not buffs.has(field.world, friend, "GuardianShield")
 
 

@@ -97,11 +97,11 @@ def test_clients_see_a_storm_as_effect_1_and_buff_28(field: Any) -> None:
     victim = still(field, "Roach", 2, 16.0, 8.0)
     field.order(slot, PSI_STORM, point=(16.0, 8.0))
     field.play(1)
-    (storm,) = field.world.fields
+    (storm,) = field.world.area_effects
     assert (storm.effect, storm.at, storm.radius) == (1, (16.0, 8.0), 1.5)
     assert [field.world.catalog.buffs[r].id for r in field.world.buffs.of(victim)["buff"]] == [28]
     for _ in field.loops(80):
-        if not field.world.fields:
+        if not field.world.area_effects:
             break
     assert field.world.loop - 1 == math.ceil(6 * 0.5712 * 16)
 

@@ -46,12 +46,12 @@ def test_a_sweep_shows_what_is_cloaked_in_its_circle_for_its_time(foggy: Any) ->
     assert not world.visible[1, hidden]
     assert foggy.order(slot, SCAN, point=(24, 24))
     assert world.energy[slot] == pytest.approx(60 - ability.energy, abs=0.3)
-    assert [(f.effect, f.radius, f.at, f.detects) for f in world.fields] == [(6, 13, (24, 24), True)]
+    assert [(f.effect, f.radius, f.at, f.detects) for f in world.area_effects] == [(6, 13, (24, 24), True)]
     foggy.play(4)
     assert world.visible[1, hidden]
     assert world.visibility[1, 24, 24] == 2
     foggy.play(int(ability.numbers["duration_loops"]) + 1)
-    assert not world.fields
+    assert not world.area_effects
     foggy.play(4)
     assert not world.visible[1, hidden]
     assert world.visibility[1, 24, 24] == 1

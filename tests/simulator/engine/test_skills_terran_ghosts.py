@@ -239,7 +239,7 @@ def test_a_nuke_comes_down_after_its_time_in_rings_of_damage(field: Any) -> None
     assert field.order(ghost, NUKE, point=point)
     field.play(1)
     begun = world.loop
-    assert [(f.effect, f.at) for f in world.fields] == [(7, point)]
+    assert [(f.effect, f.at) for f in world.area_effects] == [(7, point)]
     falls = int(numbers["delay_loops"] + numbers["post_detonate_damage_delay_loops"])
     field.play(falls - 1)
     assert all(world.life[slot] > 499 for slot in victims)
@@ -298,7 +298,7 @@ def test_a_strike_is_lost_when_the_ghost_stops_painting(field: Any, how: str) ->
     else:
         world.life[ghost] = 0.0
     field.play(2)
-    assert not world.fields
+    assert not world.area_effects
     field.play(30)
     assert world.life[victim] == 500
 

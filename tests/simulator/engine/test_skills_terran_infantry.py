@@ -198,7 +198,7 @@ def test_a_charge_does_not_throw_what_is_massive_built_or_a_larva(field: Any, na
             break
     assert world.life[victim] < before
     assert not buffs.has(world, victim, "ReaperKD8Knockback")
-    assert not [item for item in world.fields if item.does == "knockback"]
+    assert not [item for item in world.area_effects if item.rule == "knockback"]
 
 
 def test_a_charge_is_a_body_that_nobody_can_touch_and_is_gone_with_its_explosion(field: Any) -> None:
@@ -217,7 +217,7 @@ def test_a_reaper_walks_into_range_and_has_to_wait_for_the_next_charge(field: An
     reaper = field.still("Reaper", 1, 4, 10)
     assert field.order(reaper, KD8, point=(16, 10))
     for _ in field.loops(100):
-        if world.fields:
+        if world.area_effects:
             break
     radius = world.radius[reaper]
     assert math.dist(world.pos[reaper].tolist(), (16, 10)) == pytest.approx(ability.range + radius, abs=0.3)

@@ -148,7 +148,7 @@ def test_a_burrowed_mine_is_hidden_and_fires_by_itself_after_taking_aim(field: A
     assert not world.visible[2, slot]
     victim = field.still("Ultralisk", 2, 10 + ability.range + 1.0, 10)
     begun = field.until(lambda: world.casts[slot])
-    fired = field.until(lambda: world.fields)
+    fired = field.until(lambda: world.area_effects)
     assert ability.prep_loops <= fired - begun <= ability.prep_loops + 2
     field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == pytest.approx(ability.numbers["damage"])
@@ -261,7 +261,7 @@ def test_a_mine_lets_go_of_who_leaves_its_range_in_time(field: Any) -> None:
     field.play(10)
     world.pos[victim] = (22, 10)
     field.play(40)
-    assert not world.fields
+    assert not world.area_effects
     assert world.life[victim] == 500
 
 

@@ -114,11 +114,11 @@ def test_an_anti_armor_missile_flies_at_its_speed_and_gives_up_on_who_runs_far(f
     world, numbers = field.world, field.world.catalog.ability(SHREDDER).numbers
     slot, victim = raven(field, 4), field.still("Mutalisk", 2, 13, 10)
     field.order(slot, SHREDDER, victim)
-    begun = field.until(lambda: world.fields)
+    begun = field.until(lambda: world.area_effects)
     world.pos[victim] = (31, 10)
     field.play(16)
-    assert world.fields[0].at[0] == pytest.approx(4 + MECHANICS.shredder_speed_n, abs=0.3)
-    lost = field.until(lambda: not world.fields)
+    assert world.area_effects[0].at[0] == pytest.approx(4 + MECHANICS.shredder_speed_n, abs=0.3)
+    lost = field.until(lambda: not world.area_effects)
     assert lost - begun == numbers["patience_loops"]
     assert not buffs.has(world, victim, "RavenShredderMissileArmorReductionUISubtruct")
     assert MECHANICS.shredder_speed_n * numbers["patience_loops"] / 16 > numbers["patience_range"]

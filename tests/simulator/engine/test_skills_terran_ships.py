@@ -34,7 +34,7 @@ def test_the_yamato_cannon_fires_when_it_is_charged(field: Any) -> None:
     slot, victim = cruiser(field), field.still("Ultralisk", 2, 13, 10)
     assert field.order(slot, YAMATO, victim)
     field.play(1)
-    fired = field.until(lambda: world.fields)
+    fired = field.until(lambda: world.area_effects)
     assert fired == 1 + ability.numbers["cast_time_loops"]
     field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == ability.numbers["damage"] == 240
@@ -124,10 +124,10 @@ def test_a_zone_is_set_up_in_its_time_and_shown_to_everybody(field: Any) -> None
     world, numbers = field.world, field.world.catalog.ability(GUARD).numbers
     slot = field.put("Liberator", 1, 9, 10)
     field.order(slot, GUARD, point=(14, 10))
-    begun = field.until(lambda: world.fields)
-    assert [(f.effect, f.radius, f.at) for f in world.fields] == [(8, numbers["radius"], (14, 10))]
+    begun = field.until(lambda: world.area_effects)
+    assert [(f.effect, f.radius, f.at) for f in world.area_effects] == [(8, numbers["radius"], (14, 10))]
     assert begun < 10
-    working = field.until(lambda: world.fields[0].effect == 9)
+    working = field.until(lambda: world.area_effects[0].effect == 9)
     assert working == begun + numbers["setup_loops"]
     morph = world.catalog.ability(TO_GROUND)
     done = field.until(lambda: world.unit_type(slot).name == "LiberatorAG")
@@ -180,7 +180,7 @@ def test_the_zone_ends_with_the_mode_and_the_ship_takes_off(field: Any) -> None:
     slot = guarding(field)
     assert field.order(slot, LEAVE)
     field.play(1)
-    assert not [f for f in world.fields if f.effect]
+    assert not [f for f in world.area_effects if f.effect]
     begun = world.loop
     done = field.until(lambda: world.unit_type(slot).name == "Liberator")
     assert done == pytest.approx(begun + world.catalog.ability(TO_AIR).loops, abs=1.5)
@@ -193,7 +193,7 @@ def test_the_zone_ends_with_its_ship(field: Any) -> None:
     slot = guarding(field)
     field.world.life[slot] = 0.0
     field.play(2)
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 def test_a_liberator_carried_away_from_its_zone_gives_it_up(field: Any) -> None:
@@ -201,7 +201,7 @@ def test_a_liberator_carried_away_from_its_zone_gives_it_up(field: Any) -> None:
     slot = guarding(field)
     world.pos[slot] = (3, 10)
     field.play(60)
-    assert not world.fields
+    assert not world.area_effects
     assert world.unit_type(slot).name == "Liberator"
 
 
@@ -213,7 +213,7 @@ def test_research_lets_zones_lie_farther_away(field: Any) -> None:
     assert casting.as_is(world, slot, ability).range == ability.range + more
     field.order(slot, GUARD, point=(4 + 0.75 + ability.range + more, 10))
     field.play(3)
-    assert world.fields
+    assert world.area_effects
     assert world.pos[slot].tolist() == [4, 10]
 
 

@@ -136,13 +136,13 @@ def test_bile_harms_friend_and_foe_on_the_ground_and_in_the_air(arena: Any, name
     before = arena.vitals(target)
     assert arena.order(slot, BILE, point=(x, y))
     arena.play(1)
-    (bile,) = world.fields
+    (bile,) = world.area_effects
     assert (bile.effect, bile.at, bile.radius) == (11, (x, y), numbers["radius"])
     falls = numbers["delay_loops"] + numbers["fall_loops"]
     arena.play(int(falls) - 1)
     assert arena.vitals(target) >= before
     arena.play(1)
-    assert not world.fields
+    assert not world.area_effects
     assert before - arena.vitals(target) == pytest.approx(numbers["damage"], abs=0.5)
 
 
@@ -311,7 +311,7 @@ def test_a_blinding_cloud_leaves_no_reach_to_whoever_is_in_it(arena: Any) -> Non
     cannon = arena.put("SporeCrawler", 2, 14, 18)
     assert arena.order(slot, CLOUD, point=(14.0, 16.5))
     arena.play(2)
-    (cloud,) = world.fields
+    (cloud,) = world.area_effects
     assert (cloud.effect, cloud.radius) == (10, numbers["radius"])
     assert world.detects[cannon] == 0.0
     life = float(world.life[enemy])
@@ -322,7 +322,7 @@ def test_a_blinding_cloud_leaves_no_reach_to_whoever_is_in_it(arena: Any) -> Non
     assert world.life[enemy] >= life
     assert world.reach[marine] == 0.0
     arena.play(60)
-    assert not world.fields
+    assert not world.area_effects
     assert world.life[enemy] < life
     assert world.detects[cannon] > 0.0
 

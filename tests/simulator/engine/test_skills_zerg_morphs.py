@@ -31,7 +31,7 @@ def rules(does: str, *, named: str = "") -> list[Any]:
         catalog = load_catalog(version)
         for ability in catalog.abilities:
             users = [u for u in ability.users if ability in catalog.abilities_of(catalog.unit(u).row)]
-            fits = ability.does == does and ability.name.startswith(named) and users
+            fits = ability.effect == does and ability.name.startswith(named) and users
             if fits and catalog.unit(users[0]).race == "zerg":
                 found.append(pytest.param(version, ability, id=f"{version}-{ability.name}"))
     return found
@@ -223,7 +223,7 @@ def test_a_morph_called_off_gives_the_unit_and_most_of_the_price_back(
     slot = field.put(ability.users[0], 1, *CENTRE)
     assert field.order(slot, ability.id)
     field.play(20)
-    own = [a for a in world.catalog.abilities if a.does == "cancel_growth" and a.link == ability.link]
+    own = [a for a in world.catalog.abilities if a.effect == "cancel_growth" and a.link == ability.link]
     cancel = own[0] if own else world.catalog.ability(QUEUE_CANCEL)  # as 4.10's Baneling cocoon has it
     assert field.order(slot, cancel.id)
     field.play(2)

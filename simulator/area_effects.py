@@ -1,7 +1,7 @@
-"""Fields: effects that lie on the ground for a time, such as a storm, a scan or a bile on its way.
+"""Area effects: what lies on the ground for a time, such as a storm, a scan or a bile on its way.
 
-A field is a value in ``world.fields`` until it ends; ``systems.effects`` calls its skill at every period. What the
-API tells of it (``effect``, the places, the radius) is in the value, what it does is the skill's.
+One is a value in ``world.area_effects`` until it ends; ``systems.area_effects`` calls its rule at every period. What
+the API shows of it (``effect``, the places, the radius) is in the value, what it does is the rule's.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ Point = tuple[float, float]
 
 
 @dataclass(slots=True)
-class Field:
+class AreaEffect:
     """One effect on the ground.
 
     Args:
-        does: Name of the rule that runs it, in ``skills.FIELDS``.
+        rule: Name of the rule that runs it, in ``skills.registry.AREA_EFFECTS``.
         effect: The API's effect id, 0 when clients are not told of it.
         owner: Whose unit made it.
         points: Where it lies, world units; the first is its middle.
@@ -33,7 +33,7 @@ class Field:
         detects: Whether its owner sees what is cloaked there.
     """
 
-    does: str
+    rule: str
     owner: int
     points: list[Point]
     radius: float
