@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from simulator import commands
+from simulator import commands, lifecycle
 from simulator.maps import load_map
 from simulator.placement import free_places
 from simulator.systems.triggers import players_of
@@ -56,7 +56,7 @@ def armies(units: int, seed: int) -> World:
         for name, count in shares.items():
             kind = world.catalog.unit(name)
             for place in free_places(world, kind, home, count):
-                world.spawn(kind, player, place)
+                lifecycle.spawn(world, kind, player, place)
     for player, enemy in ((1, 2), (2, 1)):
         commands.attack_move(world, world.units_of(player).tolist(), homes[enemy])
     return world

@@ -80,7 +80,12 @@ def main(argv: list[str] | None = None) -> None:
         sys.exit(f"StarCraft II simulator: cannot listen on {arguments.host}:{arguments.port}: {error}")
     from simulator.server import run  # noqa: PLC0415  # after the socket listens, see above
 
-    run(sock, arguments)
+    run(
+        sock,
+        data_dir=arguments.data_dir,
+        base_build=arguments.base_build,
+        data_version=arguments.data_version,
+    )
 
 
 if __name__ == "__main__":

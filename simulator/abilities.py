@@ -2,7 +2,7 @@
 
 Data only, one record per specific ability id of the API, read from the shipped tables by ``catalog``. Whether a unit
 may use one now, and what happens then, is ``casting``'s matter; the rule behind each is a ``skills.Skill``, named by
-``does``.
+``effect``.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Ability:
 
     id: int
     name: str
-    does: str = ""
+    effect: str = ""
     general: int = 0
     link: str = ""
     aim: Aim = Aim.NONE

@@ -17,24 +17,13 @@ from simulator.stats import AIR_PLANE, GROUND_PLANE
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from simulator.buffs import Buff
+    from simulator.buff_kinds import Buff
     from simulator.records import UnitType, Weapon
     from simulator.world import World
 
 NO_SCAN: Final = -1.0
 NO_WEAPON: Final = -1
 WIDEST_TURN_DEG: Final = 180.0
-
-
-def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:
-    """Switch one of a unit's weapons on or off; a weapon that its type does not have is left alone."""
-    for index, found in enumerate(world.unit_type(slot).weapons):
-        if found.id == weapon:
-            bit = 1 << index
-            flips = on == found.disabled  # as the type says is no flip
-            world.weapon_toggles[slot] = int(world.weapon_toggles[slot]) & ~bit | (bit if flips else 0)
-            world.refresh(slot)
-            world.scan_now = True
 
 
 def usable_weapons(world: World, slot: int, kinds: Iterable[Buff] = ()) -> list[Weapon]:

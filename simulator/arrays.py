@@ -6,18 +6,17 @@ and cost three to ten times what these do.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+Bools = NDArray[np.bool_]
 
 
-def which(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+def which(mask: Bools) -> NDArray[np.int64]:
     """Indices at which a one-dimensional mask is true, ascending."""
     return mask.nonzero()[0]
 
 
-def some(mask: NDArray[np.bool_]) -> bool:
+def some(mask: Bools) -> bool:
     """Whether the mask is true anywhere."""
     return b"\x01" in mask.tobytes()

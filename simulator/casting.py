@@ -12,19 +12,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, prices, supply
+from simulator import commands, payments, prices, supply
+from simulator.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.needs import met
 from simulator.orders import Order, OrderKind
-from simulator.refusal import EXCLUDED, NOT_REQUIRED, Refusal
-from simulator.skills import SKILLS, SMARTS
+from simulator.skills.registry import SKILLS, SMARTS
 from simulator.skills.skill import touching
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 from simulator.world import NO_TAG, Mishap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from simulator.abilities import Ability, Filter
     from simulator.casts import Point
@@ -43,7 +43,7 @@ PAID_FIRST: Final = frozenset({"grow"})
 
 def is_modelled(ability: Ability) -> bool:
     """Whether the simulator has a rule for this ability."""
-    return ability.does in ORDINARY or ability.does in SKILLS
+    return ability.effect in ORDINARY or ability.effect in SKILLS
 
 
 def as_is(world: World, slot: int, ability: Ability) -> Ability:
@@ -55,9 +55,9 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
     """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
     ability = as_is(world, slot, ability)
     loops = ability.intro_loops + ability.prep_loops
-    if ability.does not in MORPHS:
+    if ability.effect not in MORPHS:
         return loops
-    if ability.does not in PAID_FIRST:
+    if ability.effect not in PAID_FIRST:
         loops += ability.loops
     return loops + (world.rng.random() * ability.random_loops if ability.random_loops else 0.0)
 
@@ -65,49 +65,49 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
 # may it ---------------------------------------------------------------------------------------------------------------
 
 
-def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> Refusal:
+def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
     """Whether a unit could use an ability of its card now, whatever it is aimed at; ``free`` looks at no cost."""
     if not is_modelled(ability):
-        return Refusal.NOT_SUPPORTED
-    if ability.does in ORDINARY:
+        return ActionResult.NOT_SUPPORTED
+    if ability.effect in ORDINARY:
         return _ordinary_refusal(world, slot, ability)
     why = _unready(world, slot, ability)
-    return why if free or why is not Refusal.SUCCESS else _unaffordable(world, slot, ability)
+    return why if free or why is not ActionResult.SUCCESS else _unaffordable(world, slot, ability)
 
 
-def _unready(world: World, slot: int, ability: Ability) -> Refusal:
-    skill = SKILLS[ability.does]
+def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
+    skill = SKILLS[ability.effect]
     if not (world.powered[slot] or skill.anytime):
-        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
+        return ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
     if not (world.can_cast[slot] or skill.anytime) or world.hallucination[slot]:
-        return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+        return ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
-        return Refusal.TECH_REQUIREMENTS_NOT_MET
-    return Refusal.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
+        return ActionResult.TECH_REQUIREMENTS_NOT_MET
+    return ActionResult.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
 
 
-def _ordinary_refusal(world: World, slot: int, ability: Ability) -> Refusal:
+def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
     if world.build_progress[slot] < 1.0:
-        return Refusal.BUILDING_IS_UNDER_CONSTRUCTION
-    stuck = ability.does in WALKS and not commands.can_move(world, slot)
-    return Refusal.UNIT_CANT_MOVE if stuck else Refusal.SUCCESS
+        return ActionResult.BUILDING_IS_UNDER_CONSTRUCTION
+    stuck = ability.effect in WALKS and not commands.can_move(world, slot)
+    return ActionResult.UNIT_CANT_MOVE if stuck else ActionResult.SUCCESS
 
 
-def _unaffordable(world: World, slot: int, ability: Ability) -> Refusal:
+def _unaffordable(world: World, slot: int, ability: Ability) -> ActionResult:
     player = world.players[int(world.owner[slot])]
     if "free" not in player.cheats:
         if player.minerals < ability.minerals:
-            return Refusal.NOT_ENOUGH_MINERALS
+            return ActionResult.NOT_ENOUGH_MINERALS
         if player.vespene < ability.vespene:
-            return Refusal.NOT_ENOUGH_VESPENE
+            return ActionResult.NOT_ENOUGH_VESPENE
         if world.energy[slot] < ability.energy:
-            return Refusal.NOT_ENOUGH_ENERGY
+            return ActionResult.NOT_ENOUGH_ENERGY
         if ability.life and world.life[slot] <= ability.life:
-            return Refusal.NOT_ENOUGH_LIFE
+            return ActionResult.NOT_ENOUGH_LIFE
     if not supply.has_room(world, player.id, ability.supply):
-        return Refusal.NOT_ENOUGH_FOOD
+        return ActionResult.NOT_ENOUGH_FOOD
     waits = "cooldown" not in player.cheats and cooldown_left(world, slot, ability) > 0.0
-    return Refusal.COOLDOWN if waits else Refusal.SUCCESS
+    return ActionResult.COOLDOWN if waits else ActionResult.SUCCESS
 
 
 def cooldown_left(world: World, slot: int, ability: Ability) -> float:
@@ -116,30 +116,32 @@ def cooldown_left(world: World, slot: int, ability: Ability) -> float:
     return max(0.0, timers.get(ability.timer, 0.0) - world.loop)
 
 
-def aim_refusal(world: World, cast: Cast) -> Refusal:
+def aim_refusal(world: World, cast: Cast) -> ActionResult:
     """Whether a unit may aim an ability like this; the way there is not looked at, unless it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
-        if wrong is not Refusal.SUCCESS:
+        if wrong is not ActionResult.SUCCESS:
             return wrong
     far = (
-        SKILLS[ability.does].give is None and ability.range < ANYWHERE and (target != NOBODY or cast.point is not None)
+        SKILLS[ability.effect].give is None
+        and ability.range < ANYWHERE
+        and (target != NOBODY or cast.point is not None)
     )
     if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
-        return Refusal.TARGET_IS_OUT_OF_RANGE
-    return SKILLS[ability.does].refuse(world, cast)
+        return ActionResult.TARGET_IS_OUT_OF_RANGE
+    return SKILLS[ability.effect].refuse(world, cast)
 
 
-def fits(world: World, slot: int, target: int, words: Filter) -> Refusal:
+def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
     """Whether a unit may be the target of another one's ability by the catalog's filter."""
     for word in words.required:
         if not _is(world, slot, target, word):
-            return NOT_REQUIRED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
+            return NOT_REQUIRED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
     for word in words.excluded:
         if _is(world, slot, target, word):
-            return EXCLUDED.get(word, Refusal.CANT_TARGET_THAT_UNIT)
-    return Refusal.SUCCESS
+            return EXCLUDED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
+    return ActionResult.SUCCESS
 
 
 def _is(world: World, slot: int, target: int, word: str) -> bool:
@@ -244,11 +246,17 @@ def use(
     """
     victim = world.slot_of(target)
     casts = [Cast(slot, as_is(world, slot, ability), victim, point) for slot in slots]
-    casts = [c for c in casts if refusal(world, c.slot, c.ability) is Refusal.SUCCESS]
-    casts = [c for c in casts if aim_refusal(world, c) is Refusal.SUCCESS]
-    give = SKILLS[ability.does].give
+    casts = [c for c in casts if refusal(world, c.slot, c.ability) is ActionResult.SUCCESS]
+    casts = [c for c in casts if aim_refusal(world, c) is ActionResult.SUCCESS]
+    return order(world, casts, ability, queue=queue) if casts else []
+
+
+def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool = False) -> list[int]:
+    """Have units carry out casts of one ability that nothing stands against; returns the slots that will."""
+    target, point = casts[0].target, casts[0].point
+    give = SKILLS[ability.effect].give
     if give is not None:
-        return give(world, [cast.slot for cast in casts], ability, target, point, queue) if casts else []
+        return give(world, [cast.slot for cast in casts], ability, world.tag_of(target), point, queue)
     if ability.solo and len(casts) > 1:
         casts = [min(casts, key=lambda c: (_busy(world, c), _away(world, c), c.slot))]
     taken: list[int] = []
@@ -257,8 +265,8 @@ def use(
             perform(world, cast)
             taken.append(cast.slot)
         else:
-            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(victim), point=point)
-            taken += commands.give(world, [cast.slot], order, queue=queue)
+            waiting = Order(OrderKind.CAST, ability.id, target=world.tag_of(target), point=point)
+            taken += commands.give(world, [cast.slot], waiting, queue=queue)
     return taken
 
 
@@ -289,12 +297,12 @@ def perform(world: World, cast: Cast) -> None:
     """Take the cost, begin the cooldown and let the ability take effect."""
     slot, ability = cast.slot, cast.ability
     player = world.players[int(world.owner[slot])]
-    prices.charge(world, player.id, prices.cost_of(ability))
+    payments.charge(world, player.id, prices.cost_of(ability))
     if "free" not in player.cheats:
         world.energy[slot] = max(0.0, float(world.energy[slot]) - ability.energy)
         world.life[slot] -= ability.life
     start_cooldown(world, slot, ability)
-    SKILLS[ability.does].effect(world, cast)
+    SKILLS[ability.effect].effect(world, cast)
 
 
 def start_cooldown(world: World, slot: int, ability: Ability, loops: float | None = None) -> None:
@@ -308,10 +316,10 @@ def start_cooldown(world: World, slot: int, ability: Ability, loops: float | Non
 
 def skill_of(ability: Ability) -> Skill:
     """The rule behind an ability; raises ``KeyError`` for one that is not modelled."""
-    return SKILLS[ability.does]
+    return SKILLS[ability.effect]
 
 
-def fail(world: World, cast: Cast, why: Refusal) -> None:
+def fail(world: World, cast: Cast, why: ActionResult) -> None:
     """Tell a player that an order could not be carried out in the end."""
     owner = int(world.owner[cast.slot])
     world.mishaps.append(Mishap(world.loop, owner, world.tag_of(cast.slot), cast.ability.id, why))

@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any, Final
 
 from simulator.abilities import Ability, ability_from
-from simulator.buffs import Buff, buff_from
+from simulator.buff_kinds import Buff, buff_from
 from simulator.prices import priced
 from simulator.records import (
     Affects,
@@ -143,7 +143,7 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
         abilities=abilities,
         buffs=buffs,
         cards=cards,
-        ordinary=tuple({a.does: a.id for a in card if a.does in BASICS} for card in cards),
+        ordinary=tuple({a.effect: a.id for a in card if a.effect in BASICS} for card in cards),
         ability_of_id={a.id: a for a in abilities},
         buff_of_name={b.name: b for b in buffs},
         upgrade_of={key: u for u in upgrades for key in (u.id, u.name)},
@@ -158,10 +158,10 @@ BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack
 def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple[tuple[Ability, ...], ...]:
     """The command card of every type; of each basic order it holds one, the one that fits the type."""
     of_name: dict[str, dict[int, Ability]] = {unit.name: {} for unit in units}
-    smart = next(a for a in abilities if a.does == "smart")
+    smart = next(a for a in abilities if a.effect == "smart")
     for ability in abilities:
         for user in ability.users:
-            if ability.does not in ("", "general", "smart") and user in of_name:
+            if ability.effect not in ("", "general", "smart") and user in of_name:
                 of_name[user][ability.id] = ability
     return tuple(_card(unit, of_name[unit.like or unit.name], smart) for unit in units)
 
@@ -173,12 +173,12 @@ def _card(unit: UnitType, found: dict[int, Ability], smart: Ability) -> tuple[Ab
     card = {} if unit.uncommandable else dict(found)
     seen: set[str] = set()
     for number, ability in sorted(found.items()):
-        if ability.does not in BASICS:
+        if ability.effect not in BASICS:
             continue
-        if ability.does in seen or not fits.get(ability.does, walks):
+        if ability.effect in seen or not fits.get(ability.effect, walks):
             card.pop(number, None)
         else:
-            seen.add(ability.does)
+            seen.add(ability.effect)
     if card or (not unit.uncommandable and (armed or walks)):
         card[smart.id] = smart
     return tuple(ability for _, ability in sorted(card.items()))

@@ -1,6 +1,6 @@
-"""The census: which kinds of units live in a world now, so that laws can pass over what is not there.
+"""The census: which kinds of units live in a world now, so that systems can pass over what is not there.
 
-Taken anew when somebody is born, dies or changes; nothing here decides anything.
+Taken again when a unit comes, dies or changes; nothing here decides anything.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class Census:
     beams: bool
     rolling_guns: bool  # weapons that fire while the body goes where it wants
     guns_walking: bool  # and at what the unit passes
-    gliders: bool  # flyers that need time to stop
+    drifting_flyers: bool  # flyers that need time to stop
     brakers: bool  # anybody who does
-    pushovers: bool  # units of less push priority than the ordinary
-    picky: bool  # units that can't aim at what is near, or do not aim at structures
+    low_priority_bodies: bool  # units of less push priority than the ordinary
+    weapons_with_filters: bool  # units that can't aim at what is near, or do not aim at structures
 
     @classmethod
     def of(cls, world: World) -> Census:
@@ -38,15 +38,16 @@ class Census:
             beams=any(w.is_beam for w in weapons),
             rolling_guns=any(w.moves == "moving" for w in weapons),
             guns_walking=bool(world.guns_walking[slots].any()),
-            gliders=bool(world.glides[slots].any()),
+            drifting_flyers=bool(world.glides[slots].any()),
             brakers=bool(np.isfinite(world.step_loss[slots]).any()),
-            pushovers=bool((world.lightness[slots] != 1.0).any()),
-            picky=bool(world.spares_structures[slots].any() or (world.least_range[slots] > 0.0).any()),
+            low_priority_bodies=bool((world.lightness[slots] != 1.0).any()),
+            weapons_with_filters=bool(world.spares_structures[slots].any() or (world.least_range[slots] > 0.0).any()),
         )
 
 
 def census(world: World) -> Census:
     """The census of a world, taken now if something has changed."""
-    if world.census is None:
-        world.census = Census.of(world)
-    return world.census
+    known = world.census
+    if not isinstance(known, Census):
+        known = world.census = Census.of(world)
+    return known

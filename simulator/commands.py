@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import harvesting
+from simulator import harvesting, lifecycle
 from simulator.columns import NOBODY
 from simulator.orders import (
     ATTACK,
@@ -28,6 +28,7 @@ from simulator.orders import (
 )
 from simulator.players import GameResult
 from simulator.targets import disengage, engage, weapon_for
+from simulator.traits import refresh
 from simulator.world import NO_TAG
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ def debug_kill(world: World, tags: Iterable[int]) -> None:
 def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:
     """Create complete units exactly at a point, all on each other; returns their slots."""
     unit = world.catalog.unit(type_id)
-    return [world.spawn(unit, owner, point) for _ in range(quantity)]
+    return [lifecycle.spawn(world, unit, owner, point) for _ in range(quantity)]
 
 
 def debug_set_value(world: World, tag: int, *, life: float | None = None, shields: float | None = None,
@@ -189,13 +190,13 @@ def debug_switch(world: World, player: int, name: str) -> None:
     else:
         cheats.append(name)
     for slot in world.units_of(player).tolist():
-        world.refresh(slot)
+        refresh(world, slot)
 
 
 def debug_upgrade(world: World, player: int) -> None:
     """Give a player every upgrade that can be researched."""
     for ability in world.catalog.abilities:
-        if ability.does == "research":
+        if ability.effect == "research":
             grant_upgrade(world, player, world.catalog.upgrade(ability.upgrade).id)
 
 
@@ -208,7 +209,7 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
         world.stats.apply(player, owned)
         for slot in np.flatnonzero(world.alive & (world.owner == player)).tolist():
             before = float(world.life_max[slot])
-            world.refresh(slot)
+            refresh(world, slot)
             world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
 
 
@@ -294,8 +295,8 @@ GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
 
 def _of_its_own(world: World, slot: int, order: Order) -> Order:
     """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
-    does = ORDINARY.get(order.kind) if order.ability in GENERAL else None
-    own = None if does is None else world.catalog.ordinary[int(world.type[slot])].get(does)
+    effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
+    own = None if effect is None else world.catalog.ordinary[int(world.type[slot])].get(effect)
     return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
 
 
@@ -337,13 +338,13 @@ def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> Non
     elif not harvesting.head_for_hall(world, slot):
         begin(world, slot, None)
         return
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def _end_harvest(world: World, slot: int) -> None:
     harvesting.leave(world, slot)
     world.harvest[slot] = harvesting.Phase.NONE
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def begin_next(world: World, slot: int) -> None:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import prices
+from simulator import lifecycle, payments
 from simulator.columns import NOBODY
+from simulator.traits import refresh
 from simulator.world import Death
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def begin(
         paid: What was charged for it, of which a part comes back when it is called off.
         by_itself: Whether the work goes on without a builder.
     """
-    slot = world.spawn(unit, owner, point, STRUCTURE_FACING)
+    slot = lifecycle.spawn(world, unit, owner, point, STRUCTURE_FACING)
     world.build_progress[slot] = 0.0
     world.build_loops[slot] = max(loops, 1.0)
     world.self_made[slot] = by_itself
@@ -45,7 +46,7 @@ def begin(
     if unit.structure:
         world.life[slot] = START_SHARE * world.life_max[slot]
         world.shields[slot] = START_SHARE * world.shields_max[slot]
-    world.refresh(slot)
+    refresh(world, slot)
     return slot
 
 
@@ -55,7 +56,7 @@ def finish(world: World, slot: int) -> None:
     world.build_progress[slot] = 1.0
     world.build_loops[slot] = 0.0
     world.invested.pop(slot, None)
-    world.refresh(slot)
+    refresh(world, slot)
     world.powered_at = -1
     world.scan_now = world.orders_changed = True
     world.alert(owner, "BuildingComplete" if unit.structure else "WarpInComplete")
@@ -65,12 +66,12 @@ def call_off(world: World, slot: int) -> None:
     """Take an unfinished structure or unit out of the world; a part of its price comes back, and the drone in it."""
     owner, unit = int(world.owner[slot]), world.unit_type(slot)
     x, y = world.pos[slot].tolist()
-    prices.refund(world, owner, world.invested.get(slot, (0.0, 0.0)), prices.CANCELLED)
+    payments.refund(world, owner, world.invested.get(slot, (0.0, 0.0)), payments.CANCELLED)
     world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, NO_KILLER))
     drone = unit.structure and unit.race == "zerg" and any(way.producer == "Drone" for way in unit.made_by)
     world.remove(slot)
     if drone:
-        world.spawn(world.catalog.unit("Drone"), owner, (x, y))
+        lifecycle.spawn(world, world.catalog.unit("Drone"), owner, (x, y))
 
 
 def builder_of(world: World, site: int) -> int:

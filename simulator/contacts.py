@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator.arrays import some, which
-from simulator.traits import Layer
+from simulator.layers import Layer
 
 if TYPE_CHECKING:
     from simulator.columns import Bools, Floats, Ints
@@ -88,6 +88,14 @@ class Bodies:
             return None
         one, other = one[meets], other[meets]
         return Pairs(np.concatenate((one, other)), np.concatenate((other, one)), np.concatenate((apart, apart)))
+
+
+def bodies_of(world: World) -> Bodies:
+    """The bodies of a world's living units, put together now if something has changed."""
+    known = world.bodies
+    if not isinstance(known, Bodies):
+        known = world.bodies = Bodies.of(world)
+    return known
 
 
 def within(at: Floats, reach: float) -> tuple[Ints, Ints, Floats]:

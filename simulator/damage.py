@@ -74,10 +74,10 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
         if world.bonus_bits[source] & attributes:
             amount += float(world.bonus_add[source]) * fraction
         amount *= float(world.dealt_factor[source])
-    wound(world, source, owner, victim, amount, kind=kind, pierces=damage.hit.ignores_armor)
+    apply_damage(world, source, owner, victim, amount, kind=kind, ignores_armor=damage.hit.ignores_armor)
 
 
-def wound(
+def apply_damage(
     world: World,
     source: int,
     owner: int,
@@ -85,7 +85,7 @@ def wound(
     amount: float,
     *,
     kind: str = "spell",
-    pierces: bool = True,
+    ignores_armor: bool = True,
     shield_bonus: float = 0.0,
 ) -> None:
     """Take an amount of damage from one unit: shields first, then life, and both players' scores remember it.
@@ -97,7 +97,7 @@ def wound(
         victim: Slot of the unit that takes it; one that can't be touched takes none.
         amount: Before armor, bonuses included.
         kind: ``ranged``, ``melee``, ``splash`` or ``spell``; buffs answer to it.
-        pierces: Whether armor does not count.
+        ignores_armor: Whether armor does not count.
         shield_bonus: More damage that only shields take.
     """
     if not world.targetable[victim] or world.life[victim] <= 0.0 or amount <= 0.0 >= shield_bonus:
@@ -113,8 +113,8 @@ def wound(
         held = min(float(world.barrier[victim]), amount)
         world.barrier[victim] -= held
         amount -= held
-    shield_armor = 0.0 if pierces else float(world.stats.shield_armor[side, row] + world.shield_armor_add[victim])
-    armor = 0.0 if pierces else float(world.stats.armor[side, row] + world.armor_add[victim])
+    shield_armor = 0.0 if ignores_armor else float(world.stats.shield_armor[side, row] + world.shield_armor_add[victim])
+    armor = 0.0 if ignores_armor else float(world.stats.armor[side, row] + world.armor_add[victim])
     shields, life = float(world.shields[victim]), float(world.life[victim])
     least = MECHANICS.damage_min if amount > 0.0 else 0.0
     absorbed, rest = 0.0, amount

@@ -76,8 +76,8 @@ def harvesters(catalog: Catalog) -> tuple[tuple[Ability | None, Ability | None],
     """By unit row: the abilities with which units of the type gather and return, None for those that do not."""
     found = []
     for card in catalog.cards:
-        gather = next((a for a in card if a.does == "gather"), None)
-        back = next((a for a in card if a.does == "return"), None)
+        gather = next((a for a in card if a.effect == "gather"), None)
+        back = next((a for a in card if a.effect == "return"), None)
         found.append((gather, back))
     return tuple(found)
 

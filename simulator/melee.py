@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import commands
+from simulator import lifecycle
 from simulator.players import NEUTRAL, GameResult
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from simulator.columns import Ints
     from simulator.geometry import Floats
@@ -36,8 +36,11 @@ LARVAE: Final = ((-1.0, -3.25), (0.0, -3.25), (1.0, -3.25))  # offsets from the 
 OVERLORD: Final = (0.0, 4.0)
 
 
-def start(world: World) -> None:
-    """Give every player of the scenario his base; who has no place of his own gets one by chance."""
+def start(world: World) -> Iterator[tuple[list[int], int]]:
+    """Give every player of the scenario a base, by chance where the scenario names no place.
+
+    Yields, after each base, its workers (slots) and the mineral field (tag) they are to gather from.
+    """
     scenario = world.map.scenario
     free = [scenario.start_locations[i] for i in world.rng.permutation(len(scenario.start_locations)).tolist()]
     for player in world.players[1:]:
@@ -46,30 +49,30 @@ def start(world: World) -> None:
             player.race = list(HALL_AND_WORKER)[int(world.rng.integers(len(HALL_AND_WORKER)))]
         place = spec.start if spec is not None and spec.start is not None else free.pop(0) if free else None
         if place is not None:
-            _found_base(world, player.id, place)
+            yield from _found_base(world, player.id, place)
 
 
-def _found_base(world: World, player: int, place: tuple[float, float]) -> None:
+def _found_base(world: World, player: int, place: tuple[float, float]) -> Iterator[tuple[list[int], int]]:
     owner = world.players[player]
     owner.start = place
     hall, worker = (world.catalog.unit(name) for name in HALL_AND_WORKER[owner.race])
-    world.spawn(hall, player, place, STRUCTURE_FACING)
+    lifecycle.spawn(world, hall, player, place, STRUCTURE_FACING)
     fields = mineral_fields(world, place)
     ring = worker_places(place, world.pos[fields].mean(axis=0) if len(fields) else np.array(place))
-    workers = [world.spawn(worker, player, (x, y)) for x, y in ring.tolist()]
+    workers = [lifecycle.spawn(world, worker, player, (x, y)) for x, y in ring.tolist()]
     x, y = ring.mean(axis=0).tolist()
     owner.camera = (x, y)
     if owner.race == "zerg":
         _hatch(world, player, place)
     if len(fields):
-        commands.gather(world, workers, world.tag_of(int(fields[min(FIRST_FIELD, len(fields)) - 1])))
+        yield workers, world.tag_of(int(fields[min(FIRST_FIELD, len(fields)) - 1]))
 
 
 def _hatch(world: World, player: int, place: tuple[float, float]) -> None:
     """The first Overlord and Larvae; where exactly they are is an estimate."""
     for name, offsets in (("Larva", LARVAE), ("Overlord", (OVERLORD,))):
         for dx, dy in offsets:
-            world.spawn(world.catalog.unit(name), player, (place[0] + dx, place[1] + dy))
+            lifecycle.spawn(world, world.catalog.unit(name), player, (place[0] + dx, place[1] + dy))
 
 
 def mineral_fields(world: World, place: tuple[float, float]) -> Ints:

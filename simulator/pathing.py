@@ -1,8 +1,8 @@
 """Which way round: free cells, connected parts and shortest ways over a terrain with its structures.
 
 A ``Surface`` is one grid of free cells that never changes, so it remembers the ways it has found, across games too.
-``Ground`` belongs to one game and swaps surfaces when structures come and go. Positions are world units, cells are
-flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
+``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go. Positions are world
+units, cells are flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from simulator import geometry
 from simulator.arrays import which
-from simulator.traits import Layer
+from simulator.layers import Layer
 
 if TYPE_CHECKING:
     from simulator.geometry import Floats
+    from simulator.ground import Ground
     from simulator.maps import Grid, Terrain
 
 Ints = NDArray[np.int64]
@@ -330,45 +331,15 @@ def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
     return terrain.walk if layer is Layer.WALK else terrain.glide
 
 
-class Ground:
-    """The surfaces of one game: the terrain with the structures that stand on it now."""
+def surface(ground: Ground, layer: Layer) -> Surface:
+    """What units of a layer move on now."""
+    found = ground.surfaces.get(layer)
+    if not isinstance(found, Surface):
+        bare = layer is Layer.AIR or not ground.blocked
+        found = _bare_surface(ground.terrain, layer) if bare else Surface(_free_now(ground, layer))
+        ground.surfaces[layer] = found
+    return found
 
-    def __init__(self, terrain: Terrain) -> None:
-        self.terrain = terrain
-        self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
-        self._blocked: dict[int, Ints] = {}
-        self._surfaces: list[Surface | None] = [None] * len(Layer)
 
-    def surface(self, layer: Layer) -> Surface:
-        """What units of a layer move on now."""
-        found = self._surfaces[layer]
-        if found is None:
-            if layer is Layer.AIR or not self._blocked:
-                found = _bare_surface(self.terrain, layer)
-            else:
-                found = Surface(self._with_structures(_layer_grid(self.terrain, layer)))
-            self._surfaces[layer] = found
-        return found
-
-    def block(self, slot: int, cells: Ints) -> None:
-        """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
-        height, width = self.terrain.walk.shape
-        inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-        if inside.any():
-            self._blocked[slot] = cells[inside]
-            self._changed()
-
-    def unblock(self, slot: int) -> None:
-        """Take the structure of a slot away, if it has one."""
-        if self._blocked.pop(slot, None) is not None:
-            self._changed()
-
-    def _changed(self) -> None:
-        self.walk = self._with_structures(self.terrain.walk)
-        self._surfaces = [None] * len(Layer)
-
-    def _with_structures(self, grid: Grid) -> Grid:
-        grid = grid.copy()
-        for cells in self._blocked.values():
-            grid[cells[:, 1], cells[:, 0]] = False
-        return grid
+def _free_now(ground: Ground, layer: Layer) -> Grid:
+    return ground.with_structures(_layer_grid(ground.terrain, layer))

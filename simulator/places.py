@@ -29,8 +29,8 @@ from simulator.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
+    from simulator.arrays import Bools
     from simulator.catalog import Catalog
-    from simulator.columns import Bools
     from simulator.geometry import Floats
 
 

@@ -6,12 +6,12 @@ A ``Job`` is one thing in the making; the first of a queue (the first two beside
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from simulator import prices
+from simulator import payments, prices
 from simulator.columns import NOBODY
-from simulator.prices import ALL, CANCELLED, Cost
+from simulator.jobs import Job
+from simulator.payments import ALL, CANCELLED
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -21,33 +21,6 @@ if TYPE_CHECKING:
 QUEUE: Final = 5
 REACTOR_QUEUE: Final = 8
 REACTOR_PARALLEL: Final = 2
-
-
-@dataclass(slots=True)
-class Job:
-    """One thing in the making.
-
-    ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` what
-    comes back when it is called off, ``supply`` what it uses once it is ``begun``. A job of kind ``addon`` only waits
-    for the structure with the tag ``site``.
-    """
-
-    ability: int
-    kind: str
-    makes: str
-    owner: int
-    loops: float
-    paid: Cost = (0.0, 0.0)
-    supply: float = 0.0
-    count: int = 1
-    done: float = 0.0
-    begun: bool = False
-    site: int = 0
-
-    @property
-    def progress(self) -> float:
-        """How far it is, 0..1."""
-        return min(1.0, self.done / self.loops) if self.loops else 1.0
 
 
 def has_reactor(world: World, slot: int) -> bool:
@@ -71,9 +44,9 @@ def room(world: World, slot: int) -> int:
 def enqueue(world: World, slot: int, ability: Ability, *, makes: str, loops: float, site: int = 0) -> Job:
     """Charge the owner and put a job at the end of a queue."""
     owner = int(world.owner[slot])
-    paid = prices.charge(world, owner, prices.cost_of(ability))
+    paid = payments.charge(world, owner, prices.cost_of(ability))
     job = Job(
-        ability.id, ability.does, makes, owner, loops, paid, supply=ability.supply, count=ability.count, site=site
+        ability.id, ability.effect, makes, owner, loops, paid, supply=ability.supply, count=ability.count, site=site
     )
     world.jobs.setdefault(slot, []).append(job)
     world.players[owner].underway.append(makes)
@@ -105,6 +78,6 @@ def call_off(world: World, slot: int, index: int = -1) -> bool:
     if not -len(queue) <= index < len(queue):
         return False
     job = queue[index]
-    prices.refund(world, job.owner, job.paid, CANCELLED if job.kind in ("structure_morph", "addon") else ALL)
+    payments.refund(world, job.owner, job.paid, CANCELLED if job.kind in ("structure_morph", "addon") else ALL)
     drop(world, slot, job)
     return True

@@ -25,8 +25,6 @@ from simulator.status import Status
 if TYPE_CHECKING:
     import socket
 
-    from simulator.__main__ import Arguments
-
 ENDPOINT = "/sc2api"
 _REQUESTS = {WSMsgType.TEXT, WSMsgType.BINARY}
 
@@ -68,13 +66,9 @@ class Server:
                     self.done.set()
 
 
-def run(sock: socket.socket, arguments: Arguments) -> None:
+def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: str | None) -> None:
     """Serves on a listening socket until a client says quit."""
-    session = Session(
-        data_dir=arguments.data_dir,
-        base_build=arguments.base_build,
-        data_version=arguments.data_version,
-    )
+    session = Session(data_dir=data_dir, base_build=base_build, data_version=data_version)
     gc.collect()
     gc.freeze()  # tables and modules stay; collections in a game need not look at them again
     asyncio.run(serve(sock, session))

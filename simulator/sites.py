@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import power
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.orders import OrderKind
 from simulator.placement import snapped
 from simulator.players import NEUTRAL
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -42,14 +42,14 @@ def centre(world: World, unit: UnitType, point: Point) -> Point:
     return point if footprint is None else snapped(point, footprint.size)
 
 
-def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
+def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
     """Why a player can't place a structure at a point, or success; who would build it is not looked at."""
     footprint = footprint_of(world, unit)
     if footprint is None:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     if footprint.id == CAPS:
         free = geyser_at(world, point)
-        return Refusal.SUCCESS if free != NOBODY else Refusal.CANT_BUILD_LOCATION_INVALID
+        return ActionResult.SUCCESS if free != NOBODY else ActionResult.CANT_BUILD_LOCATION_INVALID
     x, y = snapped(point, footprint.size)
     cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
     return (
@@ -57,23 +57,23 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
         or _of_resources(world, footprint, cells)
         or _of_creep(world, footprint, cells)
         or _of_power(world, player, unit, (x, y))
-        or Refusal.SUCCESS
+        or ActionResult.SUCCESS
     )
 
 
-def _of_ground(world: World, player: int, footprint: Footprint, cells: Ints) -> Refusal | None:
+def _of_ground(world: World, player: int, footprint: Footprint, cells: Ints) -> ActionResult | None:
     terrain = world.map.terrain
     width, height = terrain.size
     x, y = cells[:, 0], cells[:, 1]
     if not ((x >= 0) & (y >= 0) & (x < width) & (y < height)).all():
-        return Refusal.CANT_BUILD_LOCATION_INVALID
+        return ActionResult.CANT_BUILD_LOCATION_INVALID
     buildable = terrain.build if "NoBuild" in footprint.forbids else terrain.walk
     if not buildable[y, x].all():
-        return Refusal.CANT_BUILD_LOCATION_INVALID
+        return ActionResult.CANT_BUILD_LOCATION_INVALID
     if "Fogged" in footprint.forbids and (world.visibility[player, y, x] < VISIBLE).any():
-        return Refusal.CANT_SEE_BUILD_LOCATION
+        return ActionResult.CANT_SEE_BUILD_LOCATION
     if taken(world)[y, x].any() or _enemies_on(world, player, cells):
-        return Refusal.CANT_BUILD_ON_THAT
+        return ActionResult.CANT_BUILD_ON_THAT
     return None
 
 
@@ -102,7 +102,7 @@ def taken(world: World) -> Bools:
     return grid
 
 
-def _of_resources(world: World, footprint: Footprint, cells: Ints) -> Refusal | None:
+def _of_resources(world: World, footprint: Footprint, cells: Ints) -> ActionResult | None:
     if "NearResources" not in footprint.forbids:
         return None
     wanted = {(x, y) for x, y in cells.tolist()}
@@ -114,22 +114,22 @@ def _of_resources(world: World, footprint: Footprint, cells: Ints) -> Refusal | 
             continue
         x, y = np.floor(world.pos[slot] + 1e-9).astype(np.int64).tolist()
         if any((x + dx, y + dy) in wanted for dx, dy in (*mask.cells, *mask.around)):
-            return Refusal.CANT_BUILD_TOO_CLOSE_TO_RESOURCES
+            return ActionResult.CANT_BUILD_TOO_CLOSE_TO_RESOURCES
     return None
 
 
-def _of_creep(world: World, footprint: Footprint, cells: Ints) -> Refusal | None:
+def _of_creep(world: World, footprint: Footprint, cells: Ints) -> ActionResult | None:
     on_creep = world.creep[cells[:, 1], cells[:, 0]]
     if "Creep" in footprint.requires and not on_creep.all():
-        return Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE
+        return ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE
     if "Creep" in footprint.forbids and on_creep.any():
-        return Refusal.CANT_BUILD_ON_THAT
+        return ActionResult.CANT_BUILD_ON_THAT
     return None
 
 
-def _of_power(world: World, player: int, unit: UnitType, point: Point) -> Refusal | None:
+def _of_power(world: World, player: int, unit: UnitType, point: Point) -> ActionResult | None:
     if unit.needs_power and power.best(world, player, point) is None:
-        return Refusal.CANT_BUILD_TOO_FAR_FROM_POWER
+        return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
     return None
 
 
@@ -141,7 +141,7 @@ def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
             continue
         for order in world.orders_of(slot):
             ability = world.catalog.ability_of_id.get(order.ability)
-            unit = product(world, ability) if ability is not None and ability.does == "build" else None
+            unit = product(world, ability) if ability is not None and ability.effect == "build" else None
             victim = world.slot_of(order.target)
             if unit is not None and order.kind is OrderKind.CAST and (order.point is not None or victim != NOBODY):
                 x, y = order.point or world.pos[victim].tolist()

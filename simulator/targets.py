@@ -1,6 +1,7 @@
 """Targets: a unit begins and ends a fight, with the weapon that fits the other one.
 
-Used by commands (told to) and by the laws (by its own choice); whether and when it then fires is ``systems.weapons``.
+Used by commands (by order) and by the systems (by its own choice); whether and when it then fires is
+``systems.weapons``.
 """
 
 from __future__ import annotations

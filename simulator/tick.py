@@ -1,6 +1,6 @@
-"""One game loop, as a table of contents: the laws of the world in the order in which they apply.
+"""One game loop, as a table of contents: the systems of the world in the order in which they run.
 
-Each system is a function of the world and the only place of its law. Above: whoever advances the game. Below: one
+Each system is a function of the world and the only place of its rule. Above: what advances the game. Below: one
 file of ``systems`` per line.
 """
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.systems import (
     acquire,
+    area_effects,
     autocast,
     avoidance,
     buffs,
@@ -19,7 +20,6 @@ from simulator.systems import (
     creep,
     death,
     engagement,
-    fields,
     harvest,
     hits,
     idleness,
@@ -67,7 +67,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     missiles.fly,
     sweeps.run,  # lines that are being drawn through the ranks
     hits.fall_due,
-    fields.run,  # storms, scans and whatever else lies on the ground
+    area_effects.run,  # storms, scans and whatever else lies on the ground
     buffs.run_out,
     idleness.count,
     regeneration.regenerate,

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from simulator.armament import weapon_traits
-from simulator.buffs import kinds_on
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
+from simulator.layers import layer_of
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
 from simulator.targets import disengage, engage, measure_reach, weapon_for
 
 if TYPE_CHECKING:
-    from simulator.buffs import Buff
+    from simulator.buff_kinds import Buff
     from simulator.records import UnitType
     from simulator.world import World
 
@@ -27,19 +26,21 @@ BUNKER: Final = "Bunker"
 DISGUISE: Final = "Changeling"  # types that look armed and are not
 
 
-class Layer(IntEnum):
-    """On what a unit moves: the ground, the ground and its cliffs, or the air."""
-
-    WALK = 0
-    GLIDE = 1
-    AIR = 2
+def refresh(world: World, slot: int) -> None:
+    """Write the traits of a slot from its type, its owner, the owner's upgrades and the buffs that lie on it."""
+    body_traits(world, slot)
+    world.note_traits(slot)
 
 
-def layer_of(unit: UnitType) -> Layer:
-    """The layer on which units of this type move."""
-    if unit.flying:
-        return Layer.AIR
-    return Layer.GLIDE if unit.mover in ("colossus", "cliffjumper") else Layer.WALK
+def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:
+    """Switch one of a unit's weapons on or off; a weapon that its type does not have is left alone."""
+    for index, found in enumerate(world.unit_type(slot).weapons):
+        if found.id == weapon:
+            bit = 1 << index
+            flips = on == found.disabled  # as the type says is no flip
+            world.weapon_toggles[slot] = int(world.weapon_toggles[slot]) & ~bit | (bit if flips else 0)
+            refresh(world, slot)
+            world.scan_now = True
 
 
 def body_traits(world: World, slot: int) -> None:
@@ -122,6 +123,13 @@ def _braking(unit: UnitType) -> float:
     """Speed lost per loop; a type without a deceleration of its own brakes as it accelerates (an estimate)."""
     rate_n = unit.deceleration_n or unit.acceleration_n
     return math.inf if not 0.0 < rate_n < INSTANT_ACCELERATION_N else rate_n / LOOPS_PER_NORMAL_SECOND**2
+
+
+def kinds_on(world: World, slot: int) -> list[Buff]:
+    """The kinds of buffs on a unit, in the order in which they came."""
+    if not len(world.buffs):
+        return []
+    return [world.catalog.buffs[row] for row in world.buffs.of(slot)["buff"].tolist()]
 
 
 # buffs ----------------------------------------------------------------------------------------------------------------

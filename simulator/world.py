@@ -17,32 +17,30 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import geometry
-from simulator.buffs import Buffs
+from simulator.active_buffs import ActiveBuffs
+from simulator.caches import WorldCaches
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from simulator.creep import Creep
+from simulator.ground import Ground
 from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
-from simulator.pathing import Ground
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
-from simulator.remembered import Remembered
 from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.snapshots import Memory
 from simulator.stats import Stats
-from simulator.targets import take_other_weapon
-from simulator.traits import body_traits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from simulator.action_result import ActionResult
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
     from simulator.catalog import Catalog, UnitType
-    from simulator.fields import Field
+    from simulator.jobs import Job
     from simulator.maps import GameMap
-    from simulator.production import Job
-    from simulator.refusal import Refusal
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
@@ -70,7 +68,7 @@ class Mishap:
     player: int
     tag: int
     ability: int
-    refusal: Refusal
+    refusal: ActionResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +88,7 @@ class Rally:
     target: int = NO_TAG
 
 
-class World(UnitColumns, Remembered):
+class World(UnitColumns, WorldCaches):
     """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
 
     The world grows by itself; keep no reference to a column across ``spawn``.
@@ -100,7 +98,7 @@ class World(UnitColumns, Remembered):
         self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
     ) -> None:
         UnitColumns.__init__(self)
-        Remembered.__init__(self)
+        WorldCaches.__init__(self)
         self.map: GameMap = game_map
         self.catalog: Catalog = catalog or load_catalog()
         self.seed = seed
@@ -121,8 +119,8 @@ class World(UnitColumns, Remembered):
         self.missiles = Missiles()
         self.pending = PendingHits()
         self.sweeps: list[Sweep] = []
-        self.buffs = Buffs()
-        self.fields: list[Field] = []
+        self.buffs = ActiveBuffs()
+        self.area_effects: list[AreaEffect] = []
         self.timers: dict[int, dict[str, float]] = {}  # slot -> cooldown's name -> loop at which it is over
         self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
@@ -146,8 +144,8 @@ class World(UnitColumns, Remembered):
 
     # units --------------------------------------------------------------------------------------------------------
 
-    def spawn(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float = 4.7124) -> int:
-        """Put a complete unit into the world, exactly at ``point``; returns its slot."""
+    def add(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float) -> int:
+        """Take a free slot for a unit at exactly ``point``; returns it. ``lifecycle.spawn`` writes the rest."""
         slot = self._free_slot()
         self.clear(slot)
         self.alive[slot] = True
@@ -156,22 +154,8 @@ class World(UnitColumns, Remembered):
         self.owner[slot] = owner
         self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
         self.heading[slot] = self.turret[slot] = geometry.heading(facing)
-        self.life[slot] = self.stats.life_max[owner, unit.row] if unit.life_start is None else unit.life_start
-        self.shields[slot] = self.stats.shields_max[owner, unit.row]
-        self.energy[slot] = self.stats.energy_start[owner, unit.row]
-        self.burrowed[slot] = unit.burrowed
         self.born_loop[slot] = self.loop
-        self.contents[slot] = unit.resource_amount
-        autocast = tuple(ability.id for ability in self.catalog.cards[unit.row] if ability.autocast == "on")
-        if autocast and not unit.passive:
-            self.autocast[slot] = autocast
         self.queue[slot] = []
-        self.looks_around[slot] = True
-        self.visible[:, slot] = not (self.fog or unit.cloaked or unit.burrowed)  # vision looks closer
-        self.visible[owner, slot] = True
-        self.refresh(slot)
-        self._stand(slot)
-        self._population_changed()
         return slot
 
     def remove(self, slot: int) -> None:
@@ -197,50 +181,7 @@ class World(UnitColumns, Remembered):
         for sweep in self.sweeps:
             sweep.forget(slot)
         self.ground.unblock(slot)
-        self._population_changed()
-
-    def refresh(self, slot: int) -> None:
-        """Write the traits of a slot from its type, its owner, the owner's upgrades and the buffs that lie on it."""
-        body_traits(self, slot)
-        self._look_after(slot)
-
-    def become(self, slot: int, unit: UnitType) -> None:
-        """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept.
-
-        What it was set to use by itself, or not to, stays so where its new type has it.
-        """
-        owner = int(self.owner[slot])
-        known = {ability.id for ability in self.catalog.cards[int(self.type[slot])]}
-        before = float(self.life_max[slot]) or 1.0
-        had_energy = self.energy_max[slot] > 0.0
-        self.type[slot] = unit.row
-        self.burrowed[slot] = unit.burrowed
-        self.ground.unblock(slot)
-        self.refresh(slot)
-        self._stand(slot)
-        self.life[slot] = min(float(self.life[slot]) * float(self.life_max[slot]) / before, float(self.life_max[slot]))
-        self.shields[slot] = min(float(self.shields[slot]), float(self.stats.shields_max[owner, unit.row]))
-        energy = float(self.energy[slot] if had_energy else self.stats.energy_start[owner, unit.row])
-        self.energy[slot] = min(energy, float(self.stats.energy_max[owner, unit.row]))
-        chosen = self.autocast.pop(slot, ())
-        wanted = tuple(
-            ability.id
-            for ability in self.catalog.cards[unit.row]
-            if ability.id in chosen or (ability.autocast == "on" and ability.id not in known)
-        )
-        if wanted:
-            self.autocast[slot] = wanted
-        if self.target[slot] != NOBODY:
-            take_other_weapon(self, slot)
-        self.nav_loop[slot] = 0
-        self._population_changed()
-
-    def give(self, slot: int, owner: int) -> None:
-        """Hand a unit over to another player."""
-        self.owner[slot] = owner
-        self.refresh(slot)
-        self.visible[owner, slot] = True
-        self._population_changed()
+        self.population_changed()
 
     def stow(self, slot: int, carrier: int) -> None:
         """Take a unit out of the world into a carrier: it lives on, and nobody sees or touches it."""
@@ -253,7 +194,7 @@ class World(UnitColumns, Remembered):
             column[column == slot] = NOBODY
         self.target[slot] = NOBODY
         self.ground.unblock(slot)
-        self._population_changed()
+        self.population_changed()
 
     def unstow(self, slot: int, point: tuple[float, float]) -> None:
         """Put a unit from its carrier back into the world."""
@@ -261,8 +202,8 @@ class World(UnitColumns, Remembered):
         self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
         self.looks_around[slot] = True
         self.visible[self.owner[slot], slot] = True
-        self._stand(slot)
-        self._population_changed()
+        self.stand(slot)
+        self.population_changed()
 
     def alert(self, player: int, name: str) -> None:
         """Tell a player something, by the API's name of the alert."""
@@ -301,7 +242,7 @@ class World(UnitColumns, Remembered):
         result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
         return result
 
-    def _stand(self, slot: int) -> None:
+    def stand(self, slot: int) -> None:
         """Put a structure's footprint on the ground, unless units walk over it."""
         if not self.unit_type(slot).underfoot:
             self.ground.block(slot, self.footprint_cells(slot))
@@ -390,7 +331,7 @@ class World(UnitColumns, Remembered):
         sha.update(repr(self.script.content()).encode())
         sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
         sha.update(repr((self.jobs, self.rallies, self.invested)).encode())
-        sha.update(repr((self.fields, self.timers, self.autocast, self.sweeps)).encode())
+        sha.update(repr((self.area_effects, self.timers, self.autocast, self.sweeps)).encode())
         channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
         sha.update(repr(channels).encode())
         sha.update(self.growth.content())
@@ -398,7 +339,8 @@ class World(UnitColumns, Remembered):
         sha.update(repr([list(memory.of_unit.values()) for memory in self.memories]).encode())
         return sha.hexdigest()
 
-    def _population_changed(self) -> None:
+    def population_changed(self) -> None:
+        """Note that a unit came, went or became another."""
         self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.bodies = None
@@ -409,8 +351,8 @@ class World(UnitColumns, Remembered):
         self.mortal = bool(self.expires.any())
         self.hiding = bool((self.cloaked | self.burrowed).any())
 
-    def _look_after(self, slot: int) -> None:
-        """Note what the changed traits of a unit mean for laws that pass over worlds without such units."""
+    def note_traits(self, slot: int) -> None:
+        """Note what the changed traits of a unit mean for systems that pass over worlds without such units."""
         shields, life, energy = self.regenerating
         self.regenerating = (
             shields or bool(self.shield_regen[slot]),

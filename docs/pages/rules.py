@@ -14,7 +14,7 @@ from docs.pages.markdown import code, codes, head, join, table
 from simulator import stats
 from simulator.casting import ORDINARY, is_modelled
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
-from simulator.skills import DEATHS, PASSIVES, SKILLS
+from simulator.skills.registry import DEATHS, PASSIVES, SKILLS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -101,14 +101,14 @@ def _unit_row(unit: UnitType) -> tuple[object, ...]:
 def melee_abilities(catalog: Catalog) -> list[Ability]:
     """The abilities, other than moving and fighting, on the cards of types that a melee game can have, by id."""
     found = {a.id: a for unit in melee_units(catalog) for a in catalog.abilities_of(unit.row)}
-    return [a for _, a in sorted(found.items()) if a.does not in ORDINARY]
+    return [a for _, a in sorted(found.items()) if a.effect not in ORDINARY]
 
 
 def ability_state(ability: Ability) -> tuple[str, str]:
     """How far an ability is modelled, and what of it is an estimate."""
     if not is_modelled(ability):
         return MISSING, ""
-    estimates = SKILLS[ability.does].estimates
+    estimates = SKILLS[ability.effect].estimates
     return (ESTIMATED if estimates else IMPLEMENTED), " ".join(estimates)
 
 
@@ -126,7 +126,7 @@ def _ability_row(ability: Ability, names: set[str]) -> tuple[object, ...]:
 
 def _rule(ability: Ability) -> str:
     """The first sentence of the rule's own account of itself."""
-    skill = SKILLS.get(ability.does)
+    skill = SKILLS.get(ability.effect)
     text = inspect.getdoc(skill.give or skill.effect) if skill is not None else ""
     return (text or "").split("\n\n", maxsplit=1)[0]
 

@@ -43,12 +43,12 @@ class Needs(NamedTuple):
 def ability_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
     """One record for each ability that someone in a melee game has or PySC2 has a function for, by its number."""
     users = _users(catalog)
-    special = {a.id: _special(a, users.get(a.id, []), catalog) for a in catalog.abilities if a.does != "general"}
+    special = {a.id: _special(a, users.get(a.id, []), catalog) for a in catalog.abilities if a.effect != "general"}
     special = {number: record for number, record in special.items() if record["melee"] or functions_of(number)}
     general = {
         a.id: _general(a, {s.id: special[s.id] for s in catalog.abilities if s.general == a.id and s.id in special})
         for a in catalog.abilities
-        if a.does == "general"
+        if a.effect == "general"
     }
     return {str(number): sparse(record) for number, record in sorted({**special, **general}.items())}
 
@@ -69,7 +69,7 @@ def research_of(upgrade: Upgrade, catalog: Catalog) -> Ability | None:
 
     Of such pairs (an upgrade has moved to another structure) the tables keep both, and say only of some where it is.
     """
-    found = [a for a in catalog.abilities if a.does == "research" and a.upgrade == upgrade.name]
+    found = [a for a in catalog.abilities if a.effect == "research" and a.upgrade == upgrade.name]
     here = [a for a in found if set(a.users) & set(upgrade.at)]
     fits = [a for a in found if (a.minerals, a.vespene) == upgrade.cost]
     return next(iter(here or fits or found), None)
@@ -103,15 +103,15 @@ def _users(catalog: Catalog) -> dict[int, list[str]]:
 
 def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, Any]:
     upgrade = catalog.upgrade_of.get(ability.upgrade) if ability.upgrade else None
-    in_melee = ability.does and any(table_name(name) in melee_types(catalog) for name in users)
-    if ability.does == "research":
+    in_melee = ability.effect and any(table_name(name) in melee_types(catalog) for name in users)
+    if ability.effect == "research":
         in_melee = in_melee and upgrade is not None and upgrade.researchable
         in_melee = in_melee and upgrade is not None and research_of(upgrade, catalog) == ability
     elif ability.unit in catalog.row_of_name and ability.unit not in melee_types(catalog):
         in_melee = False
     return {
         "name": ability_name(ability),
-        "does": ability.does,
+        "does": ability.effect,
         "general": ability.general,
         "melee": bool(in_melee),
         "users": users or sorted(unit_names()[name] for name in ability.users if name in unit_names()),
@@ -149,7 +149,7 @@ def _filter(filters: Filter) -> dict[str, Any]:
 
 def _outcome(ability: Ability) -> dict[str, Any]:
     """What comes of it, and how long that takes."""
-    research = ability.does == "research"
+    research = ability.effect == "research"
     count = max(ability.count, len(ability.units), ability.numbers.get("count", 1))
     return {
         "produces": unit_name(ability.unit) if ability.unit else "",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from khala.knowledge.measures import plain, seconds, sparse
 
 if TYPE_CHECKING:
-    from simulator.buffs import Buff
+    from simulator.buff_kinds import Buff
     from simulator.catalog import Catalog
 
 

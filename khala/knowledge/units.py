@@ -162,7 +162,7 @@ def _blow(hit: Hit) -> dict[str, Any]:
 def _launched(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
     """What all that a unit can hold and launch do together, at the distance from which it launches them."""
     for hangar in catalog.abilities_of(unit.row):
-        if hangar.does == "arm" and hangar.unit == weapon.launches:
+        if hangar.effect == "arm" and hangar.unit == weapon.launches:
             for other in _weapons(catalog.unit(weapon.launches), catalog):
                 count = other["attacks"] * int(hangar.numbers["max"])
                 yield {**other, "range": plain(weapon.range), "attacks": count}

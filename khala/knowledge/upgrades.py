@@ -41,7 +41,7 @@ def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:
     minerals, vespene = (research.minerals, research.vespene) if research else upgrade.cost
     changes = _changes(upgrade, catalog)
     enabled = [a for a in catalog.abilities if upgrade_name(upgrade.name) in needs_of(a.requires).names]
-    users = {unit_name(u) for a in enabled if a.does != "research" for u in a.users if u in unit_names()}
+    users = {unit_name(u) for a in enabled if a.effect != "research" for u in a.users if u in unit_names()}
     places = [catalog.unit(place) for place in (research.users if research else upgrade.at)]
     return {
         "id": upgrade.id,
@@ -54,7 +54,7 @@ def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:
         "ability": research.id if research else upgrade.ability,
         "requires": list(needs_of(research.requires).names) if research else [],
         "affects": sorted(users | changes.keys()),
-        "enables": [a.id for a in enabled if a.does != "research"],
+        "enables": [a.id for a in enabled if a.effect != "research"],
         "changes": changes,
     }
 

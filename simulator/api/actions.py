@@ -1,9 +1,9 @@
 """What a client's actions do, and how they are reported back.
 
 An action is judged when it arrives, which gives the result code of the response, and takes effect when the game next
-advances. From then on the next observation reports it, in every form that the client's interface has: a raw command
-also as the click that would have given it, a click also as the raw command that it was. Nothing that a client puts
-into an action is a usage error.
+advances: as it was judged, or judged again if something else has taken effect since. From then on the next
+observation reports it, in every form that the client's interface has: a raw command also as the click that would have
+given it, a click also as the raw command that it was. Nothing that a client puts into an action is a usage error.
 
 Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` (commands).
 """
@@ -11,7 +11,7 @@ Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` (com
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from s2clientprotocol import error_pb2
 from s2clientprotocol import sc2api_pb2 as sc
@@ -19,7 +19,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator import casting
 from simulator.abilities import Aim
 from simulator.api import abilities, clicks, pixels
-from simulator.api.abilities import Command, Outcome
+from simulator.api.abilities import Command, Outcome, Plan
 from simulator.api.selection import at_point, panel_order
 
 if TYPE_CHECKING:
@@ -37,12 +37,24 @@ ON_MINIMAP = casting.ORDINARY | {"rally"}
 """What can be told by a click on the minimap, whoever is told; PySC2 has no such function for most of the rest."""
 
 
-def judge(seat: Seat, action: sc.Action) -> Result:
-    """The result code for an action as things stand; an action that says nothing succeeds."""
-    for command in _commands(seat, action):
-        outcome = abilities.judge(seat.world, seat.player, command)
-        if outcome.result != error_pb2.Success:
-            return outcome.result
+class Judgement(NamedTuple):
+    """The result code for an action as things stand, and what its first command comes to, None without one."""
+
+    result: Result
+    plan: Plan | None = None
+
+
+def judge(seat: Seat, action: sc.Action) -> Judgement:
+    """How an action goes as things stand; one that says nothing succeeds."""
+    plans = list[Plan]()
+    for plan in _plans(seat, action):
+        plans.append(plan)
+        if plan.result != error_pb2.Success:
+            return Judgement(plan.result, plans[0])
+    return Judgement(_beside_commands(seat, action), plans[0] if plans else None)
+
+
+def _beside_commands(seat: Seat, action: sc.Action) -> Result:
     if action.action_raw.HasField("camera_move") and not _finite(action.action_raw.camera_move.center_world_space):
         return error_pb2.MustTargetVisibleLocation
     if action.HasField("action_ui") and not clicks.is_possible(seat, action.action_ui):
@@ -50,10 +62,17 @@ def judge(seat: Seat, action: sc.Action) -> Result:
     return error_pb2.Success
 
 
-def perform(seat: Seat, action: sc.Action, loop: int) -> None:
-    """Lets an action take effect, and notes what the next observation is to report of it."""
-    for command in _commands(seat, action):
-        _give(seat, command, loop, by_tags=action.action_raw.HasField("unit_command"))
+def perform(seat: Seat, action: sc.Action, loop: int, plan: Plan | None = None) -> None:
+    """Have an action take effect, and note what the next observation is to report of it.
+
+    Args:
+        seat: Whose action it is.
+        action: The action.
+        loop: The loop in which it takes effect.
+        plan: What its first command comes to, if it was judged in the world as it is now.
+    """
+    for planned in _plans(seat, action, plan):
+        _give(seat, planned, loop, by_tags=action.action_raw.HasField("unit_command"))
     if action.action_raw.HasField("toggle_autocast"):
         toggle = action.action_raw.toggle_autocast
         if clicks.toggle_autocast(seat.world, seat.player, toggle.ability_id, toggle.unit_tags):
@@ -92,12 +111,18 @@ def _finite(point: common_pb2.Point) -> bool:
 # commands -------------------------------------------------------------------------------------------------------------
 
 
-def _commands(seat: Seat, action: sc.Action) -> Iterator[Command]:
+def _plans(seat: Seat, action: sc.Action, first: Plan | None = None) -> Iterator[Plan]:
+    """What the commands of an action come to, each judged when it is its turn; ``first`` is known already."""
     if action.action_raw.HasField("unit_command"):
-        yield _from_tags(seat, action.action_raw.unit_command)
+        yield first or _judged(seat, _from_tags(seat, action.action_raw.unit_command))
+        first = None
     spatial, view = _spatial(seat, action)
     if spatial.HasField("unit_command"):
-        yield _from_click(seat, spatial.unit_command, view)
+        yield first or _judged(seat, _from_click(seat, spatial.unit_command, view))
+
+
+def _judged(seat: Seat, command: Command) -> Plan:
+    return abilities.judge(seat.world, seat.player, command)
 
 
 def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
@@ -138,8 +163,8 @@ def _takes_units(seat: Seat, requested: int) -> bool:
     return any(Aim.UNIT in ability.aim for ability in meant if ability is not None)
 
 
-def _give(seat: Seat, command: Command, loop: int, *, by_tags: bool) -> None:
-    outcome = abilities.carry_out(seat.world, seat.player, command)
+def _give(seat: Seat, plan: Plan, loop: int, *, by_tags: bool) -> None:
+    command, outcome = plan.asked, abilities.carry_out(seat.world, plan)
     if outcome.result != error_pb2.Success:
         tag = command.tags[0] if command.tags else 0
         seat.hands.errors.append(
@@ -167,12 +192,12 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
     if command.target and point is None:
         x, y = seat.world.pos[seat.world.slot_of(command.target)].tolist()
         point = x, y
-    does = seat.world.catalog.ability(outcome.ability).does
+    effect = seat.world.catalog.ability(outcome.ability).effect
     for spatial, view in _images(seat, action):
         spatial.unit_command.ability_id = outcome.ability
         spatial.unit_command.queue_command = command.queue
         if point is not None:
-            pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=does in ON_MINIMAP)
+            pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=effect in ON_MINIMAP)
 
 
 def _press(seat: Seat, ui: ui_pb2.ActionUI, loop: int) -> None:

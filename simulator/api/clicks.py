@@ -127,7 +127,7 @@ def _unload(seat: Seat, index: int) -> bool:
         return False
     (carrier,) = seat.selection.slots(seat.world)
     card = seat.world.catalog.abilities_of(int(seat.world.type[carrier]))
-    unload = next((a for a in card if a.does == "unload_unit"), None)
+    unload = next((a for a in card if a.effect == "unload_unit"), None)
     if unload is None:
         return False
     return bool(casting.use(seat.world, [carrier], unload, target=cargo[index]))

@@ -11,20 +11,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from simulator.api.sight import API_NEUTRAL, Alliance, Display, alliance_of, sees
-from simulator.buffs import FOREVER
+from simulator.active_buffs import FOREVER
+from simulator.api.sight import Alliance, Display, sees
 from simulator.catalog import load_catalog
 from simulator.players import NEUTRAL
 from simulator.skills.buildings import RADAR, radars
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from s2clientprotocol import raw_pb2
 
-    from simulator.api.seat import Seat
     from simulator.api.sight import Sight
     from simulator.api.types import Types
-    from simulator.fields import Field
+    from simulator.area_effects import AreaEffect
     from simulator.skills.buildings import Radar
     from simulator.world import World
 
@@ -60,9 +58,9 @@ class Power(NamedTuple):
     radius: Floats
 
 
-def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[Field]:
+def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[AreaEffect]:
     """Fields that the API has an effect id for and that the player perceives: his own, and those in his sight."""
-    told = [field for field in world.fields if field.effect]
+    told = [field for field in world.area_effects if field.effect]
     if through_fog or not told:
         return told
     return [f for f in told if f.owner == player or sees(world, player, np.array(f.points, float)).any()]
@@ -127,32 +125,3 @@ def blips(world: World, types: Types, player: int) -> Floats:
 def _towers(version: str) -> list[int]:
     catalog = load_catalog(version)
     return [catalog.row_of_name[name] for name in RADAR if name in catalog.row_of_name]
-
-
-def write_radar(raw: raw_pb2.ObservationRaw, seat: Seat) -> None:
-    """Adds the radars that the player knows of to the raw data."""
-    for radar in seen_radars(seat.world, seat.player):
-        ring = raw.radar.add(radius=radar.radius)
-        x, y = radar.point
-        ring.pos.x, ring.pos.y, ring.pos.z = x - seat.origin[0], y - seat.origin[1], seat.ground_z(x, y)
-
-
-def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool) -> None:
-    """Adds the effects that the player perceives to the raw data."""
-    for field in seen_fields(seat.world, seat.player, through_fog=through_fog):
-        side = int(alliance_of(np.array([field.owner]), seat.player)[0])
-        effect = raw.effects.add(effect_id=field.effect, radius=field.radius, alliance=side)
-        effect.owner = field.owner or API_NEUTRAL
-        for x, y in field.points:
-            effect.pos.add(x=x - seat.origin[0], y=y - seat.origin[1])
-
-
-def write_power(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight) -> None:
-    """Adds the player's sources of power to the raw data."""
-    sources = power(sight, seat.types)
-    if sources is None:
-        return
-    for row, radius in zip(sources.row.tolist(), sources.radius.tolist(), strict=True):
-        source = raw.player.power_sources.add(radius=radius, tag=int(sight.tag[row]))
-        x, y = sight.pos[row].tolist()
-        source.pos.x, source.pos.y, source.pos.z = x - seat.origin[0], y - seat.origin[1], float(sight.z[row])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2
@@ -28,6 +28,7 @@ from simulator.tick import advance, new_game
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from simulator.api.abilities import Plan
     from simulator.maps import GameMap
     from simulator.world import World
 
@@ -59,6 +60,15 @@ class Entry:
     act: sc.Action | debug_pb2.DebugCommand
 
 
+class _Judged(NamedTuple):
+    """An action that was judged when it came: at which loop, after how many entries, and what it comes to."""
+
+    entry: Entry
+    loop: int
+    done: int
+    plan: Plan | None
+
+
 class Game:
     """A running game. With a log it is a replay, and ends at `end_loop`."""
 
@@ -79,6 +89,7 @@ class Game:
         self.delay = 0  # loops from when a client acts until that takes effect
         self.unsent: list[Entry] | None = None  # what was done here since somebody last told the other processes
         self._done = 0  # entries of the log that have taken effect
+        self._judged: _Judged | None = None  # the first action since something took effect
 
     @property
     def over(self) -> bool:
@@ -94,12 +105,14 @@ class Game:
 
     def act(self, player: int, action: sc.Action) -> error_pb2.ActionResult.ValueType:
         """Notes an action of a player, and says how it looks as things stand."""
-        result = actions.judge(self.seats[player], action)
+        judgement = actions.judge(self.seats[player], action)
         if action.ListFields():
             copy = sc.Action()
             copy.CopyFrom(action)
-            self._do(player, copy)
-        return result
+            entry = self._do(player, copy)
+            if self._judged is None or self._judged.done < self._done:
+                self._judged = _Judged(entry, self.world.loop, self._done, judgement.plan)
+        return judgement.result
 
     def debug(self, player: int, command: debug_pb2.DebugCommand) -> None:
         """Notes a debug command of a player."""
@@ -107,11 +120,12 @@ class Game:
         copy.CopyFrom(command)
         self._do(player, copy)
 
-    def _do(self, player: int, act: sc.Action | debug_pb2.DebugCommand) -> None:
+    def _do(self, player: int, act: sc.Action | debug_pb2.DebugCommand) -> Entry:
         entry = Entry(max(self.world.loop + self.delay, self.not_before), player, act)
         self.note(entry)
         if self.unsent is not None:
             self.unsent.append(entry)
+        return entry
 
     def note(self, entry: Entry) -> None:
         """Puts an entry into the log: by its loop, then by its player, then as it came."""
@@ -154,8 +168,15 @@ class Game:
             if isinstance(entry.act, debug_pb2.DebugCommand):
                 debug.execute(self.world, entry.player, entry.act)
             elif (seat := self.seats.get(entry.player)) is not None:
-                actions.perform(seat, entry.act, self.world.loop)
+                actions.perform(seat, entry.act, self.world.loop, self._plan_of(entry))
                 self._spread_chat(entry.player, entry.act)
+
+    def _plan_of(self, entry: Entry) -> Plan | None:
+        """What an action was judged to come to, if nothing has taken effect since then."""
+        judged = self._judged
+        if judged is None or judged.entry is not entry:
+            return None
+        return judged.plan if (judged.loop, judged.done) == (self.world.loop, self._done - 1) else None
 
     def _spread_chat(self, sender: int, action: sc.Action) -> None:
         if not action.HasField("action_chat"):

@@ -110,7 +110,7 @@ class FeatureLayers:
     def _effects(self, frame: Frame) -> list[Part]:
         """Effect ids at their places; of two at one pixel the younger one."""
         layer = self._screen.layers["effects"]
-        if not frame.world.fields:
+        if not frame.world.area_effects:
             return layer.blank
         fields = seen_fields(frame.world, frame.player, through_fog=not frame.fogged)
         spots = [(x, y, field.radius, field.effect) for field in fields for x, y in field.points]

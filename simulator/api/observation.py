@@ -16,9 +16,10 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api import ui, wire
 from simulator.api.abilities import result_of, usable
-from simulator.api.effects import seen_buffs, write_effects, write_power, write_radar
+from simulator.api.effects import seen_buffs
 from simulator.api.layers import Frame
 from simulator.api.raw import Units, write_image
+from simulator.api.raw_effects import write_effects, write_power, write_radar
 from simulator.api.score import Holdings
 from simulator.api.sight import Alliance
 

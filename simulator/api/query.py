@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import error_pb2, query_pb2
 
-from simulator import sites
+from simulator import pathing, sites
 from simulator.api.abilities import result_of, usable
+from simulator.layers import Layer
 from simulator.skills import warpgate
-from simulator.traits import Layer
 from simulator.world import NOBODY
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
         return 0.0
     if flying:
         return math.dist(start, end)
-    return world.ground.surface(Layer.WALK).distance(np.array(start), np.array(end))
+    return pathing.surface(world.ground, Layer.WALK).distance(np.array(start), np.array(end))
 
 
 def _on_map(world: World, x: float, y: float) -> bool:
@@ -86,5 +86,5 @@ def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> err
     point = (question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1])
     if not (all(map(math.isfinite, point)) and _on_map(world, *point)):
         return error_pb2.CantBuildLocationInvalid
-    rule = warpgate.refusal if ability.does == "warp_in" else sites.refusal
+    rule = warpgate.refusal if ability.effect == "warp_in" else sites.refusal
     return result_of(rule(world, seat.player, unit, point))

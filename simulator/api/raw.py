@@ -14,8 +14,8 @@ import numpy as np
 from s2clientprotocol import raw_pb2
 
 from simulator import harvesting
+from simulator.active_buffs import FOREVER
 from simulator.api.sight import Alliance
-from simulator.buffs import FOREVER
 from simulator.columns import NOBODY
 
 if TYPE_CHECKING:

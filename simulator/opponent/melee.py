@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import casting, commands, harvesting, sites, supply
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.harvesting import Phase
 from simulator.mechanics import MECHANICS
@@ -19,7 +20,6 @@ from simulator.opponent.levels import level_of
 from simulator.opponent.plans import PLANS
 from simulator.orders import OrderKind
 from simulator.placement import snapped
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -147,7 +147,7 @@ def _train(side: Side, makers: list[int], name: str) -> bool:
     ability = side.ability_for(name)
     if ability is None:
         return False
-    able = [s for s in makers if casting.refusal(side.world, s, ability) is Refusal.SUCCESS]
+    able = [s for s in makers if casting.refusal(side.world, s, ability) is ActionResult.SUCCESS]
     return bool(able) and bool(casting.use(side.world, able[:1], ability))
 
 
@@ -173,7 +173,7 @@ def _raise(side: Side, name: str) -> bool:
     if ability is None or not side.halls:
         return False
     worker = _free_worker(side, world.pos[side.halls[0]].tolist())
-    if worker == NOBODY or casting.refusal(world, worker, ability) is not Refusal.SUCCESS:
+    if worker == NOBODY or casting.refusal(world, worker, ability) is not ActionResult.SUCCESS:
         return False
     patch = world.tag_of(int(world.patch[worker]))
     if name == side.plan.gas:
@@ -209,7 +209,7 @@ def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | N
         x, y = snapped((float(centre[0] + dx), float(centre[1] + dy)), footprint.size)
         between = fields.size and float(np.hypot(fields[:, 0] - x, fields[:, 1] - y).min()) < NEAREST_SITE
         roomy = not between and _has_margin(world, (x, y), footprint.size)
-        if roomy and sites.refusal(world, player, unit, (x, y)) is Refusal.SUCCESS:
+        if roomy and sites.refusal(world, player, unit, (x, y)) is ActionResult.SUCCESS:
             return x, y
     return None
 

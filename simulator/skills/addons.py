@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import construction, production, sites
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -38,14 +38,14 @@ def _build(world: World, slots: list[int], ability: Ability, _: int, __: Point |
     return [slot]
 
 
-def _can_build(world: World, slot: int, ability: Ability) -> Refusal:
+def _can_build(world: World, slot: int, ability: Ability) -> ActionResult:
     unit = sites.product(world, ability)
     if unit is None or world.unit_type(slot).flying:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     if world.addon[slot] != NOBODY:
-        return Refusal.CANT_BUILD_ON_THAT
+        return ActionResult.CANT_BUILD_ON_THAT
     if slot in world.jobs:
-        return Refusal.CANT_QUEUE_THAT_ORDER
+        return ActionResult.CANT_QUEUE_THAT_ORDER
     return sites.refusal(world, int(world.owner[slot]), unit, place_of(world, slot))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.damage import hit_with
-from simulator.refusal import Refusal
 from simulator.shots import Shot
 from simulator.skills.skill import Skill
 
@@ -54,12 +54,12 @@ def _spare_buildings(world: World, cast: Cast) -> None:
     buffs.remove(world, cast.slot, BUILDINGS)
 
 
-def _not_yet(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, slot, BUILDINGS) else Refusal.SUCCESS
+def _not_yet(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.ERROR if buffs.has(world, slot, BUILDINGS) else ActionResult.SUCCESS
 
 
-def _already(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, slot, BUILDINGS) else Refusal.ERROR
+def _already(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if buffs.has(world, slot, BUILDINGS) else ActionResult.ERROR
 
 
 SKILLS: Final = {

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
-from simulator.refusal import Refusal
-from simulator.skills import room
+from simulator import buffs, lifecycle, pathing
+from simulator.action_result import ActionResult
+from simulator.layers import Layer
+from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -53,21 +53,23 @@ def off_self(buff: str) -> Effect:
 
 def _morph(world: World, cast: Cast) -> None:
     """Become what the ability makes; the time it takes has passed (see ``casting.prep_loops``)."""
-    world.become(cast.slot, world.catalog.unit(cast.ability.unit))
-    room.make(world, cast.slot)
+    lifecycle.become(world, cast.slot, world.catalog.unit(cast.ability.unit))
+    push_units_off(world, cast.slot)
 
 
-def _can_morph(world: World, cast: Cast) -> Refusal:
+def _can_morph(world: World, cast: Cast) -> ActionResult:
     row = world.catalog.row_of_name.get(cast.ability.unit)
     if row is None:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     lands = world.unit_type(cast.slot).flying and not world.catalog.units[row].flying
-    return Refusal.CANT_LAND_LOCATION_INVALID if lands and not _walkable(world, cast.slot) else Refusal.SUCCESS
+    return (
+        ActionResult.CANT_LAND_LOCATION_INVALID if lands and not _walkable(world, cast.slot) else ActionResult.SUCCESS
+    )
 
 
 def _walkable(world: World, slot: int) -> bool:
     """Whether the ground under a flyer bears walkers."""
-    surface = world.ground.surface(Layer.WALK)
+    surface = pathing.surface(world.ground, Layer.WALK)
     return bool(surface.flat[surface.cell(world.pos[slot][None])][0])
 
 

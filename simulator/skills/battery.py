@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
@@ -54,17 +54,17 @@ def _boost(world: World, slot: int) -> float:
     return number(world.catalog.ability(OVERCHARGE_ABILITY), "rate")
 
 
-def _cant_recharge(world: World, cast: Cast) -> Refusal:
+def _cant_recharge(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     if target == NOBODY or world.shields[target] >= world.shields_max[target]:
-        return Refusal.CANT_TARGET_THAT_UNIT
+        return ActionResult.CANT_TARGET_THAT_UNIT
     if world.unit_type(target).name == "Interceptor":
-        return Refusal.CANT_TARGET_THAT_UNIT
+        return ActionResult.CANT_TARGET_THAT_UNIT
     if world.channels[cast.slot] or _boost(world, cast.slot) > 1.0:
-        return Refusal.SUCCESS
+        return ActionResult.SUCCESS
     energy = float(world.energy[cast.slot])
     enough = energy > 0.0 and energy >= number(cast, "least_energy")
-    return Refusal.SUCCESS if enough else Refusal.NOT_ENOUGH_ENERGY
+    return ActionResult.SUCCESS if enough else ActionResult.NOT_ENOUGH_ENERGY
 
 
 def _stop(world: World, cast: Cast) -> None:
@@ -72,8 +72,8 @@ def _stop(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _cant_stop(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if cast.slot in world.channelling else Refusal.CANT_FIND_CANCEL_ORDER
+def _cant_stop(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if cast.slot in world.channelling else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 def _overcharge(world: World, cast: Cast) -> None:
@@ -81,18 +81,18 @@ def _overcharge(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, OVERCHARGE, source=cast.slot, loops=number(cast, "duration_loops"))
 
 
-def _cant_overcharge(world: World, cast: Cast) -> Refusal:
+def _cant_overcharge(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     if target == NOBODY or world.unit_type(target).name != "ShieldBattery" or buffs.has(world, target, OVERCHARGE):
-        return Refusal.CANT_TARGET_THAT_UNIT
+        return ActionResult.CANT_TARGET_THAT_UNIT
     if world.build_progress[target] < 1.0:
-        return Refusal.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
+        return ActionResult.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
     mine = world.units_of(int(world.owner[cast.slot]))
     nexus = mine[(world.type[mine] == world.catalog.unit("Nexus").row) & (world.build_progress[mine] >= 1.0)]
     offset = world.pos[nexus] - world.pos[target]
     away = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[nexus]
     near = bool((away <= number(cast, "nexus_range")).any())
-    return Refusal.SUCCESS if near else Refusal.TARGET_IS_OUT_OF_RANGE
+    return ActionResult.SUCCESS if near else ActionResult.TARGET_IS_OUT_OF_RANGE
 
 
 def recharge_by_click(
@@ -102,10 +102,10 @@ def recharge_by_click(
     taken: list[int] = []
     for slot in slots if target != NOBODY else ():
         card = world.catalog.abilities_of(int(world.type[slot]))
-        ability = next((a for a in card if a.does == "recharge_shields"), None)
+        ability = next((a for a in card if a.effect == "recharge_shields"), None)
         if ability is None or world.owner[target] != world.owner[slot] or gap(world, slot, target) > ability.range:
             continue
-        if _cant_recharge(world, Cast(slot, ability, target)) is Refusal.SUCCESS:
+        if _cant_recharge(world, Cast(slot, ability, target)) is ActionResult.SUCCESS:
             order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
             taken += commands.give(world, [slot], order, queue=queue)
     return taken

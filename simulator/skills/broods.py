@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands
+from simulator import commands, lifecycle
+from simulator.area_effects import AreaEffect
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.launchers import LAUNCHERS
 from simulator.mechanics import MECHANICS
 from simulator.placement import free_places
@@ -50,13 +50,13 @@ def _throw(world: World, slot: int, target: int) -> None:
     (x, y), (a, b) = world.pos[slot].tolist(), world.pos[target].tolist()
     speed_n = escort.hits[index].missile_speed_n or math.inf
     flies = math.ceil(math.hypot(a - x, b - y) / speed_n * LOOPS_PER_NORMAL_SECOND)
-    world.fields.append(
-        Field("broodling", owner, [(a, b)], 0.0, world.loop, world.loop + flies, due=world.loop + flies,
+    world.area_effects.append(
+        AreaEffect("broodling", owner, [(a, b)], 0.0, world.loop, world.loop + flies, due=world.loop + flies,
               target=world.tag_of(target))
     )  # fmt: skip
 
 
-def _lands(world: World, item: Field) -> None:
+def _lands(world: World, item: AreaEffect) -> None:
     target = world.slot_of(item.target)
     x, y = world.pos[target].tolist() if target != NOBODY else item.at
     (slot,) = hatch(world, item.owner, (x, y), 1)
@@ -67,7 +67,7 @@ def _lands(world: World, item: Field) -> None:
 def hatch(world: World, owner: int, point: Point, count: int) -> list[int]:
     """Let broodlings come into the world around a point, for a few seconds."""
     unit = world.catalog.unit(BROODLING)
-    slots = [world.spawn(unit, owner, place) for place in free_places(world, unit, point, count)]
+    slots = [lifecycle.spawn(world, unit, owner, place) for place in free_places(world, unit, point, count)]
     for slot in slots:
         chance = MECHANICS.broodling_random_loops * world.rng.random()
         teleport.live_until(world, slot, world.loop + world.catalog.buff(LIFE).loops + chance)
@@ -87,5 +87,5 @@ def _leaves(count: int) -> Callable[[World, int], None]:
 
 LAUNCHERS[WEAPON] = _throw
 
-FIELDS: Final = {"broodling": _lands}
+AREA_EFFECTS: Final = {"broodling": _lands}
 DEATHS: Final = {**{name: _leaves(9) for name in LARGE}, **{name: _leaves(6) for name in SMALL}}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from simulator import buffs
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, number
 from simulator.world import Death
 
@@ -68,16 +68,16 @@ def _salvage(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.slot, SALVAGED, source=cast.slot)
 
 
-def _not_yet(world: World, cast: Cast) -> Refusal:
+def _not_yet(world: World, cast: Cast) -> ActionResult:
     """Refuse a structure that has somebody inside, or is being taken down already."""
     inside = bool(world.passengers(cast.slot)) or buffs.has(world, cast.slot, SALVAGED)
-    return Refusal.ERROR if inside else Refusal.SUCCESS
+    return ActionResult.ERROR if inside else ActionResult.SUCCESS
 
 
 def _take_down(world: World, slot: int, row: np.void) -> None:
     """Give back a part of what a structure cost; it leaves the world, and no score counts it as lost."""
     owner = int(row["owner"])
-    ability = next(a for a in world.catalog.abilities if a.does == "salvage_shared_on")
+    ability = next(a for a in world.catalog.abilities if a.effect == "salvage_shared_on")
     share = number(ability, "refund")
     minerals, vespene = world.unit_type(slot).cost
     world.players[owner].minerals += minerals * share

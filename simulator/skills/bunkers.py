@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, targets
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.needs import met
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, number
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ def _armed(world: World, slot: int) -> list[int]:
     return [s for s in world.passengers(slot) if world.ground_weapon[s] >= 0 or world.air_weapon[s] >= 0]
 
 
-def _anybody_armed(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if _armed(world, slot) else Refusal.CANT_ATTACK_WEAPONS_DISABLED
+def _anybody_armed(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if _armed(world, slot) else ActionResult.CANT_ATTACK_WEAPONS_DISABLED
 
 
 # whom to shoot at -----------------------------------------------------------------------------------------------------
@@ -48,10 +48,10 @@ def _reaches(world: World, slot: int, target: int) -> bool:
     return float((offset**2).sum()) <= (reach + bodies) ** 2
 
 
-def _nobody_reaches(world: World, cast: Cast) -> Refusal:
+def _nobody_reaches(world: World, cast: Cast) -> ActionResult:
     aimed = cast.target != NOBODY
     reached = any(_reaches(world, slot, cast.target) for slot in _armed(world, cast.slot)) if aimed else True
-    return Refusal.SUCCESS if reached else Refusal.TARGET_IS_OUT_OF_RANGE
+    return ActionResult.SUCCESS if reached else ActionResult.TARGET_IS_OUT_OF_RANGE
 
 
 def _told_to_shoot(
@@ -93,8 +93,8 @@ def _stim(world: World, cast: Cast) -> None:
         buffs.apply(world, slot, str(cast.ability.numbers["buff"]), source=slot, loops=number(inner, "duration_loops"))
 
 
-def _anybody_fit(world: World, slot: int, ability: Ability) -> Refusal:
-    return Refusal.SUCCESS if _users(world, slot, ability) else Refusal.TECH_REQUIREMENTS_NOT_MET
+def _anybody_fit(world: World, slot: int, ability: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if _users(world, slot, ability) else ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 SKILLS: Final = {

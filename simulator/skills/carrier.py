@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, production
+from simulator import commands, lifecycle, production
+from simulator.action_result import ActionResult
 from simulator.arrays import which
 from simulator.columns import NOBODY
 from simulator.orders import ATTACK, MOVE, Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +41,7 @@ def crew_of(world: World, carrier: int) -> list[int]:
 def add_interceptor(world: World, carrier: int) -> int:
     """Put a new Interceptor into a Carrier's hangar; returns its slot."""
     x, y = world.pos[carrier].tolist()
-    slot = world.spawn(world.catalog.unit(INTERCEPTOR), int(world.owner[carrier]), (x, y))
+    slot = lifecycle.spawn(world, world.catalog.unit(INTERCEPTOR), int(world.owner[carrier]), (x, y))
     world.home[slot] = carrier
     world.stow(slot, carrier)
     return slot
@@ -56,13 +57,13 @@ def _arm(world: World, slots: list[int], ability: Ability, _: int, __: Point | N
     return slots
 
 
-def _has_place(world: World, slot: int, ability: Ability) -> Refusal:
+def _has_place(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether the hangar and its queue take one more."""
     queued = len(world.jobs.get(slot, ()))
     if queued >= production.QUEUE:
-        return Refusal.QUEUE_IS_FULL
+        return ActionResult.QUEUE_IS_FULL
     full = queued + len(crew_of(world, slot)) >= number(ability, "max")
-    return Refusal.CANT_HOLD_ANY_MORE_AMMO if full else Refusal.SUCCESS
+    return ActionResult.CANT_HOLD_ANY_MORE_AMMO if full else ActionResult.SUCCESS
 
 
 # sending them ---------------------------------------------------------------------------------------------------------
@@ -107,7 +108,7 @@ def _launch(world: World, carrier: int, prey: int, ability: Ability) -> None:
     world.unstow(slot, (x, y))
     teleport.to(world, slot, (x, y))
     world.heading[slot] = world.heading[carrier]
-    world.refresh(slot)
+    refresh(world, slot)
     _attack(world, slot, prey)
     world.timers[carrier][NEXT_LAUNCH] = world.loop + number(ability, "launch_loops")
 
@@ -125,7 +126,7 @@ def _direct(world: World, slot: int, carrier: int, leash: float) -> None:
         world.queue[slot] = []
         commands.begin(world, slot, None)
         world.stow(slot, carrier)
-        world.refresh(slot)
+        refresh(world, slot)
     elif world.order_kind[slot] != OrderKind.FOLLOW:
         commands.begin(world, slot, Order(OrderKind.FOLLOW, MOVE, target=world.tag_of(carrier)))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills.basics import off_self, on_self
 from simulator.skills.skill import Skill
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 
-def _unless(buff: str) -> Callable[[World, Cast], Refusal]:
+def _unless(buff: str) -> Callable[[World, Cast], ActionResult]:
     """Refuse a caster that bears the buff already."""
-    return lambda world, cast: Refusal.ERROR if buffs.has(world, cast.slot, buff) else Refusal.SUCCESS
+    return lambda world, cast: ActionResult.ERROR if buffs.has(world, cast.slot, buff) else ActionResult.SUCCESS
 
 
-def _with(buff: str) -> Callable[[World, Cast], Refusal]:
+def _with(buff: str) -> Callable[[World, Cast], ActionResult]:
     """Refuse a caster that does not bear the buff."""
-    return lambda world, cast: Refusal.SUCCESS if buffs.has(world, cast.slot, buff) else Refusal.ERROR
+    return lambda world, cast: ActionResult.SUCCESS if buffs.has(world, cast.slot, buff) else ActionResult.ERROR
 
 
 def _cloak(buff: str) -> Effect:

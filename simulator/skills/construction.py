@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, construction, prices, production, sites
+from simulator import commands, construction, payments, prices, production, sites
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.production import MORPHS
 from simulator.skills.skill import Skill
 
@@ -67,22 +67,22 @@ def _where(world: World, cast: Cast, unit: UnitType) -> Point:
     return sites.centre(world, unit, cast.point)
 
 
-def _can_place(world: World, cast: Cast) -> Refusal:
+def _can_place(world: World, cast: Cast) -> ActionResult:
     unit = sites.product(world, cast.ability)
     if unit is None:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     owner = int(world.owner[cast.slot])
     if cast.target != NOBODY:
         free = sites.is_free_geyser(world, cast.target)
-        return Refusal.SUCCESS if free else Refusal.CANT_BUILD_ON_THAT
+        return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_ON_THAT
     if cast.point is None:
-        return Refusal.CANT_FIND_PLACEMENT_LOCATION
+        return ActionResult.CANT_FIND_PLACEMENT_LOCATION
     return sites.refusal(world, owner, unit, cast.point)
 
 
-def _is_known(world: World, _: int, ability: Ability) -> Refusal:
+def _is_known(world: World, _: int, ability: Ability) -> ActionResult:
     known = bool(ability.loops) and sites.product(world, ability) is not None
-    return Refusal.SUCCESS if known else Refusal.NOT_SUPPORTED
+    return ActionResult.SUCCESS if known else ActionResult.NOT_SUPPORTED
 
 
 def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
@@ -91,7 +91,7 @@ def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Poi
     if unit is None or point is None:
         return []
     owner = int(world.owner[slots[0]])
-    paid = prices.charge(world, owner, prices.cost_of(ability))
+    paid = payments.charge(world, owner, prices.cost_of(ability))
     construction.begin(world, unit, owner, sites.centre(world, unit, point), loops=ability.loops, paid=paid)
     world.timers.setdefault(slots[0], {})[ability.timer] = world.loop + ability.cooldown_loops
     return slots[:1]
@@ -125,9 +125,9 @@ def _halt(world: World, slots: list[int], _: Ability, __: int, ___: Point | None
     return slots
 
 
-def _is_at_work(world: World, slot: int, _: Ability) -> Refusal:
+def _is_at_work(world: World, slot: int, _: Ability) -> ActionResult:
     busy = world.site[slot] != NOBODY or construction.builder_of(world, slot) != NOBODY
-    return Refusal.SUCCESS if busy else Refusal.CANT_FIND_CANCEL_ORDER
+    return ActionResult.SUCCESS if busy else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # calling off ----------------------------------------------------------------------------------------------------------
@@ -153,21 +153,21 @@ def _cancel_change(world: World, slot: int) -> None:
         construction.call_off(world, site)
 
 
-def _has_something(world: World, slot: int, ability: Ability) -> Refusal:
+def _has_something(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether there is anything of this kind to call off."""
     if world.build_progress[slot] < 1.0:
-        return Refusal.SUCCESS if ability.link in IN_PROGRESS else Refusal.CANT_FIND_CANCEL_ORDER
+        return ActionResult.SUCCESS if ability.link in IN_PROGRESS else ActionResult.CANT_FIND_CANCEL_ORDER
     if ability.link in IN_PROGRESS:
-        return Refusal.CANT_FIND_CANCEL_ORDER
+        return ActionResult.CANT_FIND_CANCEL_ORDER
     jobs = world.jobs.get(slot, [])
     if jobs:
         begun = world.catalog.ability(jobs[-1].ability)
         fits = jobs[-1].kind in MORPHS and begun.link in (ability.link, "")
-        return Refusal.SUCCESS if fits else Refusal.CANT_FIND_CANCEL_ORDER
+        return ActionResult.SUCCESS if fits else ActionResult.CANT_FIND_CANCEL_ORDER
     if world.casts[slot] and world.bound[slot]:
         begun = world.catalog.ability(int(world.order_ability[slot]))
-        return Refusal.SUCCESS if begun.link == ability.link else Refusal.CANT_FIND_CANCEL_ORDER
-    return Refusal.CANT_FIND_CANCEL_ORDER
+        return ActionResult.SUCCESS if begun.link == ability.link else ActionResult.CANT_FIND_CANCEL_ORDER
+    return ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 SMARTS: Final = (resume,)

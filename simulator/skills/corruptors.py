@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def _sprays(world: World, cast: Cast) -> bool:
     before, ticks = ((world.loop - cast.begun - ago) / period for ago in (1, 0))
     for tick in range(int(before) + 1, int(ticks) + 1):
         damage = number(cast, "damage_per_tick_first" if tick <= first else "damage_per_tick_after")
-        wound(world, slot, int(world.owner[slot]), target, damage)
+        apply_damage(world, slot, int(world.owner[slot]), target, damage)
     return True
 
 

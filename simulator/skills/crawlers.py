@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import sites
-from simulator.refusal import Refusal
-from simulator.skills import room, teleport
+from simulator import lifecycle, sites
+from simulator.action_result import ActionResult
+from simulator.skills import teleport
+from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill, place_of
 
 if TYPE_CHECKING:
@@ -16,15 +17,15 @@ if TYPE_CHECKING:
 
 def _root(world: World, cast: Cast) -> None:
     """Take root at a place on creep."""
-    if _room(world, cast) is not Refusal.SUCCESS:
+    if _room(world, cast) is not ActionResult.SUCCESS:
         return
     unit = world.catalog.unit(cast.ability.unit)
     teleport.to(world, cast.slot, sites.centre(world, unit, place_of(world, cast)))
-    world.become(cast.slot, unit)
-    room.make(world, cast.slot)
+    lifecycle.become(world, cast.slot, unit)
+    push_units_off(world, cast.slot)
 
 
-def _room(world: World, cast: Cast) -> Refusal:
+def _room(world: World, cast: Cast) -> ActionResult:
     unit = world.catalog.unit(cast.ability.unit)
     return sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
 

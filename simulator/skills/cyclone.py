@@ -10,17 +10,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field
-from simulator.skills import flight
+from simulator.damage import apply_damage
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, distance, number
 from simulator.stats import ATTRIBUTES
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
     from simulator.casts import Cast
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 LOCKED: Final = "LockOn"
@@ -37,8 +37,8 @@ def _lock(world: World, cast: Cast) -> None:
     world.timers.get(slot, {}).pop(ability.timer, None)
     x, y = world.pos[cast.target].tolist()
     lasts = number(cast, "ticks") * number(cast, "tick_period_loops")
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "lock_on",
             owner=int(world.owner[slot]),
             points=[(x, y)],
@@ -55,7 +55,7 @@ def _lock(world: World, cast: Cast) -> None:
     )
 
 
-def _track(world: World, lock: Field) -> None:
+def _track(world: World, lock: AreaEffect) -> None:
     """Follow the target and fire when it is time, or let go."""
     ability = world.catalog.ability(lock.ability)
     slot, target = world.slot_of(lock.source), world.slot_of(lock.target)
@@ -84,7 +84,7 @@ def _shoot(world: World, ability: Ability, slot: int, target: int) -> None:
     owner = int(world.owner[slot])
     weapon = next(w for w in world.unit_type(slot).weapons if w.id == ability.numbers["weapon"])
     if number(ability, "damage_per_tick", 0.0):
-        flight.launch_at(world, ability, slot, target, weapon.hits[0].missile_speed_n or 0.0)
+        projectiles.launch_at(world, ability, slot, target, weapon.hits[0].missile_speed_n or 0.0)
     else:
         world.pending.append(
             1,
@@ -102,31 +102,31 @@ def _shoot(world: World, ability: Ability, slot: int, target: int) -> None:
         world.cooldown[slot] = max(float(world.cooldown[slot]), number(ability, "shot_loops"))
 
 
-def _hit(world: World, missile: Field, target: int) -> None:
+def _hit(world: World, missile: AreaEffect, target: int) -> None:
     ability, owner = world.catalog.ability(missile.ability), missile.owner
     armored = world.stats.attribute_bits[world.type[target]] & 1 << ATTRIBUTES.index("armored")
     more = world.stats.changed(owner, "effect", TICK, UPGRADE_FIELD, 0.0) if armored else 0.0
     source = world.slot_of(missile.source)
-    wound(world, source, owner, target, number(ability, "damage_per_tick") + more)
+    apply_damage(world, source, owner, target, number(ability, "damage_per_tick") + more)
 
 
-def _release(world: World, lock: Field, ability: Ability) -> None:
+def _release(world: World, lock: AreaEffect, ability: Ability) -> None:
     """End a lock; the Cyclone fights as usual again, and the next lock has to wait."""
-    flight.end(world, lock)
+    projectiles.end(world, lock)
     slot, target = world.slot_of(lock.source), world.slot_of(lock.target)
     if slot != NOBODY:
         buffs.remove(world, slot, LOCKING)
         loops = number(ability, "cooldown_after_lock_ends_loops")
         world.timers.setdefault(slot, {})[ability.timer] = world.loop + loops
-    others = any(f.does == "lock_on" and f.target == lock.target and f is not lock for f in world.fields)
+    others = any(f.rule == "lock_on" and f.target == lock.target and f is not lock for f in world.area_effects)
     if target != NOBODY and not others:
         buffs.remove(world, target, LOCKED)
 
 
 def _call_off(world: World, cast: Cast) -> None:
     """Let go of the target; the next lock has to wait."""
-    for lock in world.fields:
-        if lock.does == "lock_on" and lock.source == world.tag_of(cast.slot):
+    for lock in world.area_effects:
+        if lock.rule == "lock_on" and lock.source == world.tag_of(cast.slot):
             _release(world, lock, world.catalog.ability(lock.ability))
 
 
@@ -140,6 +140,6 @@ SKILLS: Final = {
     ),
     "cancel_lock_on_cancel": Skill(_call_off),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"lock_on": _track}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"lock_on": _track}
 
-flight.ARRIVALS["lock_on"] = _hit
+projectiles.ARRIVALS["lock_on"] = _hit

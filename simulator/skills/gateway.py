@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
-from simulator.refusal import Refusal
+from simulator.damage import apply_damage
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap, number, place_of
 
@@ -58,10 +58,10 @@ def _stride(world: World, cast: Cast) -> None:
         buffs.apply(world, cast.slot, STRIDE_DELAY, source=cast.slot)
 
 
-def _cant_blink(world: World, cast: Cast) -> Refusal:
+def _cant_blink(world: World, cast: Cast) -> ActionResult:
     if buffs.has(world, cast.slot, "FungalGrowth"):
-        return Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
-    return Refusal.CANT_FIND_TELEPORT_LOCATION if _landing(world, cast) is None else Refusal.SUCCESS
+        return ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+    return ActionResult.CANT_FIND_TELEPORT_LOCATION if _landing(world, cast) is None else ActionResult.SUCCESS
 
 
 # Charge ---------------------------------------------------------------------------------------------------------------
@@ -84,14 +84,14 @@ def _charge(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.slot, CHARGING, source=cast.slot)
 
 
-def _cant_charge(world: World, cast: Cast) -> Refusal:
+def _cant_charge(world: World, cast: Cast) -> ActionResult:
     slot, target = cast.slot, cast.target
     if target == NOBODY or not commands.can_reach(world, slot, target):
-        return Refusal.CANT_TARGET_THAT_UNIT
+        return ActionResult.CANT_TARGET_THAT_UNIT
     away = gap(world, slot, target)
     if away >= number(cast, "max_range"):
-        return Refusal.TARGET_IS_OUT_OF_RANGE
-    return Refusal.TARGET_IS_TOO_CLOSE if away <= number(cast, "min_range") else Refusal.SUCCESS
+        return ActionResult.TARGET_IS_OUT_OF_RANGE
+    return ActionResult.TARGET_IS_TOO_CLOSE if away <= number(cast, "min_range") else ActionResult.SUCCESS
 
 
 def _strike_home(world: World, slots: list[int]) -> None:
@@ -109,7 +109,7 @@ def _strike_home(world: World, slots: list[int]) -> None:
 def _impact(world: World, slot: int) -> None:
     damage = number(world.catalog.ability(CHARGE), "damage")
     factor = float(world.dealt_factor[slot])
-    wound(world, slot, int(world.owner[slot]), int(world.target[slot]), damage * factor)
+    apply_damage(world, slot, int(world.owner[slot]), int(world.target[slot]), damage * factor)
 
 
 # Phase Shift ----------------------------------------------------------------------------------------------------------
@@ -120,14 +120,16 @@ def _phase_shift(world: World, cast: Cast) -> None:
     slot = cast.slot
     x, y = world.pos[slot].tolist()
     lasts = number(cast, "duration_loops")
-    shade = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
+    shade = lifecycle.spawn(
+        world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y)
+    )
     world.heading[shade] = world.heading[slot]
     world.life[shade], world.shields[shade] = world.life[slot], world.shields[slot]
     buffs.apply(world, slot, SHIFTING, source=slot)
     buffs.apply(world, shade, SHADE, source=slot)
     commands.move(world, [shade], place_of(world, cast))
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "phase_shift",
             int(world.owner[slot]),
             [(x, y)],
@@ -141,9 +143,9 @@ def _phase_shift(world: World, cast: Cast) -> None:
     )
 
 
-def _shift(world: World, field: Field) -> None:
+def _shift(world: World, field: AreaEffect) -> None:
     """Send the Adept to its shade when the time has come; let the shade go when the Adept is dead or has given up."""
-    adept, shade = source_slot(world, field), world.slot_of(field.target)
+    adept, shade = world.slot_of(field.source), world.slot_of(field.target)
     held = adept != NOBODY and buffs.has(world, adept, SHIFTING) and world.carrier[adept] == NOBODY
     if shade == NOBODY or not held:
         field.end = world.loop
@@ -170,9 +172,9 @@ def _arrive(world: World, adept: int, shade: int) -> None:
 def _cancel_shift(world: World, cast: Cast) -> None:
     """Give up the shift: told to the Adept or to its shade."""
     tag = world.tag_of(cast.slot)
-    for field in world.fields:
-        if field.does == "phase_shift" and tag in (field.source, field.target):
-            adept = source_slot(world, field)
+    for field in world.area_effects:
+        if field.rule == "phase_shift" and tag in (field.source, field.target):
+            adept = world.slot_of(field.source)
             if adept != NOBODY:
                 buffs.remove(world, adept, SHIFTING)
 
@@ -195,5 +197,5 @@ SKILLS: Final = {
     ),
     "cancel_phase_shift": Skill(_cancel_shift),
 }
-FIELDS: Final = {"phase_shift": _shift}
+AREA_EFFECTS: Final = {"phase_shift": _shift}
 PASSIVES: Final[dict[str, UnitRule]] = {"Zealot": _strike_home}

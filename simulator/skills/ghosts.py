@@ -6,20 +6,19 @@ from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import source_slot
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.skills import flight
-from simulator.skills.drops import dropping
+from simulator.skills import projectiles
+from simulator.skills.cancel import cancelling
 from simulator.skills.skill import Skill, around, distance, number
 from simulator.targets import disengage
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.skills.skill import BuffRule
     from simulator.world import World
 
@@ -52,7 +51,7 @@ def _hold_aim(world: World, cast: Cast) -> bool:
     psionic = "psionic" in world.unit_type(target).attributes
     amount = number(cast, "damage") + (number(cast, "bonus_psionic", 0.0) if psionic else 0.0)
     buffs.remove(world, slot, REFUNDABLE)
-    wound(world, slot, int(world.owner[slot]), target, amount)
+    apply_damage(world, slot, int(world.owner[slot]), target, amount)
     return False
 
 
@@ -69,14 +68,14 @@ def _lower_aim(world: World, cast: Cast) -> None:
 
 def _fire_emp(world: World, cast: Cast) -> None:
     """Send a round that takes shields and energy from all around its point, and uncovers who is cloaked."""
-    flight.launch(world, cast, MECHANICS.emp_speed_n)
+    projectiles.launch(world, cast, MECHANICS.emp_speed_n)
 
 
-def _burst(world: World, missile: Field, _: int) -> None:
+def _burst(world: World, missile: AreaEffect, _: int) -> None:
     """Take shields and energy from everybody around, friends as well, and uncover who is cloaked."""
-    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):
-        wound(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
+        apply_damage(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
         world.energy[slot] = max(float(world.energy[slot]) - number(ability, "energy_removed"), 0.0)
         if not world.burrowed[slot]:
             loops = number(ability, "decloak_loops")
@@ -111,11 +110,11 @@ SKILLS: Final = {
         end=_lower_aim,
         estimates=("The distance at which a snipe's target has got away is measured from centre to centre.",),
     ),
-    "cancel_channel_snipe": dropping("channel_snipe"),
+    "cancel_channel_snipe": cancelling("channel_snipe"),
     "emp": Skill(_fire_emp, estimates=("The EMP round's speed.",)),
     "ghost_hold_fire": Skill(_hold_fire),
     "ghost_weapons_free": Skill(_free_weapons),
 }
 TICKS: Final[dict[str, BuffRule]] = {"GhostHoldFireB": _fire_when_told}
 
-flight.ARRIVALS["emp"] = _burst
+projectiles.ARRIVALS["emp"] = _burst

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands, harvesting
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -27,20 +27,20 @@ def _return(world: World, slots: list[int], _: Ability, __: int, ___: Point | No
     return commands.return_cargo(world, slots, queue=queue)
 
 
-def _can_gather(world: World, cast: Cast) -> Refusal:
+def _can_gather(world: World, cast: Cast) -> ActionResult:
     if cast.target == NOBODY or not world.unit_type(cast.target).resource:
-        return Refusal.MUST_TARGET_RESOURCES
+        return ActionResult.MUST_TARGET_RESOURCES
     if harvesting.can_harvest(world, cast.slot, cast.target):
-        return Refusal.SUCCESS
+        return ActionResult.SUCCESS
     bare = world.owner[cast.target] == 0
-    return Refusal.MUST_BUILD_REFINERY_FIRST if bare else Refusal.CANT_HARVEST_THAT_RESOURCE
+    return ActionResult.MUST_BUILD_REFINERY_FIRST if bare else ActionResult.CANT_HARVEST_THAT_RESOURCE
 
 
-def _can_return(world: World, cast: Cast) -> Refusal:
+def _can_return(world: World, cast: Cast) -> ActionResult:
     if not world.load[cast.slot]:
-        return Refusal.ERROR
+        return ActionResult.ERROR
     found = harvesting.nearest_hall(world, cast.slot) != NOBODY
-    return Refusal.SUCCESS if found else Refusal.CANT_FIND_DROP_OFF
+    return ActionResult.SUCCESS if found else ActionResult.CANT_FIND_DROP_OFF
 
 
 def _let_out(world: World, slot: int) -> None:

@@ -9,20 +9,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, lifecycle, pathing
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
 from simulator.skills.basics import on_self
 from simulator.skills.skill import Skill, around, lay, number, place_of
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from simulator.casts import Cast
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 # stimpack -------------------------------------------------------------------------------------------------------------
@@ -69,24 +69,24 @@ def _throw_charge(world: World, cast: Cast) -> None:
     """Lay a charge that goes off after its fuse, hurts all on the ground around it and throws them outwards."""
     point, fuse = place_of(world, cast), number(cast, "fuse_loops")
     owner = int(world.owner[cast.slot])
-    charge = world.spawn(world.catalog.unit("KD8Charge"), owner, point)
+    charge = lifecycle.spawn(world, world.catalog.unit("KD8Charge"), owner, point)
     lay(world, cast, "kd8_charge", end=world.loop + fuse, due=world.loop + fuse).target = world.tag_of(charge)
 
 
-def _explode(world: World, charge: Field) -> None:
+def _explode(world: World, charge: AreaEffect) -> None:
     """Hurt everybody on the ground around a charge, friends as well, and throw them outwards."""
-    ability, source = world.catalog.ability(charge.ability), source_slot(world, charge)
+    ability, source = world.catalog.ability(charge.ability), world.slot_of(charge.source)
     body = world.slot_of(charge.target)
     for slot in around(world, charge.at, charge.radius, plane="ground"):
         if world.unit_type(slot).name not in UNTOUCHED:
-            wound(world, source, charge.owner, slot, number(ability, "damage"))
+            apply_damage(world, source, charge.owner, slot, number(ability, "damage"))
             _throw(world, charge, slot)
     if body != NOBODY:
         world.life[body] = 0.0
         world.attacker[body] = NOBODY
 
 
-def _throw(world: World, charge: Field, slot: int) -> None:
+def _throw(world: World, charge: AreaEffect, slot: int) -> None:
     unit = world.unit_type(slot)
     firm = unit.structure or "massive" in unit.attributes or bool(world.burrowed[slot]) or unit.name in STAYS_PUT
     if firm or world.life[slot] <= 0.0 or buffs.has(world, slot, "Frenzy"):
@@ -98,8 +98,8 @@ def _throw(world: World, charge: Field, slot: int) -> None:
     away = math.hypot(x - from_x, y - from_y)
     across, along = ((x - from_x) / away, (y - from_y) / away) if away > 0.0 else (1.0, 0.0)
     step = number(ability, "knockback_distance") / loops
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "knockback",
             owner=charge.owner,
             points=[(x, y)],
@@ -113,7 +113,7 @@ def _throw(world: World, charge: Field, slot: int) -> None:
     )
 
 
-def _fly_back(world: World, item: Field) -> None:
+def _fly_back(world: World, item: AreaEffect) -> None:
     """Carry a thrown unit on, until something is in its way that it can't walk on."""
     slot = world.slot_of(item.target)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
@@ -121,14 +121,14 @@ def _fly_back(world: World, item: Field) -> None:
         return
     x, y = world.pos[slot].tolist()
     goal = x + item.memory["dx"], y + item.memory["dy"]
-    surface = world.ground.surface(Layer(int(world.layer[slot])))
+    surface = pathing.surface(world.ground, Layer(int(world.layer[slot])))
     there = world.pos[slot] * 0.0 + goal
     if not surface.flat[surface.cell(there[None])][0]:
         item.end = world.loop
         return
     world.pos[slot] = world.guard[slot] = there
     world.nav_loop[slot] = 0
-    world.settled = -1
+    world.resting_version = -1
 
 
 SKILLS: Final = {
@@ -142,5 +142,5 @@ SKILLS: Final = {
         ),
     ),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"kd8_charge": _explode, "knockback": _fly_back}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"kd8_charge": _explode, "knockback": _fly_back}
 IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {"PunisherGrenadesU": _slow}

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
 from simulator.orders import OrderKind
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
+from simulator.skills.projectiles import SPEED_UNKNOWN, throw
 from simulator.skills.skill import Skill, around, foes, gap, lay, number
-from simulator.skills.throws import SPEED_UNKNOWN, throw
 from simulator.targets import disengage
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def _fungal(world: World, cast: Cast) -> None:
     throw(world, cast, "fungal_growth", radius=number(cast, "radius"))
 
 
-def _grows_over(world: World, item: Field) -> None:
-    source = source_slot(world, item)
+def _grows_over(world: World, item: AreaEffect) -> None:
+    source = world.slot_of(item.source)
     for slot in foes(world, around(world, item.at, item.radius, structures=False), item.owner):
         for name in ("FungalGrowth", "FungalGrowthSlowMovement"):
             buffs.apply(world, slot, name, source=source, owner=item.owner)
@@ -49,7 +49,7 @@ def _grows_over(world: World, item: Field) -> None:
 
 def _fungal_tick(world: World, slot: int, row: np.void) -> None:
     damage = number(world.catalog.ability(FUNGAL_GROWTH), "damage_per_tick")
-    wound(world, int(row["source"]), int(row["owner"]), slot, damage)
+    apply_damage(world, int(row["source"]), int(row["owner"]), slot, damage)
 
 
 # Neural Parasite ------------------------------------------------------------------------------------------------------
@@ -60,14 +60,14 @@ def _reach_out(world: World, cast: Cast) -> None:
     throw(world, cast, "neural_parasite")
 
 
-def _can_reach(world: World, cast: Cast) -> Refusal:
+def _can_reach(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     free = not (buffs.frenzied(world, target) or buffs.has(world, target, NEURAL) or world.passengers(target))
-    return Refusal.SUCCESS if free else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if free else ActionResult.CANT_TARGET_THAT_UNIT
 
 
-def _arrives(world: World, item: Field) -> None:
-    slot, target = source_slot(world, item), world.slot_of(item.target)
+def _arrives(world: World, item: AreaEffect) -> None:
+    slot, target = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (slot, target) or not world.channels[slot] or world.order_target[slot] != target:
         return
     kind, was = world.catalog.buff(NEURAL), int(world.owner[target])
@@ -83,7 +83,7 @@ def _controls(world: World, cast: Cast) -> bool:
     if world.order_target[slot] != target:
         return False
     tag = world.tag_of(slot)
-    if any(item.does == "neural_parasite" and item.source == tag for item in world.fields):
+    if any(item.rule == "neural_parasite" and item.source == tag for item in world.area_effects):
         return True
     return _holder(world, target) == slot and gap(world, slot, target) <= number(cast, "leash_range")
 
@@ -109,7 +109,7 @@ def _time_is_up(world: World, slot: int, row: np.void) -> None:
 
 def _hand_over(world: World, slot: int, owner: int) -> None:
     """Give a unit to a player: it forgets its orders, and its new friends leave it alone."""
-    world.give(slot, owner)
+    lifecycle.give(world, slot, owner)
     world.queue[slot] = []
     commands.begin(world, slot, None)
     for other in world.units_of(owner).tolist():
@@ -125,10 +125,10 @@ def _break_off(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _is_holding(world: World, slot: int, _: Ability) -> Refusal:
+def _is_holding(world: World, slot: int, _: Ability) -> ActionResult:
     held = world.channelling.get(slot)
-    holding = held is not None and held.ability.does == "neural_parasite"
-    return Refusal.SUCCESS if holding else Refusal.CANT_FIND_CANCEL_ORDER
+    holding = held is not None and held.ability.effect == "neural_parasite"
+    return ActionResult.SUCCESS if holding else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # Infested Terrans -----------------------------------------------------------------------------------------------------
@@ -139,23 +139,23 @@ def _infested_terrans(world: World, cast: Cast) -> None:
     throw(world, cast, "infested_terran_egg")
 
 
-def _egg_lands(world: World, item: Field) -> None:
+def _egg_lands(world: World, item: AreaEffect) -> None:
     ability = world.catalog.ability(item.ability)
     egg = world.catalog.unit(str(ability.numbers["egg"]))
     (place,) = free_places(world, egg, item.at, 1)
-    slot = world.spawn(egg, item.owner, place)
+    slot = lifecycle.spawn(world, egg, item.owner, place)
     hatch = next(a for a in world.catalog.abilities_of(egg.row) if a.unit == "InfestorTerran")
     due = world.loop + hatch.loops
-    world.fields.append(
-        Field("infested_terran", item.owner, [place], 0.0, world.loop, due, due=due, ability=item.ability,
+    world.area_effects.append(
+        AreaEffect("infested_terran", item.owner, [place], 0.0, world.loop, due, due=due, ability=item.ability,
               target=world.tag_of(slot))
     )  # fmt: skip
 
 
-def _hatches(world: World, item: Field) -> None:
+def _hatches(world: World, item: AreaEffect) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY:
-        world.become(slot, world.catalog.unit("InfestorTerran"))
+        lifecycle.become(world, slot, world.catalog.unit("InfestorTerran"))
         world.life[slot] = world.life_max[slot]
         teleport.live_until(world, slot, world.loop + number(world.catalog.ability(item.ability), "life_loops"))
 
@@ -169,10 +169,10 @@ def _shroud(world: World, cast: Cast) -> None:
     lay(world, cast, "microbial_shroud", end=end, due=world.loop, period=period)
 
 
-def _shrouds(world: World, item: Field) -> None:
+def _shrouds(world: World, item: AreaEffect) -> None:
     for slot in around(world, item.at, item.radius, plane="ground", structures=False):
         if world.owner[slot]:
-            buffs.apply(world, slot, SHROUD, source=source_slot(world, item), owner=item.owner)
+            buffs.apply(world, slot, SHROUD, source=world.slot_of(item.source), owner=item.owner)
 
 
 SKILLS: Final = {
@@ -188,7 +188,7 @@ SKILLS: Final = {
     "infested_terrans": Skill(_infested_terrans, estimates=(SPEED_UNKNOWN, "An infested terran lives for 480 loops.")),
     "amorphous_armorcloud": Skill(_shroud),
 }
-FIELDS: Final = {
+AREA_EFFECTS: Final = {
     "fungal_growth": _grows_over,
     "neural_parasite": _arrives,
     "infested_terran_egg": _egg_lands,

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import sites
+from simulator import lifecycle, sites
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
-from simulator.skills import addons, room, teleport
+from simulator.skills import addons, teleport
+from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -27,29 +28,29 @@ def _lift(world: World, cast: Cast) -> None:
     """Take off and leave the add-on behind."""
     slot = cast.slot
     detach(world, slot)
-    world.become(slot, world.catalog.unit(cast.ability.unit))
+    lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
 
 
-def _can_lift(world: World, cast: Cast) -> Refusal:
+def _can_lift(world: World, cast: Cast) -> ActionResult:
     """Refuse a structure that is at work or has an add-on in the making."""
-    return Refusal.CANT_QUEUE_THAT_ORDER if cast.slot in world.jobs else Refusal.SUCCESS
+    return ActionResult.CANT_QUEUE_THAT_ORDER if cast.slot in world.jobs else ActionResult.SUCCESS
 
 
-def _can_land(world: World, cast: Cast) -> Refusal:
+def _can_land(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_LAND_LOCATION_INVALID
+        return ActionResult.CANT_LAND_LOCATION_INVALID
     why = sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
-    return Refusal.SUCCESS if why is Refusal.SUCCESS else Refusal.CANT_LAND_LOCATION_INVALID
+    return ActionResult.SUCCESS if why is ActionResult.SUCCESS else ActionResult.CANT_LAND_LOCATION_INVALID
 
 
 def _settle(world: World, cast: Cast) -> None:
     """Come down, unless something has come under it by now, and take up an add-on that stands at the right place."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
-    if cast.point is None or _can_land(world, cast) is not Refusal.SUCCESS:
+    if cast.point is None or _can_land(world, cast) is not ActionResult.SUCCESS:
         return
     teleport.to(world, slot, sites.centre(world, unit, cast.point))
-    world.become(slot, unit)
-    room.make(world, slot)
+    lifecycle.become(world, slot, unit)
+    push_units_off(world, slot)
     attach(world, slot)
 
 
@@ -61,7 +62,7 @@ def detach(world: World, slot: int) -> None:
     addon = int(world.addon[slot])
     world.addon[slot] = NOBODY
     if addon != NOBODY:
-        world.become(addon, _plain(world, addon))
+        lifecycle.become(world, addon, _plain(world, addon))
 
 
 def attach(world: World, slot: int) -> None:
@@ -72,7 +73,7 @@ def attach(world: World, slot: int) -> None:
         own = world.catalog.row_of_name.get(world.unit_type(slot).name + unit.name)
         if unit.name in KINDS and own is not None and _is_at(world, other, goal):
             world.addon[slot] = other
-            world.become(other, world.catalog.units[own])
+            lifecycle.become(world, other, world.catalog.units[own])
             return
 
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs
+from simulator import buffs, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.mechanics import MECHANICS
 from simulator.orders import OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, distance, number
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def hatch(world: World, hall: int, count: int = 1) -> None:
     x, y = world.pos[hall].tolist()
     for index in range(there, min(there + count, MECHANICS.larva_limit)):
         dx, dy = RING[index % len(RING)]
-        larva = world.spawn(world.catalog.units[_larva(world)], int(world.owner[hall]), (x + dx, y + dy))
+        larva = lifecycle.spawn(world, world.catalog.units[_larva(world)], int(world.owner[hall]), (x + dx, y + dy))
         world.home[larva] = hall
 
 
@@ -100,9 +100,9 @@ def _inject(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, WAITING if buffs.has(world, cast.target, INJECTED) else INJECTED, source=cast.slot)
 
 
-def _is_hall(world: World, cast: Cast) -> Refusal:
+def _is_hall(world: World, cast: Cast) -> ActionResult:
     fits = world.unit_type(cast.target).name in HALLS and not buffs.has(world, cast.target, CONTAMINATED)
-    return Refusal.SUCCESS if fits else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if fits else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _injection_is_over(world: World, slot: int, row: np.void) -> None:
@@ -110,8 +110,8 @@ def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     world.alert(int(world.owner[slot]), "LarvaHatched")
     numbers = world.catalog.ability(INJECT)
     count, gap = int(number(numbers, "larva")), MECHANICS.injected_larva_loops
-    world.fields.append(
-        Field("injected_larvae", int(row["owner"]), [(0.0, 0.0)], 0.0, world.loop, world.loop + count * gap,
+    world.area_effects.append(
+        AreaEffect("injected_larvae", int(row["owner"]), [(0.0, 0.0)], 0.0, world.loop, world.loop + count * gap,
               due=world.loop + gap, period=gap, target=world.tag_of(slot))
     )  # fmt: skip
     at = world.buffs.find(slot, world.catalog.buff(WAITING).row)
@@ -123,7 +123,7 @@ def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     buffs.apply(world, slot, INJECTED, owner=int(row["owner"]))
 
 
-def _one_hatches(world: World, item: Field) -> None:
+def _one_hatches(world: World, item: AreaEffect) -> None:
     hall = world.slot_of(item.target)
     if hall >= 0:
         hatch(world, hall)
@@ -163,6 +163,6 @@ def _step(world: World, slot: int, x: float, y: float) -> None:
 SKILLS: Final = {
     "spawn_larva": Skill(_inject, refuse=_is_hall, estimates=("How larvae wander.",)),
 }
-FIELDS: Final = {"injected_larvae": _one_hatches}
+AREA_EFFECTS: Final = {"injected_larvae": _one_hatches}
 ENDS: Final = {INJECTED: _injection_is_over}
 PASSIVES: Final = {**dict.fromkeys(HALLS, _hatch_by_nature), "Larva": _wander}

@@ -10,16 +10,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands
-from simulator.buffs import FOREVER
+from simulator.active_buffs import FOREVER
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.orders import Order, OrderKind
-from simulator.skills import flight
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, distance, number
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 SETTING_UP: Final = 8  # the API's LiberatorTargetMorphDelayPersistent
@@ -33,7 +33,7 @@ def _lay_out(world: World, cast: Cast) -> None:
     slot, point = cast.slot, cast.point
     assert point is not None
     _leave(world, slot)
-    zone = Field(
+    zone = AreaEffect(
         "liberator_zone",
         owner=int(world.owner[slot]),
         points=[point],
@@ -47,16 +47,16 @@ def _lay_out(world: World, cast: Cast) -> None:
         sights=number(cast, "reveal_radius"),
         memory={"works": world.loop + number(cast, "setup_loops")},
     )
-    world.fields.append(zone)
+    world.area_effects.append(zone)
     world.zone[slot], world.zone_radius[slot] = point, zone.radius
     _morph(world, slot, TO_GROUND)
 
 
-def _guard(world: World, zone: Field) -> None:
+def _guard(world: World, zone: AreaEffect) -> None:
     """Let the zone work when it is set up, and end it when its ship is gone, or too far away."""
     slot = world.slot_of(zone.source)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
-        flight.end(world, zone)
+        projectiles.end(world, zone)
         return
     leash = number(world.catalog.ability(zone.ability), "leash_range") + _more_range(world, zone)
     if distance(world, slot, zone.at) > leash:
@@ -68,7 +68,7 @@ def _guard(world: World, zone: Field) -> None:
         zone.effect = WORKING
 
 
-def _more_range(world: World, zone: Field) -> float:
+def _more_range(world: World, zone: AreaEffect) -> float:
     """What upgrades add to how far from the ship a zone may lie; the leash grows with it."""
     ability = world.catalog.ability(zone.ability)
     return world.stats.ability(zone.owner, ability).range - ability.range
@@ -82,16 +82,16 @@ def _take_off(world: World, cast: Cast) -> None:
 
 def _leave(world: World, slot: int) -> None:
     world.zone_radius[slot] = 0.0
-    for zone in world.fields:
-        if zone.does == "liberator_zone" and zone.source == world.tag_of(slot):
-            flight.end(world, zone)
+    for zone in world.area_effects:
+        if zone.rule == "liberator_zone" and zone.source == world.tag_of(slot):
+            projectiles.end(world, zone)
             zone.effect = 0
 
 
 def _morph(world: World, slot: int, link: str) -> None:
     """Make the morph with this link the unit's current order; what waits behind stays."""
     waiting = world.queue[slot]
-    ability = next(a for a in world.catalog.abilities if a.link == link and a.does == "morph")
+    ability = next(a for a in world.catalog.abilities if a.link == link and a.effect == "morph")
     commands.begin(world, slot, Order(OrderKind.CAST, ability.id))
     world.queue[slot] = waiting
 
@@ -103,4 +103,4 @@ SKILLS: Final = {
     ),
     "liberator_aa_target": Skill(_take_off),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"liberator_zone": _guard}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"liberator_zone": _guard}

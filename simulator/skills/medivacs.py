@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills.basics import on_self
 from simulator.skills.skill import Skill, gap, nearest_hurt, number
 from simulator.stats import ATTRIBUTES
@@ -24,20 +24,20 @@ DONE: Final = 1e-9
 BIOLOGICAL: Final = 1 << ATTRIBUTES.index("biological")
 
 
-def _can_heal(world: World, cast: Cast) -> Refusal:
+def _can_heal(world: World, cast: Cast) -> ActionResult:
     """Refuse who needs no healing or has somebody who heals him, and Medivacs without energy."""
     slot, target = cast.slot, cast.target
     if target == NOBODY:
-        return Refusal.MUST_TARGET_UNIT
+        return ActionResult.MUST_TARGET_UNIT
     if world.life[target] >= world.life_max[target] - DONE or _is_healed(world, cast):
-        return Refusal.REQUIRES_HEAL_TARGET
-    return Refusal.SUCCESS if world.energy[slot] > 0.0 else Refusal.NOT_ENOUGH_ENERGY
+        return ActionResult.REQUIRES_HEAL_TARGET
+    return ActionResult.SUCCESS if world.energy[slot] > 0.0 else ActionResult.NOT_ENOUGH_ENERGY
 
 
 def _is_healed(world: World, cast: Cast) -> bool:
     """Whether another Medivac heals the target now."""
     return any(
-        other.target == cast.target and other.ability.does == cast.ability.does and slot != cast.slot
+        other.target == cast.target and other.ability.effect == cast.ability.effect and slot != cast.slot
         for slot, other in world.channelling.items()
     )
 
@@ -69,7 +69,9 @@ def resume(world: World, slot: int) -> None:
 def _pick(world: World, slot: int, ability: Ability) -> int:
     """The nearest friend who needs healing and whom nobody heals."""
     hurt = nearest_hurt(world, slot, ability.autocast_range, BIOLOGICAL)
-    return next((other for other in hurt if _can_heal(world, Cast(slot, ability, other)) is Refusal.SUCCESS), NOBODY)
+    return next(
+        (other for other in hurt if _can_heal(world, Cast(slot, ability, other)) is ActionResult.SUCCESS), NOBODY
+    )
 
 
 def _begin(world: World, cast: Cast) -> None:

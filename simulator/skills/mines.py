@@ -8,18 +8,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import source_slot
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
-from simulator.skills import flight
+from simulator.skills import projectiles
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast, Point
-    from simulator.fields import Field
     from simulator.skills.skill import SmartRule, UnitRule
     from simulator.world import World
 
@@ -32,28 +31,30 @@ TIMER: Final = "WidowMineAttack"
 CLAWS: Final = "DrillClaws"
 
 
-def _no_larva(world: World, cast: Cast) -> Refusal:
+def _no_larva(world: World, cast: Cast) -> ActionResult:
     if world.unit_type(cast.slot).name != BURROWED:
-        return Refusal.TECH_REQUIREMENTS_NOT_MET
+        return ActionResult.TECH_REQUIREMENTS_NOT_MET
     larva = cast.target != NOBODY and world.unit_type(cast.target).name == "Larva"
-    return Refusal.CANT_TARGET_THAT_UNIT if larva else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if larva else ActionResult.SUCCESS
 
 
 def _fire(world: World, cast: Cast) -> None:
     """Send a missile that hurts its target much and all around it, friends as well, a little."""
-    flight.launch(world, cast, MECHANICS.mine_missile_speed_n)
+    projectiles.launch(world, cast, MECHANICS.mine_missile_speed_n)
 
 
-def _explode(world: World, missile: Field, target: int) -> None:
+def _explode(world: World, missile: AreaEffect, target: int) -> None:
     """Hurt the target, and whoever is around it, friends as well, but no structure and no mine of the owner's."""
-    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     owner = missile.owner
-    wound(world, source, owner, target, number(ability, "damage"), shield_bonus=number(ability, "bonus_vs_shields"))
+    apply_damage(
+        world, source, owner, target, number(ability, "damage"), shield_bonus=number(ability, "bonus_vs_shields")
+    )
     amount, more = number(ability, "splash_damage"), number(ability, "splash_bonus_vs_shields")
     for slot in around(world, missile.at, number(ability, "splash_radius"), structures=False):
         own_mine = world.owner[slot] == owner and world.unit_type(slot).name in MINES
         if slot != target and not own_mine:
-            wound(world, source, owner, slot, amount, kind="splash", shield_bonus=more)
+            apply_damage(world, source, owner, slot, amount, kind="splash", shield_bonus=more)
 
 
 def _keep_watch(world: World, slots: list[int]) -> None:
@@ -98,4 +99,4 @@ SKILLS: Final = {
 }
 PASSIVES: Final[dict[str, UnitRule]] = {BURROWED: _keep_watch, "WidowMine": _climb_out}
 
-flight.ARRIVALS["widow_mine_attack"] = _explode
+projectiles.ARRIVALS["widow_mine_attack"] = _explode

@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.fields import Field, source_slot
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, friends, lay, number, place_of
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from simulator.abilities import Ability
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
     from simulator.skills.skill import BuffRule, UnitRule
     from simulator.world import World
@@ -61,9 +61,9 @@ def _recall(world: World, cast: Cast) -> None:
     lay(world, cast, "recall", end=world.loop + lasts, due=world.loop + 1).points.append((x, y))
 
 
-def _bring(world: World, field: Field) -> None:
+def _bring(world: World, field: AreaEffect) -> None:
     """Take the marked units along at the end; without the caster they stay and are free."""
-    caster = source_slot(world, field)
+    caster = world.slot_of(field.source)
     lost = caster == NOBODY or buffs.has(world, caster, SCRAMBLED)
     if not lost and world.loop < field.end:
         return
@@ -75,15 +75,15 @@ def _bring(world: World, field: Field) -> None:
     field.end = world.loop
 
 
-def _marked(world: World, name: str, field: Field) -> list[int]:
+def _marked(world: World, name: str, field: AreaEffect) -> list[int]:
     rows = world.buffs.rows
     mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == field.begun)
-    mine &= (rows["source"] == source_slot(world, field)) | (rows["source"] == NOBODY)
+    mine &= (rows["source"] == world.slot_of(field.source)) | (rows["source"] == NOBODY)
     slots: list[int] = rows["slot"][mine].tolist()
     return slots
 
 
-def _arrive(world: World, slot: int, field: Field) -> None:
+def _arrive(world: World, slot: int, field: AreaEffect) -> None:
     """Stand as far from the destination as it stood from the middle of the recall, or as near to there as it fits."""
     (from_x, from_y), (to_x, to_y) = field.points
     x, y = world.pos[slot].tolist()
@@ -95,8 +95,8 @@ def _arrive(world: World, slot: int, field: Field) -> None:
     buffs.apply(world, slot, RECALLED)
 
 
-def _nobody_to_recall(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if _taken(world, cast) else Refusal.CANT_TARGET_THAT_UNIT
+def _nobody_to_recall(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if _taken(world, cast) else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # Time Warp ------------------------------------------------------------------------------------------------------------
@@ -108,11 +108,11 @@ def _time_warp(world: World, cast: Cast) -> None:
     lay(world, cast, "time_warp", end=grown + number(cast, "duration_loops"), due=grown, effect=GROWING_EFFECT)
 
 
-def _slow(world: World, field: Field) -> None:
+def _slow(world: World, field: AreaEffect) -> None:
     field.effect = WARP_EFFECT
     plane = str(world.catalog.ability(field.ability).numbers["plane"])
     for slot in foes(world, around(world, field.at, field.radius, plane=plane), field.owner):
-        buffs.apply(world, slot, WARPED, source=source_slot(world, field), owner=field.owner)
+        buffs.apply(world, slot, WARPED, source=world.slot_of(field.source), owner=field.owner)
 
 
 # the cloaking field ---------------------------------------------------------------------------------------------------
@@ -151,15 +151,15 @@ def _chrono_boost(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, str(cast.ability.numbers["buff"]), source=cast.slot)
 
 
-def _cant_boost(world: World, cast: Cast) -> Refusal:
+def _cant_boost(world: World, cast: Cast) -> ActionResult:
     if world.build_progress[cast.target] < 1.0:
-        return Refusal.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
+        return ActionResult.CANT_TARGET_UNDER_CONSTRUCTION_UNITS
     card = world.catalog.abilities_of(int(world.type[cast.target]))
-    return Refusal.SUCCESS if any(map(_makes_something, card)) else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if any(map(_makes_something, card)) else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _makes_something(ability: Ability) -> bool:
-    return ability.does in ("train", "research", "warp_in") or bool(ability.upgrade)
+    return ability.effect in ("train", "research", "warp_in") or bool(ability.upgrade)
 
 
 SKILLS: Final = {
@@ -175,6 +175,6 @@ SKILLS: Final = {
     "mothership_cloak": Skill(_cloak),
     "chrono_boost": Skill(_chrono_boost, refuse=_cant_boost),
 }
-FIELDS: Final = {"recall": _bring, "time_warp": _slow}
+AREA_EFFECTS: Final = {"recall": _bring, "time_warp": _slow}
 TICKS: Final[dict[str, BuffRule]] = {CLOAK_FIELD: _cloak_around}
 PASSIVES: Final[dict[str, UnitRule]] = {"Mothership": _always_cloaks}

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from simulator.area_effects import AreaEffect
 from simulator.casts import Cast
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
-from simulator.skills.drops import dropping
+from simulator.damage import apply_damage
+from simulator.skills.cancel import cancelling
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 PAINTED: Final = 7  # the API's NukePersistent
@@ -32,7 +32,7 @@ def _call(world: World, cast: Cast) -> None:
     if armed.size:
         world.remove(int(armed[0]))
     down = world.loop + number(cast, "delay_loops")
-    strike = Field(
+    strike = AreaEffect(
         "nuke",
         owner=owner,
         points=[point],
@@ -45,7 +45,7 @@ def _call(world: World, cast: Cast) -> None:
         source=world.tag_of(cast.slot),
         memory={"down": down},
     )
-    world.fields.append(strike)
+    world.area_effects.append(strike)
     for player in world.players[1:]:
         if player.id != owner:
             world.alert(player.id, "NuclearLaunchDetected")
@@ -55,10 +55,10 @@ def _paint(world: World, cast: Cast) -> bool:
     return bool(world.can_cast[cast.slot]) and world.loop < cast.begun + number(cast, "delay_loops")
 
 
-def _fall(world: World, strike: Field) -> None:
+def _fall(world: World, strike: AreaEffect) -> None:
     """Wait for the missile while the Ghost paints, then for the explosion."""
     if world.loop < strike.memory["down"]:
-        painter = world.channelling.get(source_slot(world, strike))
+        painter = world.channelling.get(world.slot_of(strike.source))
         if not (isinstance(painter, Cast) and painter.ability.id == strike.ability and painter.begun == strike.begun):
             strike.end = world.loop
     elif world.loop == strike.memory["down"]:
@@ -67,17 +67,17 @@ def _fall(world: World, strike: Field) -> None:
         _detonate(world, strike)
 
 
-def _detonate(world: World, strike: Field) -> None:
+def _detonate(world: World, strike: AreaEffect) -> None:
     """Hurt everything around by the ring it is in, friend and foe, on the ground and in the air."""
-    ability, source = world.catalog.ability(strike.ability), source_slot(world, strike)
+    ability, source = world.catalog.ability(strike.ability), world.slot_of(strike.source)
     struck: set[int] = set()
     for ring in ability.numbers["area"]:
         for slot in around(world, strike.at, ring["radius"]):
             if slot not in struck:
                 struck.add(slot)
                 extra = number(ability, "bonus_structure") if world.unit_type(slot).structure else 0.0
-                wound(world, source, strike.owner, slot, (number(ability, "damage") + extra) * ring["fraction"])
-    afterglow = Field(
+                apply_damage(world, source, strike.owner, slot, (number(ability, "damage") + extra) * ring["fraction"])
+    afterglow = AreaEffect(
         "afterglow",
         owner=strike.owner,
         points=[strike.at],
@@ -87,8 +87,8 @@ def _detonate(world: World, strike: Field) -> None:
         due=world.loop + number(ability, "afterglow_loops"),
         sights=strike.radius,
     )
-    world.fields.append(afterglow)
+    world.area_effects.append(afterglow)
 
 
-SKILLS: Final = {"tac_nuke_strike": Skill(_call, hold=_paint), "cancel_tac_nuke_strike": dropping("tac_nuke_strike")}
-FIELDS: Final[dict[str, FieldRule]] = {"nuke": _fall}
+SKILLS: Final = {"tac_nuke_strike": Skill(_call, hold=_paint), "cancel_tac_nuke_strike": cancelling("tac_nuke_strike")}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"nuke": _fall}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number, place_of
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from simulator.casts import Cast
-    from simulator.skills.skill import BuffRule, FieldRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule
     from simulator.world import World
 
 SWEEP: Final = 6  # the API's ScannerSweep
@@ -29,8 +29,8 @@ SWEEP: Final = 6  # the API's ScannerSweep
 def _sweep(world: World, cast: Cast) -> None:
     """See everything in a circle anywhere on the map for a while, what is cloaked or burrowed as well."""
     lasts, radius = number(cast, "duration_loops"), number(cast, "radius")
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "scanner_sweep",
             owner=int(world.owner[cast.slot]),
             points=[place_of(world, cast)],
@@ -52,21 +52,21 @@ def _sweep(world: World, cast: Cast) -> None:
 SEEN: Final = 2
 
 
-def _can_call(world: World, cast: Cast) -> Refusal:
+def _can_call(world: World, cast: Cast) -> ActionResult:
     """Refuse units that hold no minerals, and places that the player does not see now."""
     target = cast.target
     if target != NOBODY and world.unit_type(target).resource != "minerals":
-        return Refusal.MUST_TARGET_RESOURCES
+        return ActionResult.MUST_TARGET_RESOURCES
     x, y = place_of(world, cast)
     seen = not world.fog or world.visibility[int(world.owner[cast.slot]), int(y), int(x)] == SEEN
-    return Refusal.SUCCESS if seen else Refusal.MUST_TARGET_VISIBLE_LOCATION
+    return ActionResult.SUCCESS if seen else ActionResult.MUST_TARGET_VISIBLE_LOCATION
 
 
 def _call_mule(world: World, cast: Cast) -> None:
     """Have a MULE come down, which mines for the time it lives."""
     falls = number(cast, "delay_loops")
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "calldown_mule",
             owner=int(world.owner[cast.slot]),
             points=[place_of(world, cast)],
@@ -80,10 +80,10 @@ def _call_mule(world: World, cast: Cast) -> None:
     )
 
 
-def _land_mule(world: World, item: Field) -> None:
+def _land_mule(world: World, item: AreaEffect) -> None:
     ability = world.catalog.ability(item.ability)
     unit = world.catalog.unit(str(ability.numbers["unit"]))
-    mule = world.spawn(unit, item.owner, free_places(world, unit, item.at, 1)[0])
+    mule = lifecycle.spawn(world, unit, item.owner, free_places(world, unit, item.at, 1)[0])
     lasts = number(ability, "duration_loops") + world.rng.random() * number(ability, "duration_random_loops")
     teleport.live_until(world, mule, world.loop + lasts)
     if world.slot_of(item.target) != NOBODY and item.target:
@@ -103,11 +103,11 @@ ON_ITS_WAY: Final = "SupplyDropEnRoute"
 DROPPED: Final = "SupplyDrop"
 
 
-def _is_plain_depot(world: World, cast: Cast) -> Refusal:
+def _is_plain_depot(world: World, cast: Cast) -> ActionResult:
     slot = cast.target
     depot = slot != NOBODY and world.unit_type(slot).name in DEPOTS
     taken = depot and any(buffs.has(world, slot, name) for name in (ON_ITS_WAY, DROPPED))
-    return Refusal.SUCCESS if depot and not taken else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if depot and not taken else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def _drop_supplies(world: World, cast: Cast) -> None:
@@ -131,5 +131,5 @@ SKILLS: Final = {
     "supply_drop": Skill(_drop_supplies, refuse=_is_plain_depot),
 }
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = {"MULE": _expire}
-FIELDS: Final[dict[str, FieldRule]] = {"calldown_mule": _land_mule}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"calldown_mule": _land_mule}
 ENDS: Final[dict[str, BuffRule]] = {ON_ITS_WAY: _arrive}

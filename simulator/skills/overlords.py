@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs
+from simulator import buffs, lifecycle
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.commands import is_enemy
 from simulator.creep import GENERATING
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, number
 
@@ -42,12 +42,12 @@ def _stop_creep(world: World, cast: Cast) -> None:
     world.growth.looked_at = -1
 
 
-def _dry(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, slot, GENERATING) else Refusal.SUCCESS
+def _dry(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.ERROR if buffs.has(world, slot, GENERATING) else ActionResult.SUCCESS
 
 
-def _generating(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, slot, GENERATING) else Refusal.ERROR
+def _generating(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if buffs.has(world, slot, GENERATING) else ActionResult.ERROR
 
 
 # changelings ----------------------------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ def _disguise(world: World, slots: list[int]) -> None:
         if (world.loop - int(world.born_loop[slot])) % period == 0:
             enemy = _enemy_near(world, slot)
             if enemy != NOBODY:
-                world.become(slot, world.catalog.unit(_looks(world, enemy)))
+                lifecycle.become(world, slot, world.catalog.unit(_looks(world, enemy)))
                 world.life[slot], world.shields[slot] = world.life_max[slot], world.shields_max[slot]
 
 

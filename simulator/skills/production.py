@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import production
-from simulator.refusal import Refusal
-from simulator.skills import growth
+from simulator import lifecycle, production
+from simulator.action_result import ActionResult
+from simulator.skills import morphs
 from simulator.skills.skill import Skill
 from simulator.world import NO_TAG, NOBODY, Rally
 
@@ -32,7 +32,7 @@ def _train(world: World, slots: list[int], ability: Ability, _: int, __: Point |
     """Put a unit into the queue of a structure, or into an egg."""
     slot = min(slots, key=lambda s: (_length(world, s), s))
     if world.unit_type(slot).name in COCOONS:
-        world.become(slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
+        lifecycle.become(world, slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
         world.life[slot] = world.life_max[slot]
     production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
     return [slot]
@@ -42,16 +42,16 @@ def _length(world: World, slot: int) -> float:
     return len(world.jobs.get(slot, ())) / production.parallel(world, slot)
 
 
-def has_place(world: World, slot: int, ability: Ability) -> Refusal:
+def has_place(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether a queue takes one more job of this kind."""
     if ability.unit and ability.unit not in world.catalog.row_of_name:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     jobs = world.jobs.get(slot, [])
     if any(job.kind in MORPHS for job in jobs) or (world.casts[slot] and world.bound[slot]):
-        return Refusal.CANT_QUEUE_THAT_ORDER
+        return ActionResult.CANT_QUEUE_THAT_ORDER
     if not world.powered[slot]:
-        return Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
-    return Refusal.SUCCESS if production.room(world, slot) else Refusal.QUEUE_IS_FULL
+        return ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
+    return ActionResult.SUCCESS if production.room(world, slot) else ActionResult.QUEUE_IS_FULL
 
 
 def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
@@ -61,9 +61,9 @@ def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point 
     return slots
 
 
-def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
+def _can_change(world: World, slot: int, ability: Ability) -> ActionResult:
     if slot in world.jobs:
-        return Refusal.CANT_QUEUE_THAT_ORDER
+        return ActionResult.CANT_QUEUE_THAT_ORDER
     return has_place(world, slot, ability)
 
 
@@ -72,9 +72,9 @@ def _can_change(world: World, slot: int, ability: Ability) -> Refusal:
 
 def cancel_last(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
     """Call off the last job of a queue; an egg becomes a larva again, and a cocoon what it was."""
-    growing = [slot for slot in slots if growth.grows(world, slot)]
+    growing = [slot for slot in slots if morphs.grows(world, slot)]
     for slot in growing:
-        growth.call_off(world, slot)
+        morphs.call_off(world, slot)
     taken = [slot for slot in slots if production.call_off(world, slot)]
     for slot in taken:
         _hatch_back(world, slot)
@@ -91,14 +91,14 @@ def cancel_at(world: World, slot: int, index: int) -> bool:
 
 def _hatch_back(world: World, slot: int) -> None:
     if world.unit_type(slot).name in COCOONS.values() and slot not in world.jobs:
-        world.become(slot, world.catalog.unit("Larva"))
+        lifecycle.become(world, slot, world.catalog.unit("Larva"))
         world.life[slot] = world.life_max[slot]
 
 
-def has_job(world: World, slot: int, _: Ability) -> Refusal:
+def has_job(world: World, slot: int, _: Ability) -> ActionResult:
     """Whether there is anything to call off."""
-    found = slot in world.jobs or growth.grows(world, slot)
-    return Refusal.SUCCESS if found else Refusal.CANT_FIND_CANCEL_ORDER
+    found = slot in world.jobs or morphs.grows(world, slot)
+    return ActionResult.SUCCESS if found else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # rally points ---------------------------------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
     taken = []
     for slot in slots:
         card = world.catalog.abilities_of(int(world.type[slot]))
-        kinds = {"workers" if a.general == WORKERS else "units" for a in card if a.does == "rally"}
+        kinds = {"workers" if a.general == WORKERS else "units" for a in card if a.effect == "rally"}
         if not world.unit_type(slot).structure or not kinds:
             continue
         resource = target != NOBODY and bool(world.unit_type(target).resource)
@@ -140,15 +140,15 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
     return taken
 
 
-def _sends_units(world: World, slot: int, ability: Ability) -> Refusal:
+def _sends_units(world: World, slot: int, ability: Ability) -> ActionResult:
     """Whether units come of it: a structure, an egg, or a unit that is itself still in the making."""
     finished = world.build_progress[slot] >= 1.0
-    return Refusal.ERROR if ability.link == "ProgressRally" and finished else Refusal.SUCCESS
+    return ActionResult.ERROR if ability.link == "ProgressRally" and finished else ActionResult.SUCCESS
 
 
-def _can_rally(_: World, cast: Cast) -> Refusal:
+def _can_rally(_: World, cast: Cast) -> ActionResult:
     aimed = cast.target != NOBODY or cast.point is not None
-    return Refusal.SUCCESS if aimed else Refusal.MUST_TARGET_VISIBLE_LOCATION
+    return ActionResult.SUCCESS if aimed else ActionResult.MUST_TARGET_VISIBLE_LOCATION
 
 
 SMARTS: Final = (rally_by_click,)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, construction, sites
+from simulator import buffs, commands, construction, lifecycle, sites
+from simulator.action_result import ActionResult
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, number, place_of
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ def _transfuse(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, "Transfusion", source=cast.slot)
 
 
-def _needs_life(world: World, cast: Cast) -> Refusal:
+def _needs_life(world: World, cast: Cast) -> ActionResult:
     hurt = world.life[cast.target] < world.life_max[cast.target]
-    return Refusal.SUCCESS if hurt else Refusal.REQUIRES_HEAL_TARGET
+    return ActionResult.SUCCESS if hurt else ActionResult.REQUIRES_HEAL_TARGET
 
 
 def _heal_tick(world: World, slot: int, _: np.void) -> None:
@@ -57,7 +57,7 @@ def _plant(world: World, cast: Cast) -> None:
         world.timers.setdefault(slot, {})[cast.ability.timer] = math.inf  # a tumor plants one other in its life
 
 
-def _room_for_tumor(world: World, cast: Cast) -> Refusal:
+def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
     """Creep without a structure on it; the tumor's own must be in sight."""
     unit = world.catalog.unit(cast.ability.unit)
     return sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
@@ -73,7 +73,7 @@ def _burrow_when_grown(world: World, slots: list[int]) -> None:
 def _burrow_tumor(world: World, cast: Cast) -> None:
     """Go under the ground, and be able to plant another tumor after a while."""
     slot = cast.slot
-    world.become(slot, world.catalog.unit(cast.ability.unit))
+    lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
     plant = world.catalog.ability(PLANT)
     world.timers.setdefault(slot, {})[plant.timer] = world.loop + number(plant, "first_use_after_loops")
 

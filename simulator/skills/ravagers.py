@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
 from simulator.skills.skill import Skill, around, lay, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
     from simulator.world import World
 
@@ -22,10 +22,10 @@ def _bile(world: World, cast: Cast) -> None:
     lay(world, cast, "corrosive_bile", end=due, due=due, effect=BILE_EFFECT)
 
 
-def _falls(world: World, item: Field) -> None:
+def _falls(world: World, item: AreaEffect) -> None:
     damage = number(world.catalog.ability(item.ability), "damage")
     for slot in around(world, item.at, item.radius):
-        wound(world, source_slot(world, item), item.owner, slot, damage)
+        apply_damage(world, world.slot_of(item.source), item.owner, slot, damage)
     fields_of_force = world.live[world.type[world.live] == world.catalog.unit("ForceField").row]
     for slot in fields_of_force.tolist():
         x, y = world.pos[slot].tolist()
@@ -36,4 +36,4 @@ def _falls(world: World, item: Field) -> None:
 SKILLS: Final = {
     "ravager_corrosive_bile": Skill(_bile, estimates=("The bile falls for 8 loops after its two seconds in the air.",)),
 }
-FIELDS: Final = {"corrosive_bile": _falls}
+AREA_EFFECTS: Final = {"corrosive_bile": _falls}

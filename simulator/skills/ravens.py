@@ -7,27 +7,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, sites
+from simulator import buffs, lifecycle, sites
+from simulator.action_result import ActionResult
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.fields import source_slot
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
-from simulator.skills import flight, room, teleport
+from simulator.skills import projectiles, teleport
+from simulator.skills.push_units_off import push_units_off
 from simulator.skills.skill import Skill, around, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 # auto-turret ----------------------------------------------------------------------------------------------------------
 
 
-def _has_room(world: World, cast: Cast) -> Refusal:
+def _has_room(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_BUILD_LOCATION_INVALID
+        return ActionResult.CANT_BUILD_LOCATION_INVALID
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     return sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
 
@@ -36,8 +36,8 @@ def _place_turret(world: World, cast: Cast) -> None:
     """Put up a turret that stands for a while and fires at ground and air."""
     assert cast.point is not None
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    turret = world.spawn(unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
-    room.make(world, turret)
+    turret = lifecycle.spawn(world, unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
+    push_units_off(world, turret)
     more = world.stats.changed(int(world.owner[turret]), "behavior", "AutoTurretTimedLife", "Duration", 0.0)
     lasts = number(cast, "duration_loops") + more * LOOPS_PER_NORMAL_SECOND
     lasts += world.rng.random() * number(cast, "duration_random_loops")
@@ -50,28 +50,28 @@ MATRIX: Final = ("RavenScramblerMissile", "RavenScramblerMissileCarrier")
 MARKED: Final = "ScramblerMarker"
 
 
-def _can_be_jammed(world: World, cast: Cast) -> Refusal:
+def _can_be_jammed(world: World, cast: Cast) -> ActionResult:
     """Refuse what is neither mechanical nor psionic, and where markers are known, what is jammed or about to be."""
     if cast.target == NOBODY:
-        return Refusal.MUST_TARGET_UNIT
+        return ActionResult.MUST_TARGET_UNIT
     if not {"mechanical", "psionic"} & set(world.unit_type(cast.target).attributes):
-        return Refusal.MUST_TARGET_MECHANICAL_UNITS
+        return ActionResult.MUST_TARGET_MECHANICAL_UNITS
     known = [name for name in (*MATRIX, MARKED) if name in world.catalog.buff_of_name]
     taken = MARKED in known and any(buffs.has(world, cast.target, name) for name in known)
-    return Refusal.ALREADY_TARGETED if taken else Refusal.SUCCESS
+    return ActionResult.ALREADY_TARGETED if taken else ActionResult.SUCCESS
 
 
 def _jam(world: World, cast: Cast) -> None:
     """Send a missile that keeps a machine or a psionic unit from attacking, casting and hiding."""
     if MARKED in world.catalog.buff_of_name:
         buffs.apply(world, cast.target, MARKED, source=cast.slot)
-    flight.launch(world, cast, MECHANICS.matrix_speed_n)
+    projectiles.launch(world, cast, MECHANICS.matrix_speed_n)
 
 
-def _jammed(world: World, missile: Field, target: int) -> None:
+def _jammed(world: World, missile: AreaEffect, target: int) -> None:
     carrier = world.unit_type(target).name == "Carrier" and MATRIX[1] in world.catalog.buff_of_name
     loops = number(world.catalog.ability(missile.ability), "duration_loops")
-    source = source_slot(world, missile)
+    source = world.slot_of(missile.source)
     buffs.apply(world, target, MATRIX[carrier], source=source, owner=missile.owner, loops=loops)
     buffs.remove(world, target, "MedivacSpeedBoost")
 
@@ -89,26 +89,26 @@ RESEARCHED_RADIUS: Final = ("effect", "RavenShredderMissileImpactSearchArea", "A
 
 def _send_shredder(world: World, cast: Cast) -> None:
     """Send a missile that chases its target and weakens the armor of all around it, friends as well."""
-    missile = flight.launch(world, cast, MECHANICS.shredder_speed_n)
-    missile.does = "shredder"
+    missile = projectiles.launch(world, cast, MECHANICS.shredder_speed_n)
+    missile.rule = "shredder"
 
 
-def _chase(world: World, missile: Field) -> None:
+def _chase(world: World, missile: AreaEffect) -> None:
     """Fly on; the target can tell, and a missile that was led too far for too long gives up."""
     ability = world.catalog.ability(missile.ability)
     target = world.slot_of(missile.target)
     spent = world.loop == missile.begun + number(ability, "patience_loops")
-    if spent and flight.flown(missile) >= number(ability, "patience_range"):
-        flight.end(world, missile)
+    if spent and projectiles.flown(missile) >= number(ability, "patience_range"):
+        projectiles.end(world, missile)
         return
     if target != NOBODY:
         buffs.apply(world, target, SEEN_COMING, owner=missile.owner)
-    flight.fly(world, missile)
+    projectiles.fly(world, missile)
 
 
-def _shred(world: World, missile: Field, _: int) -> None:
+def _shred(world: World, missile: AreaEffect, _: int) -> None:
     """Weaken the armor of everybody around, friends as well, but of no structure."""
-    ability, source = world.catalog.ability(missile.ability), source_slot(world, missile)
+    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     radius = world.stats.changed(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
     loops = number(ability, "duration_loops")
     for slot in around(world, missile.at, radius, structures=False):
@@ -126,7 +126,7 @@ SKILLS: Final = {
     "raven_scrambler_missile": Skill(_jam, refuse=_can_be_jammed, estimates=("The interference matrix' speed.",)),
     "raven_shredder_missile": Skill(_send_shredder, estimates=("The anti-armor missile's speed.",)),
 }
-FIELDS: Final[dict[str, FieldRule]] = {"shredder": _chase}
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"shredder": _chase}
 
-flight.ARRIVALS["raven_scrambler_missile"] = _jammed
-flight.ARRIVALS["raven_shredder_missile"] = _shred
+projectiles.ARRIVALS["raven_scrambler_missile"] = _jammed
+projectiles.ARRIVALS["raven_shredder_missile"] = _shred

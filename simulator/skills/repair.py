@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.medivacs import resume
 from simulator.skills.skill import Skill, distance, nearest_hurt, number, touching
 from simulator.stats import ATTRIBUTES
@@ -27,24 +27,24 @@ REPAIRS: Final = ("repair", "mule_repair")
 MECHANICAL: Final = 1 << ATTRIBUTES.index("mechanical")
 
 
-def _can_repair(world: World, cast: Cast) -> Refusal:
+def _can_repair(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     if target == NOBODY:
-        return Refusal.MUST_TARGET_UNIT
+        return ActionResult.MUST_TARGET_UNIT
     if world.life[target] >= world.life_max[target] - DONE or _loops(world, target) <= 0.0:
-        return Refusal.REQUIRES_REPAIR_TARGET
+        return ActionResult.REQUIRES_REPAIR_TARGET
     return _unaffordable(world, cast)
 
 
-def _unaffordable(world: World, cast: Cast) -> Refusal:
+def _unaffordable(world: World, cast: Cast) -> ActionResult:
     """Whether the player lacks what the next loop of work costs."""
     player = world.players[int(world.owner[cast.slot])]
     if "free" in player.cheats:
-        return Refusal.SUCCESS
+        return ActionResult.SUCCESS
     minerals, vespene = _price(world, cast)
     if player.minerals < minerals:
-        return Refusal.NOT_ENOUGH_MINERALS
-    return Refusal.NOT_ENOUGH_VESPENE if player.vespene < vespene else Refusal.SUCCESS
+        return ActionResult.NOT_ENOUGH_MINERALS
+    return ActionResult.NOT_ENOUGH_VESPENE if player.vespene < vespene else ActionResult.SUCCESS
 
 
 def _loops(world: World, slot: int) -> float:
@@ -68,7 +68,7 @@ def _mend(world: World, cast: Cast) -> bool:
     if distance(world, slot, (x, y)) > touching(world, slot, target) + 2.0 * cast.ability.slop:
         resume(world, slot)
         return True
-    if _unaffordable(world, cast) is not Refusal.SUCCESS:
+    if _unaffordable(world, cast) is not ActionResult.SUCCESS:
         return False
     missing = float(world.life_max[target] - world.life[target])
     whole = float(world.life_max[target]) / _loops(world, target)
@@ -102,7 +102,7 @@ def _repair_by_click(world: World, slots: list[int], target: int, _: Point | Non
     taken: list[int] = []
     for slot in slots:
         card = world.catalog.abilities_of(int(world.type[slot]))
-        ability = next((a for a in card if a.does in REPAIRS), None)
+        ability = next((a for a in card if a.effect in REPAIRS), None)
         if ability is not None and slot != target and world.owner[slot] == world.owner[target]:
             order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
             taken += commands.give(world, [slot], order, queue=queue)

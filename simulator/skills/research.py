@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import production
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills.production import has_place
 from simulator.skills.skill import Skill
 
@@ -22,13 +22,13 @@ def _research(world: World, slots: list[int], ability: Ability, _: int, __: Poin
     return [slot]
 
 
-def _can_research(world: World, slot: int, ability: Ability) -> Refusal:
+def _can_research(world: World, slot: int, ability: Ability) -> ActionResult:
     player = world.players[int(world.owner[slot])]
     upgrade = next((u for u in world.catalog.upgrades if u.name == ability.upgrade), None)
     if upgrade is None or not ability.loops:
-        return Refusal.NOT_SUPPORTED
+        return ActionResult.NOT_SUPPORTED
     if upgrade.id in player.upgrades or upgrade.name in player.underway:
-        return Refusal.TECH_REQUIREMENTS_NOT_MET
+        return ActionResult.TECH_REQUIREMENTS_NOT_MET
     return has_place(world, slot, ability)
 
 

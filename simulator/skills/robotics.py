@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
 from simulator.skills.skill import Skill, around, number, place_of
 
 if TYPE_CHECKING:
@@ -40,13 +40,13 @@ def _nova(world: World, cast: Cast) -> None:
     """Send out a ball that can be steered and bursts when its time is over."""
     slot, lasts = cast.slot, number(cast, "duration_loops")
     x, y = world.pos[slot].tolist()
-    nova = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
+    nova = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
     world.heading[nova] = world.heading[slot]
     buffs.apply(world, slot, NOVA_CASTER, source=slot)
     buffs.apply(world, nova, NOVA, source=slot)
     commands.move(world, [nova], place_of(world, cast))
-    world.fields.append(
-        Field(
+    world.area_effects.append(
+        AreaEffect(
             "purification_nova",
             int(world.owner[slot]),
             [(x, y)],
@@ -61,9 +61,9 @@ def _nova(world: World, cast: Cast) -> None:
     )
 
 
-def _burn(world: World, field: Field) -> None:
+def _burn(world: World, field: AreaEffect) -> None:
     """Burst at the end; go out without harm when the Disruptor dies, is carried, or is out of its owner's hands."""
-    disruptor, nova = source_slot(world, field), world.slot_of(field.target)
+    disruptor, nova = world.slot_of(field.source), world.slot_of(field.target)
     held = (
         NOBODY not in (nova, disruptor)
         and world.carrier[disruptor] == NOBODY
@@ -77,7 +77,7 @@ def _burn(world: World, field: Field) -> None:
         world.remove(nova)
 
 
-def _burst(world: World, field: Field, disruptor: int, nova: int) -> None:
+def _burst(world: World, field: AreaEffect, disruptor: int, nova: int) -> None:
     """Hurt everybody on the ground around the nova, friends too; only the owner's own Disruptors are spared."""
     ability = world.catalog.ability(field.ability)
     x, y = world.pos[nova].tolist()
@@ -85,7 +85,7 @@ def _burst(world: World, field: Field, disruptor: int, nova: int) -> None:
     for slot in around(world, (x, y), field.radius, plane="ground"):
         own = int(world.owner[slot]) == field.owner
         if not (own and world.unit_type(slot).name == "Disruptor"):
-            wound(world, disruptor, field.owner, slot, amount, shield_bonus=bonus)
+            apply_damage(world, disruptor, field.owner, slot, amount, shield_bonus=bonus)
 
 
 # the barrier ----------------------------------------------------------------------------------------------------------
@@ -162,6 +162,6 @@ SKILLS: Final = {
         estimates=("Hits in the same loop as the first one get past a barrier that they raise.",),
     ),
 }
-FIELDS: Final = {"purification_nova": _burn}
+AREA_EFFECTS: Final = {"purification_nova": _burn}
 PASSIVES: Final[dict[str, UnitRule]] = {"Immortal": _guard}
 ENDS: Final[dict[str, BuffRule]] = {BARRIER: _barrier_over, BARRIER_ACTIVE: _active_over}

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, geometry, placement
+from simulator import buffs, geometry, lifecycle, placement
 from simulator.columns import NOBODY
-from simulator.fields import Field, source_slot
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, friends, lay, number, place_of
 from simulator.stats import ATTRIBUTES, GROUND_PLANE
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
     from simulator.skills.skill import UnitRule
     from simulator.world import World
@@ -39,9 +40,9 @@ def _guardian_shield(world: World, cast: Cast) -> None:
     lay(world, cast, "guardian_shield", end=end, due=world.loop + 1, effect=SHIELD_EFFECT)
 
 
-def _cover(world: World, field: Field) -> None:
+def _cover(world: World, field: AreaEffect) -> None:
     """Follow the Sentry, and every period cover its owner's units around it; structures are not covered."""
-    sentry = source_slot(world, field)
+    sentry = world.slot_of(field.source)
     if sentry == NOBODY or buffs.has(world, sentry, SCRAMBLED):
         field.end = world.loop
         return
@@ -66,7 +67,7 @@ def _force_field(world: World, cast: Cast) -> None:
     """Put up a wall that nobody on the ground can pass until it ends, or somebody massive breaks it."""
     unit = world.catalog.unit("ForceField")
     point = place_of(world, cast)
-    slot = world.spawn(unit, 0, point)
+    slot = lifecycle.spawn(world, unit, 0, point)
     lasts = number(cast, "duration_loops") + world.rng.random() * number(cast, "random_loops")
     teleport.live_until(world, slot, world.loop + lasts)
     cells = geometry.disc_cells(number(cast, "radius")) + np.floor(point).astype(np.int64)
@@ -127,7 +128,7 @@ def make_hallucination(world: World, slot: int, loops: float) -> None:
     buffs.apply(world, slot, "HallucinationTimedLife", loops=loops)
     world.autocast.pop(slot, None)
     teleport.live_until(world, slot, world.loop + loops)
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 SKILLS: Final = {
@@ -148,5 +149,5 @@ SKILLS: Final = {
     ),
     "hallucination": Skill(_hallucinate, estimates=("Images appear at the nearest free places around the Sentry.",)),
 }
-FIELDS: Final = {"guardian_shield": _cover}
+AREA_EFFECTS: Final = {"guardian_shield": _cover}
 PASSIVES: Final[dict[str, UnitRule]] = {"ForceField": _shatter_near_massive}

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field
-from simulator.refusal import Refusal
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from simulator.world import World
 
 Effect: TypeAlias = Callable[["World", "Cast"], None]
-FieldRule: TypeAlias = Callable[["World", "Field"], None]
+AreaEffectRule: TypeAlias = Callable[["World", "AreaEffect"], None]
 BuffRule: TypeAlias = Callable[["World", int, "np.void"], None]
 Give: TypeAlias = Callable[["World", "list[int]", "Ability", int, "Point | None", bool], "list[int]"]
 SmartRule: TypeAlias = Callable[["World", "list[int]", int, "Point | None", bool], "list[int]"]
@@ -35,9 +35,9 @@ def no_effect(_: World, __: Cast) -> None:
     """An ability that is carried out in its own way."""
 
 
-def nothing_against_it(_: World, __: Cast) -> Refusal:
+def nothing_against_it(_: World, __: Cast) -> ActionResult:
     """No reason of its own to refuse."""
-    return Refusal.SUCCESS
+    return ActionResult.SUCCESS
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Skill:
         give: Carries the order out in its own way instead of as a cast, such as by a structure's queue: called with
             the units that may, the ability, the target (tag), the point and whether to queue it; returns those that
             took it. It charges what it costs.
-        refuse: Reasons of its own against the cast, ``Refusal.SUCCESS`` for none.
+        refuse: Reasons of its own against the cast, ``ActionResult.SUCCESS`` for none.
         ready: Reasons of its own against using it now, whatever it is aimed at.
         anytime: A unit that can't act may use it too, such as a structure that is to be cancelled.
         hold: Makes it a channel: called in every later loop, False when it is over.
@@ -62,8 +62,8 @@ class Skill:
 
     effect: Effect = no_effect
     give: Give | None = None
-    refuse: Callable[[World, Cast], Refusal] = nothing_against_it
-    ready: Callable[[World, int, Ability], Refusal] | None = None
+    refuse: Callable[[World, Cast], ActionResult] = nothing_against_it
+    ready: Callable[[World, int, Ability], ActionResult] | None = None
     anytime: bool = False
     hold: Callable[[World, Cast], bool] | None = None
     end: Effect | None = None
@@ -124,13 +124,15 @@ def place_of(world: World, cast: Cast) -> Point:
     return x, y
 
 
-def lay(world: World, cast: Cast, does: str, *, end: float, due: float, effect: int = 0, period: float = 1.0) -> Field:
+def lay(
+    world: World, cast: Cast, rule: str, *, end: float, due: float, effect: int = 0, period: float = 1.0
+) -> AreaEffect:
     """Lay a field where a cast is aimed, as wide as the ability says; whoever lays it may change it on.
 
-    Its rule ``does`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
+    Its ``rule`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
     """
-    laid = Field(
-        does,
+    laid = AreaEffect(
+        rule,
         owner=int(world.owner[cast.slot]),
         points=[place_of(world, cast)],
         radius=number(cast, "radius", 0.0),
@@ -142,7 +144,7 @@ def lay(world: World, cast: Cast, does: str, *, end: float, due: float, effect: 
         ability=cast.ability.id,
         source=world.tag_of(cast.slot),
     )
-    world.fields.append(laid)
+    world.area_effects.append(laid)
     return laid
 
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, placement, targets
+from simulator import buffs, commands, lifecycle, placement, targets
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
-from simulator.fields import Field, source_slot
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, around, foes, number, place_of
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,7 +60,7 @@ def _unearth(world: World, slot: int) -> None:
     unit = world.unit_type(slot)
     above = unit.name.replace("Burrowed", "")
     if unit.burrowed and above in world.catalog.row_of_name:
-        world.become(slot, world.catalog.unit(above))
+        lifecycle.become(world, slot, world.catalog.unit(above))
 
 
 def _keep_lifted(world: World, cast: Cast) -> bool:
@@ -93,8 +94,8 @@ def _retarget(world: World, slot: int) -> None:
             targets.disengage(world, fighter)
 
 
-def _cant_lift(world: World, cast: Cast) -> Refusal:
-    return Refusal.ALREADY_TARGETED if buffs.has(world, cast.target, "Yoink") else Refusal.SUCCESS
+def _cant_lift(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.ALREADY_TARGETED if buffs.has(world, cast.target, "Yoink") else ActionResult.SUCCESS
 
 
 def _let_go(world: World, cast: Cast) -> None:
@@ -102,8 +103,8 @@ def _let_go(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _cant_let_go(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if cast.slot in world.channelling else Refusal.CANT_FIND_CANCEL_ORDER
+def _cant_let_go(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if cast.slot in world.channelling else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 # Oracle ---------------------------------------------------------------------------------------------------------------
@@ -125,12 +126,12 @@ def _disarm(world: World, slot: int) -> None:
     targets.disengage(world, slot)
 
 
-def _pulses(world: World, cast: Cast) -> Refusal:
-    return Refusal.ERROR if buffs.has(world, cast.slot, PULSAR) else Refusal.SUCCESS
+def _pulses(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.ERROR if buffs.has(world, cast.slot, PULSAR) else ActionResult.SUCCESS
 
 
-def _does_not_pulse(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if buffs.has(world, cast.slot, PULSAR) else Refusal.ERROR
+def _does_not_pulse(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if buffs.has(world, cast.slot, PULSAR) else ActionResult.ERROR
 
 
 def _mind_energy(world: World, slots: list[int]) -> None:
@@ -152,12 +153,16 @@ def _reveal(world: World, cast: Cast) -> None:
 def _set_trap(world: World, cast: Cast) -> None:
     """Begin a trap, which finishes itself; its energy is paid now."""
     point = _trap_place(world, cast)
-    trap = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[cast.slot]), point)
+    trap = lifecycle.spawn(
+        world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[cast.slot]), point
+    )
     world.build_progress[trap] = 0.0
-    world.refresh(trap)
+    refresh(world, trap)
     end = world.loop + cast.ability.loops
-    world.fields.append(
-        Field("trap_forms", int(world.owner[trap]), [point], 0.0, world.loop, end, due=end, source=world.tag_of(trap))
+    world.area_effects.append(
+        AreaEffect(
+            "trap_forms", int(world.owner[trap]), [point], 0.0, world.loop, end, due=end, source=world.tag_of(trap)
+        )
     )
 
 
@@ -166,21 +171,21 @@ def _trap_place(world: World, cast: Cast) -> Point:
     return placement.snapped(place_of(world, cast), world.catalog.footprints[unit.footprint].size)
 
 
-def _cant_set_trap(world: World, cast: Cast) -> Refusal:
+def _cant_set_trap(world: World, cast: Cast) -> ActionResult:
     x, y = _trap_place(world, cast)
     height, width = world.ground.walk.shape
     inside = 0 <= x < width and 0 <= y < height
     free = inside and bool(world.ground.walk[int(y), int(x)] and world.map.terrain.build[int(y), int(x)])
-    return Refusal.SUCCESS if free else Refusal.CANT_BUILD_LOCATION_INVALID
+    return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_LOCATION_INVALID
 
 
-def _trap_done(world: World, field: Field) -> None:
-    trap = source_slot(world, field)
+def _trap_done(world: World, field: AreaEffect) -> None:
+    trap = world.slot_of(field.source)
     if trap != NOBODY:
         world.build_progress[trap] = 1.0
         buffs.apply(world, trap, TRAP_LIFE)
         teleport.live_until(world, trap, world.loop + world.catalog.buff(TRAP_LIFE).loops)
-        world.refresh(trap)
+        refresh(world, trap)
 
 
 def _intruder(world: World, slot: int, ability: Ability) -> int:
@@ -200,9 +205,9 @@ def _catchable(world: World, trap: int, slots: list[int]) -> list[int]:
     ]
 
 
-def _cant_spring(world: World, cast: Cast) -> Refusal:
+def _cant_spring(world: World, cast: Cast) -> ActionResult:
     sprung = buffs.has(world, cast.slot, "OracleStasisTrapCaster")
-    return Refusal.COOLDOWN if sprung else Refusal.SUCCESS
+    return ActionResult.COOLDOWN if sprung else ActionResult.SUCCESS
 
 
 def _spring(world: World, cast: Cast) -> None:
@@ -213,16 +218,18 @@ def _spring(world: World, cast: Cast) -> None:
     buffs.apply(world, slot, "OracleStasisTrapCaster", source=slot)
     teleport.live_until(world, slot, world.loop + number(cast, "gone_loops"))
     owner, tag = int(world.owner[slot]), world.tag_of(slot)
-    spot = Field("trap_springs", owner, [(x, y)], number(cast, "radius"), world.loop, world.loop + delay, source=tag)
+    spot = AreaEffect(
+        "trap_springs", owner, [(x, y)], number(cast, "radius"), world.loop, world.loop + delay, source=tag
+    )
     spot.due, spot.period = spot.end, delay
     sight_end = world.loop + number(cast, "sight_loops")
-    seen = Field("sight", owner, [(x, y)], number(cast, "sight_radius"), world.loop, sight_end)
+    seen = AreaEffect("sight", owner, [(x, y)], number(cast, "sight_radius"), world.loop, sight_end)
     seen.due, seen.sights = sight_end, number(cast, "sight_radius")
-    world.fields += [spot, seen]
+    world.area_effects += [spot, seen]
 
 
-def _catch(world: World, field: Field) -> None:
-    trap = source_slot(world, field)
+def _catch(world: World, field: AreaEffect) -> None:
+    trap = world.slot_of(field.source)
     if trap == NOBODY:
         return
     near = around(world, field.at, field.radius, plane="ground", structures=False)
@@ -255,6 +262,6 @@ SKILLS: Final = {
     "prismatic_alignment": Skill(_align),
     "cancel_prismatic_alignment": Skill(_unalign),
 }
-FIELDS: Final = {"trap_forms": _trap_done, "trap_springs": _catch, "sight": lambda _, __: None}
+AREA_EFFECTS: Final = {"trap_forms": _trap_done, "trap_springs": _catch, "sight": lambda _, __: None}
 PASSIVES: Final[dict[str, UnitRule]] = {"Oracle": _mind_energy}
 ENDS: Final[dict[str, BuffRule]] = {LIFT: _put_down}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.area_effects import AreaEffect
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.fields import Field
 from simulator.launchers import LAUNCHERS
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
@@ -32,13 +32,13 @@ def _spawn_locusts(world: World, cast: Cast) -> None:
     for slot in teleport.beside(world, cast.slot, unit, int(number(cast, "count"))):
         buffs.apply(world, slot, STUNNED, source=cast.slot)
         due = world.loop + number(cast, "spawn_stun_loops")
-        world.fields.append(
-            Field("locust_ready", int(world.owner[slot]), [place_of(world, cast)], 0.0, world.loop, due, due=due,
+        world.area_effects.append(
+            AreaEffect("locust_ready", int(world.owner[slot]), [place_of(world, cast)], 0.0, world.loop, due, due=due,
                   ability=cast.ability.id, target=world.tag_of(slot))
         )  # fmt: skip
 
 
-def _ready(world: World, item: Field) -> None:
+def _ready(world: World, item: AreaEffect) -> None:
     slot = world.slot_of(item.target)
     if slot == NOBODY:
         return
@@ -67,16 +67,24 @@ def _come_down(world: World, slot: int, point: Point) -> None:
     """Become a locust on the ground that is on its way to a free place there."""
     ground = world.catalog.unit(HATCHED)
     (place,) = free_places(world, ground, point, 1)
-    world.become(slot, ground)
+    lifecycle.become(world, slot, ground)
     buffs.apply(world, slot, SWOOPING, source=slot)
     lasts = world.catalog.buff(SWOOPING).loops
-    world.fields.append(
-        Field("swoop", int(world.owner[slot]), [place], MECHANICS.swoop_speed_n / LOOPS_PER_NORMAL_SECOND, world.loop,
-              world.loop + lasts, due=world.loop + 1, target=world.tag_of(slot))
-    )  # fmt: skip
+    world.area_effects.append(
+        AreaEffect(
+            "swoop",
+            owner=int(world.owner[slot]),
+            points=[place],
+            radius=MECHANICS.swoop_speed_n / LOOPS_PER_NORMAL_SECOND,
+            begun=world.loop,
+            end=world.loop + lasts,
+            due=world.loop + 1,
+            target=world.tag_of(slot),
+        )
+    )
 
 
-def _glides(world: World, item: Field) -> None:
+def _glides(world: World, item: AreaEffect) -> None:
     """Bring a locust one step nearer to its landing place; the field's radius is the step."""
     slot = world.slot_of(item.target)
     if slot == NOBODY:
@@ -92,7 +100,7 @@ def _glides(world: World, item: Field) -> None:
 
 def _land(world: World, cast: Cast) -> None:
     """Stand on the ground from now on."""
-    world.become(cast.slot, world.catalog.unit(cast.ability.unit))
+    lifecycle.become(world, cast.slot, world.catalog.unit(cast.ability.unit))
 
 
 LAUNCHERS["LocustMPFlyingSwoopWeapon"] = _swoop_on
@@ -106,4 +114,4 @@ SKILLS: Final = {
     "locust_mp_flying_swoop_attack": Skill(_swoop, estimates=("How fast a locust swoops down.",)),
     "land_locust": Skill(_land),
 }
-FIELDS: Final = {"locust_ready": _ready, "swoop": _glides}
+AREA_EFFECTS: Final = {"locust_ready": _ready, "swoop": _glides}

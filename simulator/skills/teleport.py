@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry, placement
+from simulator import geometry, lifecycle, placement
 
 if TYPE_CHECKING:
     from simulator.casts import Point
@@ -28,7 +28,7 @@ def to(world: World, slot: int, point: Point) -> None:
     world.aside[slot] = 0.0
     world.nav_end[slot] = world.returning[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
-    world.settled = world.looked_at = -1
+    world.resting_version = world.looked_at = -1
     world.scan_now = True
 
 
@@ -82,7 +82,10 @@ def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int
     """Put new units of the maker's owner where they fit around it; returns their slots."""
     x, y = world.pos[maker].tolist()
     owner, facing = int(world.owner[maker]), float(geometry.facing(world.heading[maker : maker + 1])[0])
-    return [world.spawn(unit, owner, place, facing) for place in placement.free_places(world, unit, (x, y), count)]
+    return [
+        lifecycle.spawn(world, unit, owner, place, facing)
+        for place in placement.free_places(world, unit, (x, y), count)
+    ]
 
 
 def live_until(world: World, slot: int, loop: float) -> None:

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.arrays import which
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills.skill import Skill, around, lay, number
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.casts import Cast
@@ -43,9 +44,9 @@ def _psi_storm(world: World, cast: Cast) -> None:
     lay(world, cast, "psi_storm", end=end, due=world.loop, effect=STORM_EFFECT, period=period)
 
 
-def _search(world: World, field: Field) -> None:
+def _search(world: World, field: AreaEffect) -> None:
     """Find whom the storm touches, friends too: who is new to it takes damage at once."""
-    source = source_slot(world, field)
+    source = world.slot_of(field.source)
     for slot in around(world, field.at, field.radius, structures=False):
         fresh = not buffs.has(world, slot, STORM_BUFF)
         buffs.apply(world, slot, STORM_BUFF, source=source, owner=field.owner)
@@ -58,7 +59,7 @@ def _storm_tick(world: World, slot: int, row: np.void) -> None:
 
 
 def _hurt(world: World, slot: int, source: int, owner: int) -> None:
-    wound(world, source, owner, slot, number(world.catalog.ability(STORM_ABILITY), "damage"))
+    apply_damage(world, source, owner, slot, number(world.catalog.ability(STORM_ABILITY), "damage"))
 
 
 # Feedback -------------------------------------------------------------------------------------------------------------
@@ -69,12 +70,12 @@ def _feedback(world: World, cast: Cast) -> None:
     energy = float(world.energy[cast.target])
     amount = energy * number(cast, "damage_per_energy")
     world.energy[cast.target] = energy * (1.0 - number(cast, "energy_drained_fraction"))
-    wound(world, cast.slot, int(world.owner[cast.slot]), cast.target, amount)
+    apply_damage(world, cast.slot, int(world.owner[cast.slot]), cast.target, amount)
 
 
-def _cant_feed_back(world: World, cast: Cast) -> Refusal:
+def _cant_feed_back(world: World, cast: Cast) -> ActionResult:
     spared = world.unit_type(cast.target).name in SPARED_BY_FEEDBACK
-    return Refusal.CANT_TARGET_THAT_UNIT if spared else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if spared else ActionResult.SUCCESS
 
 
 # Archons --------------------------------------------------------------------------------------------------------------
@@ -97,31 +98,33 @@ def _fuse(world: World, cast: Cast) -> None:
     """Become an Archon with another Templar, beside it; it takes its time to form."""
     one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
     x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
-    archon = world.spawn(world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
+    archon = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
     world.remove(one)
     world.remove(other)
     world.build_progress[archon] = 0.0
-    world.refresh(archon)
+    refresh(world, archon)
     end = world.loop + cast.ability.loops
-    world.fields.append(
-        Field("archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon))
+    world.area_effects.append(
+        AreaEffect(
+            "archon_merge", owner, [(x, y)], 0.0, world.loop, end, due=world.loop + 1, source=world.tag_of(archon)
+        )
     )
 
 
-def _form(world: World, field: Field) -> None:
-    archon = source_slot(world, field)
+def _form(world: World, field: AreaEffect) -> None:
+    archon = world.slot_of(field.source)
     if archon == NOBODY:
         field.end = world.loop
         return
     world.build_progress[archon] = min((world.loop - field.begun) / (field.end - field.begun), 1.0)
     if world.build_progress[archon] >= 1.0:
-        world.refresh(archon)
+        refresh(world, archon)
         world.orders_changed = world.scan_now = True
 
 
-def _cant_merge(world: World, cast: Cast) -> Refusal:
+def _cant_merge(world: World, cast: Cast) -> ActionResult:
     fits = cast.target == NOBODY or world.unit_type(cast.target).name in TEMPLARS
-    return Refusal.SUCCESS if fits else Refusal.CANT_TARGET_THAT_UNIT
+    return ActionResult.SUCCESS if fits else ActionResult.CANT_TARGET_THAT_UNIT
 
 
 SKILLS: Final = {
@@ -136,5 +139,5 @@ SKILLS: Final = {
         estimates=("An Archon in the making has full life and shields and can be attacked.",),
     ),
 }
-FIELDS: Final = {"psi_storm": _search, "archon_merge": _form}
+AREA_EFFECTS: Final = {"psi_storm": _search, "archon_merge": _form}
 TICKS: Final[dict[str, BuffRule]] = {STORM_BUFF: _storm_tick}

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 from simulator.damage import IMPACTS
 from simulator.skills import (
+    battlecruiser,
     buildings,
     cloaks,
     cyclone,
-    flight,
     ghosts,
     infantry,
     landing,
@@ -18,15 +18,15 @@ from simulator.skills import (
     mines,
     nukes,
     orbital,
+    projectiles,
     ravens,
     repair,
-    starships,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, SmartRule, UnitRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule, Skill, SmartRule, UnitRule
     from simulator.world import World
 
 SKILLS: Final[dict[str, Skill]] = {
@@ -43,16 +43,16 @@ SKILLS: Final[dict[str, Skill]] = {
     **orbital.SKILLS,
     **ravens.SKILLS,
     **repair.SKILLS,
-    **starships.SKILLS,
+    **battlecruiser.SKILLS,
 }
-FIELDS: Final[dict[str, FieldRule]] = {
-    **cyclone.FIELDS,
-    **flight.FIELDS,
-    **infantry.FIELDS,
-    **liberators.FIELDS,
-    **nukes.FIELDS,
-    **orbital.FIELDS,
-    **ravens.FIELDS,
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
+    **cyclone.AREA_EFFECTS,
+    **projectiles.AREA_EFFECTS,
+    **infantry.AREA_EFFECTS,
+    **liberators.AREA_EFFECTS,
+    **nukes.AREA_EFFECTS,
+    **orbital.AREA_EFFECTS,
+    **ravens.AREA_EFFECTS,
 }
 TICKS: Final[dict[str, BuffRule]] = {**buildings.TICKS, **cloaks.TICKS, **ghosts.TICKS}
 ENDS: Final[dict[str, BuffRule]] = {**buildings.ENDS, **orbital.ENDS}

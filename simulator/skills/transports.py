@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import buffs, commands, placement
+from simulator import commands, placement
+from simulator.action_result import ActionResult
 from simulator.arrays import which
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 from simulator.skills import teleport
 from simulator.skills.skill import Skill, gap
+from simulator.traits import kinds_on, refresh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,19 +69,21 @@ def room(world: World, carrier: int) -> int:
     return world.unit_type(carrier).cargo_space - taken
 
 
-def cant_carry(world: World, carrier: int, passenger: int) -> Refusal:
-    """Why a carrier can't take a unit in now, ``Refusal.SUCCESS`` when it can."""
+def cant_carry(world: World, carrier: int, passenger: int) -> ActionResult:
+    """Why a carrier can't take a unit in now, ``ActionResult.SUCCESS`` when it can."""
     unit, vessel = world.unit_type(passenger), world.unit_type(carrier)
     if world.owner[passenger] != world.owner[carrier]:
-        return Refusal.CANT_LOAD_OTHER_PLAYERS_UNITS
-    bound = any("no_passenger" in kind.flags for kind in buffs.kinds_on(world, passenger))
+        return ActionResult.CANT_LOAD_OTHER_PLAYERS_UNITS
+    bound = any("no_passenger" in kind.flags for kind in kinds_on(world, passenger))
     alien = vessel.name in WORKERS_ONLY and not unit.worker
     alien |= vessel.name == "Bunker" and "biological" not in unit.attributes
     if not unit.cargo_size or unit.cargo_size > vessel.cargo_max_size or bound or alien or passenger == carrier:
-        return Refusal.CANT_LOAD_THAT_UNIT
+        return ActionResult.CANT_LOAD_THAT_UNIT
     if world.build_progress[carrier] < 1.0 or world.hallucination[carrier] or world.hallucination[passenger]:
-        return Refusal.CANT_LOAD_THAT_UNIT
-    return Refusal.SUCCESS if unit.cargo_size <= room(world, carrier) else Refusal.NOT_ENOUGH_ROOM_TO_LOAD_UNIT
+        return ActionResult.CANT_LOAD_THAT_UNIT
+    return (
+        ActionResult.SUCCESS if unit.cargo_size <= room(world, carrier) else ActionResult.NOT_ENOUGH_ROOM_TO_LOAD_UNIT
+    )
 
 
 # in -------------------------------------------------------------------------------------------------------------------
@@ -88,7 +91,7 @@ def cant_carry(world: World, carrier: int, passenger: int) -> Refusal:
 
 def _load(world: World, cast: Cast) -> None:
     """Take a unit in that has come within reach."""
-    if cant_carry(world, cast.slot, cast.target) is Refusal.SUCCESS:
+    if cant_carry(world, cast.slot, cast.target) is ActionResult.SUCCESS:
         take_in(world, cast.slot, cast.target)
 
 
@@ -99,7 +102,7 @@ def take_in(world: World, carrier: int, passenger: int) -> None:
     world.stow(passenger, carrier)
     x, y = world.pos[carrier].tolist()
     teleport.to(world, passenger, (x, y))
-    world.refresh(passenger)
+    refresh(world, passenger)
     if world.unit_type(carrier).name == "Bunker":
         world.holds[passenger] = world.looks_around[passenger] = True
     world.timers.get(carrier, {}).pop(UNLOADING, None)
@@ -124,9 +127,9 @@ def _board(world: World, slots: list[int], carrier: int, ability: Ability, *, qu
     return commands.give(world, slots, order, queue=queue)
 
 
-def _cant_load(world: World, cast: Cast) -> Refusal:
+def _cant_load(world: World, cast: Cast) -> ActionResult:
     if cast.target == NOBODY:
-        return Refusal.MUST_TARGET_UNIT
+        return ActionResult.MUST_TARGET_UNIT
     return cant_carry(world, cast.slot, cast.target)
 
 
@@ -138,12 +141,12 @@ def _load_all(world: World, cast: Cast) -> None:
 
 def _callable(world: World, cast: Cast) -> list[int]:
     mine = world.units_of(int(world.owner[cast.slot])).tolist()
-    fit = [slot for slot in mine if cant_carry(world, cast.slot, slot) is Refusal.SUCCESS]
+    fit = [slot for slot in mine if cant_carry(world, cast.slot, slot) is ActionResult.SUCCESS]
     return sorted(fit, key=lambda slot: (gap(world, cast.slot, slot), slot))
 
 
-def _nobody_to_load(world: World, cast: Cast) -> Refusal:
-    return Refusal.SUCCESS if _callable(world, cast) else Refusal.LOAD_ALL_NO_TARGETS_FOUND
+def _nobody_to_load(world: World, cast: Cast) -> ActionResult:
+    return ActionResult.SUCCESS if _callable(world, cast) else ActionResult.LOAD_ALL_NO_TARGETS_FOUND
 
 
 # out ------------------------------------------------------------------------------------------------------------------
@@ -171,18 +174,18 @@ def _told_to_unload(
     return ([own] if own in slots else []) + commands.give(world, rest, order, queue=queue)
 
 
-def _no_place(world: World, cast: Cast) -> Refusal:
+def _no_place(world: World, cast: Cast) -> ActionResult:
     """Whether nobody could stand at the point that is named."""
     if cast.point is None or cast.target != NOBODY:
-        return Refusal.SUCCESS
+        return ActionResult.SUCCESS
     unit = world.unit_type(inside(world, cast.slot)[0])
     reach = UNLOAD_REACH + float(world.radius[cast.slot])
     free = len(placement.candidates(world, unit, cast.point, reach)) > 0
-    return Refusal.SUCCESS if free else Refusal.CANT_UNLOAD_UNITS_THERE
+    return ActionResult.SUCCESS if free else ActionResult.CANT_UNLOAD_UNITS_THERE
 
 
-def _is_empty(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if inside(world, slot) else Refusal.NO_CARGO_TO_UNLOAD
+def _is_empty(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if inside(world, slot) else ActionResult.NO_CARGO_TO_UNLOAD
 
 
 def unload_one(world: World, carrier: int, passenger: int) -> bool:
@@ -195,7 +198,7 @@ def unload_one(world: World, carrier: int, passenger: int) -> bool:
     px, py = places[0].tolist()
     world.unstow(passenger, (px, py))
     teleport.to(world, passenger, (px, py))
-    world.refresh(passenger)
+    refresh(world, passenger)
     commands.begin(world, passenger, None)
     return True
 
@@ -227,14 +230,14 @@ def _carry(world: World, slots: list[int]) -> None:
 def _boards(world: World, slot: int, carrier: int) -> bool:
     ability = world.catalog.ability(int(world.order_ability[slot]))
     reach = max(world.unit_type(carrier).cargo_range, BOARDING_GAP)
-    return ability.does in ("load", "load_all") and gap(world, slot, carrier) <= reach
+    return ability.effect in ("load", "load_all") and gap(world, slot, carrier) <= reach
 
 
 def _let_in(world: World, slot: int, carrier: int) -> None:
     why = cant_carry(world, carrier, slot)
-    if why is Refusal.SUCCESS:
+    if why is ActionResult.SUCCESS:
         take_in(world, carrier, slot)
-    elif why is not Refusal.NOT_ENOUGH_ROOM_TO_LOAD_UNIT or not world.queue[slot]:
+    elif why is not ActionResult.NOT_ENOUGH_ROOM_TO_LOAD_UNIT or not world.queue[slot]:
         commands.begin_next(world, slot)
 
 
@@ -291,7 +294,7 @@ def load_by_click(
     taken: list[int] = []
     for slot in slots:
         own = _load_of(world, slot)
-        if own is not None and world.step_max[slot] > 0.0 and cant_carry(world, slot, target) is Refusal.SUCCESS:
+        if own is not None and world.step_max[slot] > 0.0 and cant_carry(world, slot, target) is ActionResult.SUCCESS:
             order = Order(OrderKind.CAST, own.id, target=world.tag_of(target))
             taken += commands.give(world, [slot], order, queue=queue)
     return taken
@@ -300,12 +303,12 @@ def load_by_click(
 def _may_board(world: World, slot: int, carrier: int) -> bool:
     """Whether a unit would get in; workers rather repair what is damaged."""
     damaged = world.unit_type(slot).worker and world.life[carrier] < world.life_max[carrier]
-    return not damaged and cant_carry(world, carrier, slot) is Refusal.SUCCESS
+    return not damaged and cant_carry(world, carrier, slot) is ActionResult.SUCCESS
 
 
 def _load_of(world: World, slot: int) -> Ability | None:
     card = world.catalog.abilities_of(int(world.type[slot]))
-    return next((ability for ability in card if ability.does == "load"), None)
+    return next((ability for ability in card if ability.effect == "load"), None)
 
 
 SKILLS: Final = {

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands
+from simulator import buffs, commands, lifecycle
+from simulator.action_result import ActionResult
+from simulator.area_effects import AreaEffect
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import Field, source_slot
+from simulator.damage import apply_damage
 from simulator.placement import free_places
-from simulator.refusal import Refusal
 from simulator.skills import teleport
+from simulator.skills.projectiles import SPEED_UNKNOWN, flight_loops, throw
 from simulator.skills.skill import Skill, around, foes, lay, number
-from simulator.skills.throws import SPEED_UNKNOWN, flight_loops, throw
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,8 +41,8 @@ def _cloud(world: World, cast: Cast) -> None:
     lay(world, cast, "blinding_cloud", end=end, due=world.loop, effect=CLOUD_EFFECT, period=period)
 
 
-def _blinds(world: World, item: Field) -> None:
-    source = source_slot(world, item)
+def _blinds(world: World, item: AreaEffect) -> None:
+    source = world.slot_of(item.source)
     for slot in around(world, item.at, item.radius, plane="ground"):
         if world.owner[slot]:
             name = "BlindingCloudStructure" if world.unit_type(slot).structure else "BlindingCloud"
@@ -57,20 +57,20 @@ def _reach_out(world: World, cast: Cast) -> None:
     throw(world, cast, "abduct")
 
 
-def _can_pull(world: World, cast: Cast) -> Refusal:
+def _can_pull(world: World, cast: Cast) -> ActionResult:
     held = buffs.frenzied(world, cast.target) or buffs.has(world, cast.target, PULLED)
-    return Refusal.CANT_TARGET_THAT_UNIT if held else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if held else ActionResult.SUCCESS
 
 
-def _caught(world: World, item: Field) -> None:
+def _caught(world: World, item: AreaEffect) -> None:
     """The tentacle has its victim: that drops everything, comes out of the ground and is on its way."""
-    viper, slot = source_slot(world, item), world.slot_of(item.target)
+    viper, slot = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (viper, slot):
         return
     unit = world.unit_type(slot)
     standing = world.catalog.row_of_id.get(unit.unit_alias)
     if standing is not None and (unit.burrowed or unit.speed_n <= 0.0):
-        world.become(slot, world.catalog.units[standing])
+        lifecycle.become(world, slot, world.catalog.units[standing])
     world.queue[slot] = []
     commands.begin(world, slot, None)
     x, y = world.pos[viper].tolist()
@@ -79,13 +79,13 @@ def _caught(world: World, item: Field) -> None:
     loops = number(ability, "max_disable_loops")
     buffs.apply(world, slot, PULLED, source=viper, owner=item.owner, loops=loops)
     step = number(ability, "pull_speed_n") / LOOPS_PER_NORMAL_SECOND
-    world.fields.append(
-        Field("pull", item.owner, [place], step, world.loop, world.loop + loops, due=world.loop + 1,
+    world.area_effects.append(
+        AreaEffect("pull", item.owner, [place], step, world.loop, world.loop + loops, due=world.loop + 1,
               ability=item.ability, target=item.target)
     )  # fmt: skip
 
 
-def _pulls(world: World, item: Field) -> None:
+def _pulls(world: World, item: AreaEffect) -> None:
     """Bring the victim one step nearer; its ``radius`` is the step."""
     slot = world.slot_of(item.target)
     if slot == NOBODY or not buffs.has(world, slot, PULLED):
@@ -107,11 +107,11 @@ def _bomb(world: World, cast: Cast) -> None:
     throw(world, cast, "parasitic_bomb")
 
 
-def _infects(world: World, item: Field) -> None:
+def _infects(world: World, item: AreaEffect) -> None:
     slot = world.slot_of(item.target)
     if slot != NOBODY and not buffs.has(world, slot, BOMB):
         lasts = world.catalog.buff(BOMB).loops + world.catalog.buff(DELAY).loops
-        buffs.apply(world, slot, BOMB, source=source_slot(world, item), owner=item.owner, loops=lasts)
+        buffs.apply(world, slot, BOMB, source=world.slot_of(item.source), owner=item.owner, loops=lasts)
 
 
 def _spreads(world: World, slot: int, row: np.void) -> None:
@@ -127,7 +127,7 @@ def _spreads(world: World, slot: int, row: np.void) -> None:
 
 def _harms(world: World, slot: int, row: np.void) -> None:
     damage = number(world.catalog.ability(PARASITIC_BOMB), "damage_per_tick")
-    wound(world, int(row["source"]), int(row["owner"]), slot, damage)
+    apply_damage(world, int(row["source"]), int(row["owner"]), slot, damage)
 
 
 def _lingers(world: World, slot: int, row: np.void) -> None:
@@ -136,7 +136,7 @@ def _lingers(world: World, slot: int, row: np.void) -> None:
     if left <= 0.0:
         return
     x, y = world.pos[slot].tolist()
-    cloud = world.spawn(world.catalog.unit(BOMB_UNIT), int(row["owner"]), (x, y))
+    cloud = lifecycle.spawn(world, world.catalog.unit(BOMB_UNIT), int(row["owner"]), (x, y))
     buffs.apply(world, cloud, AFTER_BOMB, source=int(row["source"]), owner=int(row["owner"]), loops=left)
     teleport.live_until(world, cloud, world.loop + left + 1)
 
@@ -149,10 +149,10 @@ def _consume(world: World, cast: Cast) -> None:
     buffs.apply(world, cast.target, DRAINED, source=cast.slot)
 
 
-def _can_consume(world: World, cast: Cast) -> Refusal:
+def _can_consume(world: World, cast: Cast) -> ActionResult:
     full = world.energy[cast.slot] >= world.energy_max[cast.slot]
     unfit = world.unit_type(cast.target).name == "CreepTumorBurrowed"
-    return Refusal.CANT_TARGET_THAT_UNIT if full or unfit else Refusal.SUCCESS
+    return ActionResult.CANT_TARGET_THAT_UNIT if full or unfit else ActionResult.SUCCESS
 
 
 def _drains(world: World, cast: Cast) -> bool:
@@ -185,6 +185,6 @@ SKILLS: Final = {
         _consume, refuse=_can_consume, hold=_drains, end=_ends_draining, estimates=(SPEED_UNKNOWN,)
     ),
 }
-FIELDS: Final = {"blinding_cloud": _blinds, "abduct": _caught, "pull": _pulls, "parasitic_bomb": _infects}
+AREA_EFFECTS: Final = {"blinding_cloud": _blinds, "abduct": _caught, "pull": _pulls, "parasitic_bomb": _infects}
 TICKS: Final = {BOMB: _spreads, AFTER_BOMB: _spreads, INFECTED: _harms}
 FINALS: Final = {BOMB: _lingers}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import construction, power, prices
-from simulator.refusal import Refusal
+from simulator import construction, pathing, payments, power, prices
+from simulator.action_result import ActionResult
+from simulator.layers import layer_of
 from simulator.skills.skill import Skill
-from simulator.traits import layer_of
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -35,7 +35,7 @@ def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Po
     source = power.best(world, owner, point)
     if source is None or not _is_free(world, unit, point):
         return []
-    paid = prices.charge(world, owner, prices.cost_of(ability))
+    paid = payments.charge(world, owner, prices.cost_of(ability))
     slow = ability.numbers.get("slow_time_loops", ability.loops)
     loops = ability.numbers.get("fast_time_loops", FAST_LOOPS) if source.fast else slow
     construction.begin(world, unit, owner, point, loops=loops, paid=paid)
@@ -44,23 +44,23 @@ def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Po
     return [slot]
 
 
-def _can_warp_in(world: World, cast: Cast) -> Refusal:
+def _can_warp_in(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
-        return Refusal.CANT_FIND_PLACEMENT_LOCATION
+        return ActionResult.CANT_FIND_PLACEMENT_LOCATION
     return refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
 
 
-def refusal(world: World, player: int, unit: UnitType, point: Point) -> Refusal:
+def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
     """Why a player can't warp a unit in at a point, or success."""
     if power.best(world, player, point) is None:
-        return Refusal.CANT_BUILD_TOO_FAR_FROM_POWER
-    return Refusal.SUCCESS if _is_free(world, unit, point) else Refusal.CANT_WARP_IN_UNITS_THERE
+        return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
+    return ActionResult.SUCCESS if _is_free(world, unit, point) else ActionResult.CANT_WARP_IN_UNITS_THERE
 
 
 def _is_free(world: World, unit: UnitType, point: Point) -> bool:
     """Whether a unit's body touches nobody and no wall at a point."""
     at = np.array([point])
-    surface = world.ground.surface(layer_of(unit))
+    surface = pathing.surface(world.ground, layer_of(unit))
     if not surface.flat[surface.cell(at)][0]:
         return False
     live = world.live

@@ -9,10 +9,10 @@ from simulator.skills import (
     broods,
     corruptors,
     crawlers,
-    growth,
     infestors,
     larvae,
     lurkers,
+    morphs,
     nydus,
     overlords,
     queens,
@@ -24,14 +24,14 @@ from simulator.skills import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.skills.skill import BuffRule, FieldRule, Skill, UnitRule
+    from simulator.skills.skill import AreaEffectRule, BuffRule, Skill, UnitRule
     from simulator.world import World
 
 SKILLS: Final[dict[str, Skill]] = {
     **banelings.SKILLS,
     **corruptors.SKILLS,
     **crawlers.SKILLS,
-    **growth.SKILLS,
+    **morphs.SKILLS,
     **infestors.SKILLS,
     **larvae.SKILLS,
     **lurkers.SKILLS,
@@ -41,13 +41,13 @@ SKILLS: Final[dict[str, Skill]] = {
     **swarmhosts.SKILLS,
     **vipers.SKILLS,
 }
-FIELDS: Final[dict[str, FieldRule]] = {
-    **broods.FIELDS,
-    **infestors.FIELDS,
-    **larvae.FIELDS,
-    **ravagers.FIELDS,
-    **swarmhosts.FIELDS,
-    **vipers.FIELDS,
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
+    **broods.AREA_EFFECTS,
+    **infestors.AREA_EFFECTS,
+    **larvae.AREA_EFFECTS,
+    **ravagers.AREA_EFFECTS,
+    **swarmhosts.AREA_EFFECTS,
+    **vipers.AREA_EFFECTS,
 }
 TICKS: Final[dict[str, BuffRule]] = {
     **infestors.TICKS,

@@ -1,1 +1,1 @@
-"""The laws of the world, one file each; ``tick`` says in which order they apply."""
+"""The systems of the world, one file each; ``tick`` says in which order they run."""

@@ -155,10 +155,10 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
     wanted = gap <= sight
-    if census(world).picky:
+    if census(world).weapons_with_filters:
         wanted &= (gap >= world.least_range[seekers, None]) | (world.least_range[seekers, None] <= 0.0)
         wanted &= ~(world.spares_structures[seekers, None] & world.walled.take(foes))
-    if world.fields and some(world.zone_radius.take(seekers) > 0.0):
+    if world.area_effects and some(world.zone_radius.take(seekers) > 0.0):
         k, m = wanted.shape
         wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)
     rank = world.priority[foes] * PRIORITY_WEIGHT

@@ -12,11 +12,11 @@ import numpy as np
 
 from simulator import casting, commands
 from simulator.abilities import Aim
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
 from simulator.orders import Order, OrderKind
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -55,7 +55,7 @@ def _try(world: World, slot: int, ability: Ability) -> bool:
 
 def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
     """The cast that a unit would make of an ability now, or None."""
-    if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+    if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
         return None
     pick = casting.skill_of(ability).pick
     target = (pick or nearest)(world, slot, ability)
@@ -63,13 +63,15 @@ def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
         return None
     cast = Cast(slot, ability, target, begun=world.loop)
     aimless = target == NOBODY and (ability.requires_point or pick is not None)
-    return None if aimless or casting.aim_refusal(world, cast) is not Refusal.SUCCESS else cast
+    return None if aimless or casting.aim_refusal(world, cast) is not ActionResult.SUCCESS else cast
 
 
 def _tempted(world: World, slot: int, ability: Ability) -> bool:
     """Whether somebody is near who makes a unit use what is aimed at nobody, as when it comes out of the ground."""
     filters = ability.autocast_filters
-    return any(casting.fits(world, slot, other, filters) is Refusal.SUCCESS for other in _near(world, slot, ability))
+    return any(
+        casting.fits(world, slot, other, filters) is ActionResult.SUCCESS for other in _near(world, slot, ability)
+    )
 
 
 def nearest(world: World, slot: int, ability: Ability) -> int:
@@ -79,8 +81,8 @@ def nearest(world: World, slot: int, ability: Ability) -> int:
     for other in _near(world, slot, ability):
         if (
             other != slot
-            and casting.fits(world, slot, other, ability.autocast_filters) is Refusal.SUCCESS
-            and casting.aim_refusal(world, Cast(slot, ability, other)) is Refusal.SUCCESS
+            and casting.fits(world, slot, other, ability.autocast_filters) is ActionResult.SUCCESS
+            and casting.aim_refusal(world, Cast(slot, ability, other)) is ActionResult.SUCCESS
         ):
             return int(other)
     return NOBODY

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import geometry, pathing
 from simulator.arrays import some, which
 from simulator.contacts import within
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.columns import Bools, Ints
@@ -123,6 +123,6 @@ def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
     for layer in LAYERS:
         mine = layers == layer.value
         if layer is not AIR and some(mine):
-            surface = world.ground.surface(layer)
+            surface = pathing.surface(world.ground, layer)
             free[mine] = surface.flat[surface.cell(points[mine])]
     return free

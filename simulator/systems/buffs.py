@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simulator.arrays import some, which
-from simulator.skills import ENDS, TICKS
+from simulator.skills.registry import ENDS, TICKS
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -23,7 +24,7 @@ def run_out(world: World) -> None:
     world.buffs.rows = world.buffs.rows[~over]
     for row in ended:
         slot = int(row["slot"])
-        world.refresh(slot)
+        refresh(world, slot)
         rule = ENDS.get(world.catalog.buffs[int(row["buff"])].name)
         if rule is not None:
             rule(world, slot, row)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simulator import casting, commands, geometry
+from simulator.action_result import ActionResult
 from simulator.arrays import which
 from simulator.casts import Cast
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.columns import Ints
@@ -60,9 +60,9 @@ def _begin(world: World, cast: Cast) -> None:
     """Start preparing, or give up when it is not possible any more."""
     slot = cast.slot
     why = casting.refusal(world, slot, cast.ability)
-    if why is Refusal.SUCCESS:
+    if why is ActionResult.SUCCESS:
         why = casting.aim_refusal(world, cast)
-    if why is not Refusal.SUCCESS:
+    if why is not ActionResult.SUCCESS:
         _give_up(world, cast, why)
         return
     _face(world, cast)
@@ -76,12 +76,12 @@ def _begin(world: World, cast: Cast) -> None:
 
 def _take_effect(world: World, cast: Cast) -> None:
     slot, skill = cast.slot, casting.skill_of(cast.ability)
-    why = Refusal.SUCCESS
+    why = ActionResult.SUCCESS
     if world.cast_begun[slot] < world.loop and not world.bound[slot]:  # it took time to prepare: look again
         why = casting.refusal(world, slot, cast.ability)
-        if why is Refusal.SUCCESS and not casting.in_range(world, cast):
-            why = Refusal.TARGET_IS_OUT_OF_RANGE
-    if why is not Refusal.SUCCESS:
+        if why is ActionResult.SUCCESS and not casting.in_range(world, cast):
+            why = ActionResult.TARGET_IS_OUT_OF_RANGE
+    if why is not ActionResult.SUCCESS:
         _give_up(world, cast, why)
         return
     casting.perform(world, cast)
@@ -100,7 +100,7 @@ def finish(world: World, slot: int) -> None:
     commands.begin_next(world, slot)
 
 
-def _give_up(world: World, cast: Cast, why: Refusal) -> None:
+def _give_up(world: World, cast: Cast, why: ActionResult) -> None:
     casting.fail(world, cast, why)
     commands.begin_next(world, cast.slot)
 

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import geometry, pathing
 from simulator.arrays import some, which
 from simulator.census import census
 from simulator.columns import NOBODY
-from simulator.contacts import OVERLAP_ALLOWED, Bodies, Pairs
+from simulator.contacts import OVERLAP_ALLOWED, Pairs, bodies_of
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
 from simulator.systems import avoidance
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.columns import Bools, Ints
@@ -43,16 +43,16 @@ EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 
 
 def separate(world: World) -> None:
     """Carry out this loop's steps, push bodies apart and remember who could not get on."""
-    if not world.stirred and world.settled == world.population:
+    if not world.anyone_moved and world.resting_version == world.population:
         return
     slots = world.live
     before = world.pos.take(slots, 0)
-    after = before + world.intended.take(slots, 0) if world.stirred else before.copy()
+    after = before + world.intended.take(slots, 0) if world.anyone_moved else before.copy()
     crowded = _push_apart(world, slots, before, after)
     _keep_on_surfaces(world, slots, before, after)
     world.pos[slots] = after
-    world.settled = -1 if world.stirred or crowded else world.population
-    if world.stirred:
+    world.resting_version = -1 if world.anyone_moved or crowded else world.population
+    if world.anyone_moved:
         _note_blocked(world, slots, before, after)
 
 
@@ -62,16 +62,15 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
     Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
     that a crowd does not press itself together.
     """
-    if world.bodies is None:
-        world.bodies = Bodies.of(world)
-    found = world.bodies.near(after)
+    bodies = bodies_of(world)
+    found = bodies.near(after)
     if found is None:
         return False
     _part(after, found)
     start = after.copy()
     drifting = False
-    if world.bodies.any_flying:
-        flying = world.bodies.flying
+    if bodies.any_flying:
+        flying = bodies.flying
         soft = flying.take(found.one) | flying.take(found.other)
         drifting = _drift_apart(world, slots, after, _only(found, soft))
         found = _only(found, ~soft)
@@ -181,7 +180,7 @@ def _left(world: World, slots: Ints) -> Floats:
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
     """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
     firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
-    if census(world).pushovers:
+    if census(world).low_priority_bodies:
         firm *= world.lightness.take(slots)
     immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
     if some(immobile):
@@ -204,7 +203,7 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
             mine = _moved(mine, before, after)
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
-        surface = world.ground.surface(layer)
+        surface = pathing.surface(world.ground, layer)
         free = surface.open.take(surface.cell(after.take(mine, 0)))
         if np.count_nonzero(free) < len(free):
             near = _moved(mine[~free], before, after)

@@ -60,7 +60,7 @@ def _note_builders(world: World, sites: Ints) -> None:
 def is_work(world: World, slot: int) -> bool:
     """Whether a unit's order is to build."""
     ability = world.catalog.ability_of_id.get(int(world.order_ability[slot]))
-    return ability is not None and ability.does == "build"
+    return ability is not None and ability.effect == "build"
 
 
 def _grow(world: World, sites: Ints) -> None:

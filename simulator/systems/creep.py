@@ -13,7 +13,7 @@ import numpy as np
 from simulator import buffs
 from simulator.columns import NOBODY
 from simulator.creep import GENERATING, spreads
-from simulator.damage import wound
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _wither(world: World) -> None:
         return
     for slot in world.growth.withering.tolist():
         if world.build_progress[slot] >= 1.0 and not world.on_creep(slot):
-            wound(world, NOBODY, int(world.owner[slot]), slot, MECHANICS.off_creep_damage)
+            apply_damage(world, NOBODY, int(world.owner[slot]), slot, MECHANICS.off_creep_damage)
 
 
 @lru_cache(maxsize=4)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from simulator.arrays import some, which
 from simulator.columns import NOBODY
-from simulator.skills import DEATHS, FINALS
+from simulator.skills.registry import DEATHS, FINALS
 from simulator.world import Death
 
 if TYPE_CHECKING:

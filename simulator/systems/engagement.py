@@ -92,7 +92,7 @@ def _close_in(world: World, slots: Ints) -> None:
         near |= swinging & (gap <= reach + world.slop.take(slots))
     near &= gap >= world.reach_min.take(slots)
     near &= world.can_attack.take(slots)
-    if world.fields:
+    if world.area_effects:
         near &= inside_zone(world, slots, target)
     if kinds.beams:
         world.beaming[slots] &= near

@@ -1,8 +1,8 @@
 """Hits: what a weapon has let go happens when it is due, at once, as a missile or as a sweep.
 
-Between ``weapons``, which lays hits into ``pending`` at the damage point, and the laws that carry them out: ``damage``,
-``missiles``, ``sweeps``. The hits of a shot happen in the order of being due and fired; those of a dead attacker are
-lost.
+Between ``weapons``, which puts hits into ``pending`` at the damage point, and the rules that carry them out:
+``damage``, ``missiles``, ``sweeps``. The hits of a shot happen in the order of being due and fired; those of a dead
+attacker are lost.
 """
 
 from __future__ import annotations

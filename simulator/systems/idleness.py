@@ -21,7 +21,7 @@ IDLE: Final = int(OrderKind.IDLE)
 @lru_cache(maxsize=4)
 def _rows(catalog: Catalog) -> tuple[Bools, Bools]:
     """By unit row: who works, and which structures train."""
-    trains = [u.structure and any(a.does == "train" for a in catalog.abilities_of(u.row)) for u in catalog.units]
+    trains = [u.structure and any(a.effect == "train" for a in catalog.abilities_of(u.row)) for u in catalog.units]
     return np.array([u.worker for u in catalog.units]), np.array(trains)
 
 

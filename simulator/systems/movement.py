@@ -40,11 +40,11 @@ def move(world: World) -> None:
         walkers = which(wants)
         if walkers.size:
             _walk(world, walkers)
-        world.stirred = True
-    elif world.stirred:
+        world.anyone_moved = True
+    elif world.anyone_moved:
         world.speed[:n] = 0.0
         world.intended[:n] = 0.0
-        world.stirred = False
+        world.anyone_moved = False
     _face_targets(world)
 
 
@@ -72,7 +72,7 @@ def _face_targets(world: World) -> None:
 
 def _coasting(world: World) -> Ints:
     """Flyers that have speed left and nowhere to go."""
-    if not census(world).gliders:
+    if not census(world).drifting_flyers:
         return NOBODY_COASTS
     n = world.top
     left = (world.speed[:n] > 0.0) & ~world.wants[:n]

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry
+from simulator import geometry, pathing
 from simulator.arrays import some, which
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.columns import Ints
@@ -53,7 +53,7 @@ def find_ways(world: World) -> None:
 
 def _look_over(world: World, slots: Ints, layer: Layer) -> None:
     goal = world.goal[slots]
-    surface = world.ground.surface(layer)
+    surface = pathing.surface(world.ground, layer)
     straight = np.ones(len(slots), dtype=np.bool_)
     if layer is not AIR:
         straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))

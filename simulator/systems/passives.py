@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.skills import PASSIVES
+from simulator.skills.registry import PASSIVES
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 def run(world: World) -> None:
     """Run the rule of every type that has one, for all living units of the type."""
-    if world.natured_at != world.population:
+    if world.passive_units_at != world.population:
         _look_over(world)
-    for name, slots in world.natured.items():
+    for name, slots in world.passive_units.items():
         PASSIVES[name](world, slots)
 
 
 def _look_over(world: World) -> None:
     """List the units whose types have a rule, after somebody came or went."""
-    world.natured_at, world.natured = world.population, {}
+    world.passive_units_at, world.passive_units = world.population, {}
     for slot in world.live.tolist():
         name = world.unit_type(slot).name
         if name in PASSIVES:
-            world.natured.setdefault(name, []).append(slot)
+            world.passive_units.setdefault(name, []).append(slot)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simulator import power
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -16,4 +17,4 @@ def run(world: World) -> None:
         return
     world.powered_at = world.population
     for slot in power.supply(world):
-        world.refresh(slot)
+        refresh(world, slot)

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, casting, commands, placement, production, supply
+from simulator import buffs, casting, commands, lifecycle, placement, production, supply
 from simulator.columns import NOBODY
 from simulator.skills import carrier
 
 if TYPE_CHECKING:
-    from simulator.production import Job
+    from simulator.jobs import Job
     from simulator.records import UnitType
     from simulator.world import Rally, World
 
@@ -86,7 +86,7 @@ def _born(world: World, slot: int, job: Job) -> None:
     rally = rally_of(world, slot, unit)
     born: list[int] = []
     if not parent.structure:
-        world.become(slot, unit)
+        lifecycle.become(world, slot, unit)
         world.life[slot], world.energy[slot] = world.life_max[slot], world.stats.energy_start[owner, unit.row]
         commands.begin(world, slot, None)
         born = [slot]
@@ -108,7 +108,7 @@ def _put_outside(world: World, slot: int, parent: UnitType, unit: UnitType, rall
     length = math.hypot(across, along) or 1.0
     away = (parent.radius_shown + unit.radius + DOORSTEP) / length if parent.structure else 0.0
     place = placement.free_places(world, unit, (x + across * away, y + along * away), 1)[0]
-    new = world.spawn(unit, int(world.owner[slot]), place, math.atan2(along, across))
+    new = lifecycle.spawn(world, unit, int(world.owner[slot]), place, math.atan2(along, across))
     if unit.name in STOWED:
         world.stow(new, slot)
     return new
@@ -149,7 +149,7 @@ def _researched(world: World, slot: int, job: Job) -> None:
 def _changed(world: World, slot: int, job: Job) -> None:
     unit, owner = world.catalog.unit(job.makes), int(world.owner[slot])
     had_energy = bool(world.energy_max[slot])
-    world.become(slot, unit)
+    lifecycle.become(world, slot, unit)
     if not had_energy:
         world.energy[slot] = world.stats.energy_start[owner, unit.row]
     world.alert(owner, "MorphComplete")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from simulator import casting, commands, melee
+from simulator import casting, commands, lifecycle, melee
 from simulator.placement import free_places
 from simulator.places import Column, Grid, RandomPlace, kind_of_place
 from simulator.players import NEUTRAL, GameResult
@@ -49,7 +49,8 @@ def set_up(world: World) -> None:
     for units in scenario.units:
         create(world, units, placed=True)
     if scenario.melee:
-        melee.start(world)
+        for workers, field in melee.start(world):
+            commands.gather(world, workers, field)
 
 
 def act(world: World, action: Action, subject: int) -> None:
@@ -79,7 +80,7 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]
     alone = placed and spec.count == 1 and not unit.structure and kind_of_place(spec.at) in {"name", "point"}
     exact = spec.model_copy(update={"at": (point_of(world, spec.at),)}) if alone else spec
     for x, y, facing in _places(world, unit, exact):
-        slot = world.spawn(unit, spec.player, (x, y), facing)
+        slot = lifecycle.spawn(world, unit, spec.player, (x, y), facing)
         slots.append(slot)
         if spec.life is not None:
             world.life[slot] = min(spec.life, float(world.life_max[slot]))
@@ -87,7 +88,7 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]
             world.energy[slot] = min(spec.energy, float(world.energy_max[slot]))
         for name, count in spec.cargo.items():
             for _ in range(count):
-                world.stow(world.spawn(world.catalog.unit(name), spec.player, (x, y), facing), slot)
+                world.stow(lifecycle.spawn(world, world.catalog.unit(name), spec.player, (x, y), facing), slot)
     return slots
 
 
@@ -169,7 +170,7 @@ def _regroup(world: World, spec: RegroupSpec) -> None:
     for slot in old:
         world.remove(slot)
     for i, place in enumerate(_spots(world, unit, spec.at, len(lives) + spec.more)):
-        slot = world.spawn(unit, spec.player, (place[0], place[1]))
+        slot = lifecycle.spawn(world, unit, spec.player, (place[0], place[1]))
         if i < len(lives):
             world.life[slot] = lives[i]
 
@@ -228,7 +229,7 @@ def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> Non
     """Each transport among the slots unloads everybody at the point."""
     for slot in slots:
         card = world.catalog.cards[int(world.type[slot])]
-        ability = next((ability for ability in card if ability.does == "unload_all_at"), None)
+        ability = next((ability for ability in card if ability.effect == "unload_all_at"), None)
         if ability is not None:
             casting.use(world, [slot], ability, point=point, queue=queue)
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simulator import geometry
+from simulator.fog import remember
+from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
-from simulator.snapshots import remember
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.
     """(k,) whether a detector or a scan of the player's reaches each unit's edge."""
     eyes = world.units_of(player)
     eyes = eyes[world.detects[eyes] > 0.0]
-    scans = [item for item in world.fields if item.detects and item.owner == player]
+    scans = [item for item in world.area_effects if item.detects and item.owner == player]
     at = np.concatenate((world.pos[eyes], np.array([item.at for item in scans]).reshape(-1, 2)))
     reach = np.concatenate((world.detects[eyes], np.array([item.radius for item in scans])))
     offset = world.pos[slots][:, None, :] - at
@@ -105,7 +105,7 @@ def _light(world: World, player: int) -> None:
 
 def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]]:
     """Places that a player sees without a unit there, with the radius: by his fields, and by his buffs on others."""
-    lights = [(item.at, item.sights) for item in world.fields if item.sights and item.owner == player]
+    lights = [(item.at, item.sights) for item in world.area_effects if item.sights and item.owner == player]
     rows = world.buffs.rows
     for row in rows[np.isin(rows["buff"], _lighting(world.catalog)) & (rows["owner"] == player)] if len(rows) else ():
         x, y = world.pos[int(row["slot"])].tolist()

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from simulator.api.layers import Frame
     from simulator.api.painting.palette import Colour
     from simulator.api.projection import Screen
-    from simulator.fields import Field
+    from simulator.area_effects import AreaEffect
 
     Image = NDArray[np.uint8]
     Point = tuple[float, float]
@@ -103,9 +103,9 @@ OTHER = Manner((240, 240, 240), 0.2, above=False)
 """How an effect is painted that has no manner of its own."""
 
 
-def paint_below(image: Image, frame: Frame, screen: Screen) -> list[Field]:
+def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
     """Paints the effects that lie on the ground, and returns those that hang above."""
-    if not frame.world.fields:
+    if not frame.world.area_effects:
         return []
     fields = seen_fields(frame.world, frame.player, through_fog=not frame.fogged)
     above = [field for field in fields if MANNERS.get(field.effect, OTHER).above]
@@ -113,13 +113,13 @@ def paint_below(image: Image, frame: Frame, screen: Screen) -> list[Field]:
     return above
 
 
-def paint_above(image: Image, frame: Frame, screen: Screen, fields: list[Field]) -> None:
+def paint_above(image: Image, frame: Frame, screen: Screen, fields: list[AreaEffect]) -> None:
     """Paints the effects that hang over the units."""
     if fields:
         _paint(image, frame, screen, fields)
 
 
-def _paint(image: Image, frame: Frame, screen: Screen, fields: list[Field]) -> None:
+def _paint(image: Image, frame: Frame, screen: Screen, fields: list[AreaEffect]) -> None:
     for field in fields:
         manner, age = MANNERS.get(field.effect, OTHER), frame.world.loop - field.begun
         edge = palette.mix(manner.colour, palette.LIVERIES[_side(field, frame)].dot, EDGE_SIDE)
@@ -137,7 +137,7 @@ def _in_view(centre: Point, reach: float, screen: Screen) -> bool:
     return -reach < x < screen.columns + reach and -reach < y < screen.rows + reach
 
 
-def _side(field: Field, frame: Frame) -> int:
+def _side(field: AreaEffect, frame: Frame) -> int:
     owner = np.array([field.owner or API_NEUTRAL])
     alliance = alliance_of(np.array([field.owner]), frame.player)
     return int(palette.sides(owner, alliance, frame.player)[0])

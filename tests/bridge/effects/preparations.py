@@ -8,10 +8,11 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from simulator import buffs, casting, commands, harvesting, production, targets
+from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
 from simulator.abilities import Aim
 from simulator.skills import addons
 from simulator.tick import advance
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,11 +30,11 @@ LONG = 1.0e6
 
 def prepare_for(caster: str, ability: Ability) -> Preparation | None:
     """What has to happen before a unit of this type can use an ability; None for nothing."""
-    if ability.does in {"cancel", "cancel_growth", "cancel_morph"}:
-        return _begin(ability.link, ability.does)
-    if (caster, ability.does) in OF_UNIT:
-        return OF_UNIT[caster, ability.does]
-    return PREPARE.get(ability.does)
+    if ability.effect in {"cancel", "cancel_growth", "cancel_morph"}:
+        return _begin(ability.link, ability.effect)
+    if (caster, ability.effect) in OF_UNIT:
+        return OF_UNIT[caster, ability.effect]
+    return PREPARE.get(ability.effect)
 
 
 # --- what the unit does already -----------------------------------------------------------------------------------
@@ -73,14 +74,14 @@ def _begin(link: str, does: str) -> Preparation:
         name = world.unit_type(slot).name
         before = next((a for a in world.catalog.abilities if a.numbers.get("cocoon") == name), None)
         if before is not None:
-            world.become(slot, world.catalog.unit(before.users[0]))
+            lifecycle.become(world, slot, world.catalog.unit(before.users[0]))
         x, y = world.pos[slot].tolist()
         for ability in world.catalog.abilities_of(int(world.type[slot])):
-            wanted = before is ability or (before is None and ability.link == link and ability.does != does)
+            wanted = before is ability or (before is None and ability.link == link and ability.effect != does)
             if does == "cancel_morph":
-                wanted = ability.does in {"morph", "root"} and ability.loops + ability.prep_loops > 0
+                wanted = ability.effect in {"morph", "root"} and ability.loops + ability.prep_loops > 0
             if does == "cancel_growth" and before is None:
-                wanted = ability.does == "grow"
+                wanted = ability.effect == "grow"
             point = (x, y) if Aim.POINT in ability.aim and Aim.NONE not in ability.aim else None
             if wanted and casting.use(world, [slot], ability, point=point):
                 advance(world, 4 if does == "cancel" else 16)
@@ -93,7 +94,7 @@ def _begin(link: str, does: str) -> Preparation:
 
 def _in_the_making(world: World, slot: int) -> None:
     world.build_progress[slot], world.build_loops[slot] = 0.5, 1000.0
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def _at_work(world: World, slot: int) -> None:
@@ -101,9 +102,9 @@ def _at_work(world: World, slot: int) -> None:
     x, y = world.pos[slot].tolist()
     site = slot
     if world.unit_type(slot).worker:
-        site = world.spawn(world.catalog.unit("SupplyDepot"), 1, (x - 3.0, y + 3.0))
+        site = lifecycle.spawn(world, world.catalog.unit("SupplyDepot"), 1, (x - 3.0, y + 3.0))
     else:
-        slot = world.spawn(world.catalog.unit("SCV"), 1, (x, y - 3.5))
+        slot = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (x, y - 3.5))
     _in_the_making(world, site)
     assert casting.smart(world, [slot], target=world.tag_of(site))
     advance(world, 40)
@@ -127,14 +128,14 @@ def _hungry(world: World, slot: int) -> None:
 
 
 def _foe(world: World, point: Point) -> int:
-    slot = world.spawn(world.catalog.unit(FOE), 2, point)
+    slot = lifecycle.spawn(world, world.catalog.unit(FOE), 2, point)
     world.looks_around[slot] = False
     return slot
 
 
 def _fill(world: World, slot: int) -> None:
     """A passenger in the carrier."""
-    passenger = world.spawn(world.catalog.unit("SCV"), 1, tuple(world.pos[slot].tolist()))
+    passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, tuple(world.pos[slot].tolist()))
     world.stow(passenger, slot)
 
 
@@ -143,33 +144,37 @@ def _man(world: World, slot: int) -> None:
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     x, y = world.pos[slot].tolist()
     for name in ("Marine", "Marauder"):
-        world.stow(world.spawn(world.catalog.unit(name), 1, (x, y)), slot)
+        world.stow(lifecycle.spawn(world, world.catalog.unit(name), 1, (x, y)), slot)
     for passenger in world.passengers(slot):
         world.pos[passenger] = x, y
-        world.refresh(passenger)
+        refresh(world, passenger)
     targets.engage(world, world.passengers(slot)[0], _foe(world, (x, y + 4.0)))
 
 
 def _split(world: World, slot: int) -> None:
     """An Adept in its phase shift, or the shade of one."""
     x, y = world.pos[slot].tolist()
-    adept = slot if world.unit_type(slot).name == "Adept" else world.spawn(world.catalog.unit("Adept"), 1, (x, y + 1.0))
+    adept = (
+        slot
+        if world.unit_type(slot).name == "Adept"
+        else lifecycle.spawn(world, world.catalog.unit("Adept"), 1, (x, y + 1.0))
+    )
     casting.use(world, [adept], world.catalog.ability(2544), point=(x + 4.0, y))
     advance(world, 4)
     if adept != slot:
-        world.fields[-1].target = world.tag_of(slot)
+        world.area_effects[-1].target = world.tag_of(slot)
 
 
 def _worker(world: World, slot: int) -> None:
     """A worker beside a structure that takes workers in."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("SCV"), 1, (x, y - 4.0))
+    lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (x, y - 4.0))
 
 
 def _drained(world: World, slot: int) -> None:
     """A Stalker without shields beside a battery."""
     x, y = world.pos[slot].tolist()
-    stalker = world.spawn(world.catalog.unit("Stalker"), 1, (x - 1.5, y + 3.0))
+    stalker = lifecycle.spawn(world, world.catalog.unit("Stalker"), 1, (x - 1.5, y + 3.0))
     world.shields[stalker] = 5.0
     world.damaged_loop[stalker] = LONG
     advance(world, 2)
@@ -184,15 +189,15 @@ def _recharge(world: World, slot: int) -> None:
 def _battery(world: World, slot: int) -> None:
     """A Shield Battery with power beside a Nexus."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("Pylon"), 1, (x - 4.0, y - 4.0))
-    world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.0, y))
+    lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y - 4.0))
+    lifecycle.spawn(world, world.catalog.unit("ShieldBattery"), 1, (x - 4.0, y))
     advance(world, 2)
 
 
 def _with_tech_lab(world: World, slot: int) -> None:
     """A structure with a TechLab at its side."""
     lab = world.catalog.unit(f"{world.unit_type(slot).name}TechLab")
-    world.addon[slot] = world.spawn(lab, 1, addons.place_of(world, slot))
+    world.addon[slot] = lifecycle.spawn(world, lab, 1, addons.place_of(world, slot))
 
 
 def _know(upgrade: str) -> Preparation:
@@ -205,8 +210,8 @@ def _at_it(producer: str, ability: int, makes: str) -> Preparation:
 
     def prepare(world: World, slot: int) -> None:
         x, y = world.pos[slot].tolist()
-        other = world.spawn(world.catalog.unit(producer), 1, (x - 4.0, y - 6.0))
-        world.spawn(world.catalog.unit("Pylon"), 1, (x - 1.0, y - 4.5))
+        other = lifecycle.spawn(world, world.catalog.unit(producer), 1, (x - 4.0, y - 6.0))
+        lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 1.0, y - 4.5))
         production.enqueue(world, other, world.catalog.ability(ability), makes=makes, loops=2000.0)
         advance(world, 2)
 

@@ -17,8 +17,10 @@ from bridge.available import available, question
 from bridge.compat import features, point
 from bridge.knowledge import knowledge
 from bridge.snapshot import Snapshot
+from simulator import lifecycle
 from simulator.api import bookmark
 from simulator.client import Client, interface
+from simulator.traits import refresh
 
 from .effect import Seen
 
@@ -101,7 +103,7 @@ class Stage:
         world.growth.paint(*CREEP)
         for owner, group in ((1, OWN), (2, FOES), (0, NEUTRAL)):
             for name, x, y in group:
-                slot = world.spawn(world.catalog.unit(name), owner, (x, y))
+                slot = lifecycle.spawn(world, world.catalog.unit(name), owner, (x, y))
                 world.energy[slot] = world.energy_max[slot]
                 world.looks_around[slot] = False
                 world.autocast.pop(slot, None)
@@ -117,7 +119,7 @@ class Stage:
             place = _usual_place(unit)
         if not unit.structure:  # a structure may have to research them
             _grant_all(world)
-        slot = world.spawn(unit, 1, place)
+        slot = lifecycle.spawn(world, unit, 1, place)
         world.energy[slot] = world.energy_max[slot]
         world.looks_around[slot] = False
         world.autocast.pop(slot, None)
@@ -219,11 +221,11 @@ class _Opener(pickle.Unpickler):
 
 def _grant_all(world: World) -> None:
     """Gives the player every upgrade at once, which is much faster than one after the other."""
-    names = (ability.upgrade for ability in world.catalog.abilities if ability.does == "research")
+    names = (ability.upgrade for ability in world.catalog.abilities if ability.effect == "research")
     world.players[1].upgrades = sorted({world.catalog.upgrade(name).id for name in names})
     world.stats.apply(1, world.players[1].upgrades)
     for slot in world.units_of(1).tolist():
-        world.refresh(slot)
+        refresh(world, slot)
 
 
 def _usual_place(unit: UnitType) -> Point:

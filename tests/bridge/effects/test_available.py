@@ -7,6 +7,7 @@ import pytest
 from bridge.functions import functions
 from bridge.knowledge import knowledge
 from simulator import commands
+from simulator.traits import refresh
 
 from .stage import Stage
 
@@ -49,7 +50,7 @@ def test_what_is_not_finished_can_only_be_called_off(gateway: Stage) -> None:
     world = gateway.world
     slot = world.slot_of(gateway.caster)
     world.build_progress[slot] = 0.5
-    world.refresh(slot)
+    refresh(world, slot)
     abilities = gateway.look().snapshot.abilities
     assert abilities is not None
     cancel = {functions()[name].ability_id for name in ("Cancel_quick", "Cancel_BuildInProgress_quick")}

@@ -31,7 +31,7 @@ def special(version: str) -> dict[int, AbilityFacts]:
 @pytest.mark.parametrize(
     ("field", "expected"),
     [
-        ("does", lambda row: row.does),
+        ("does", lambda row: row.effect),
         ("general", lambda row: row.general or None),
         ("target", lambda row: next(name for name, aim in AIMS.items() if aim == row.aim)),
         ("range", lambda row: None if row.range >= EVERYWHERE else row.range),
@@ -58,7 +58,7 @@ def test_a_fact_is_that_of_the_tables(
     ("field", "loops"),
     [
         ("cooldown_s", lambda row: row.cooldown_loops or (row.charges.loops if row.charges else 0)),
-        ("time_s", lambda row: row.loops if row.unit or row.does == "research" else 0),
+        ("time_s", lambda row: row.loops if row.unit or row.effect == "research" else 0),
     ],
 )
 def test_a_time_is_that_of_the_tables_in_seconds(
@@ -96,7 +96,7 @@ def test_every_ability_of_a_command_card_that_does_something_is_known(version: s
     legacy = {number for number in cards if number not in abilities(version)}
     named = {function.ability_id for function in functions().values()}
     assert legacy & named == set()
-    assert {tables.ability(number).does for number in legacy} <= {"research", "morph"}
+    assert {tables.ability(number).effect for number in legacy} <= {"research", "morph"}
 
 
 def _count(need: Need, owned: set[str], names: dict[str, str], addon: str) -> float:

@@ -129,7 +129,7 @@ def test_units_that_are_trained_built_or_warped_in_have_a_producer(
     version: str, tables: Catalog, names: dict[str, str]
 ) -> None:
     kinds = {"train", "build", "warp_in", "build_addon"}
-    products = {a.unit for a in tables.abilities if a.does in kinds and a.users} & names.keys()
+    products = {a.unit for a in tables.abilities if a.effect in kinds and a.users} & names.keys()
     assert {names[product] for product in products if not knowledge(version)[names[product]].producers} == set()
 
 

@@ -28,7 +28,7 @@ def test_prices_times_and_places_are_those_of_the_research(
         assert (known.id, known.melee) == (row.id, row.researchable), name
         if known.melee:
             research = tables.ability(known.ability)
-            assert (research.does, research.upgrade) == ("research", row.name), name
+            assert (research.effect, research.upgrade) == ("research", row.name), name
             assert (known.minerals, known.vespene) == (research.minerals, research.vespene), name
             assert known.at == tuple(names[place] for place in research.users), name
             assert known.time_s == pytest.approx(research.loops / 22.4, abs=0.006), name

@@ -9,6 +9,7 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import lifecycle
 from simulator.api.game import Game, Setup
 from simulator.api.observation import observe
 from simulator.mapfile import read_map
@@ -62,7 +63,7 @@ class Table:
         return self.game.world
 
     def put(self, name: str, owner: int, x: float, y: float, facing: float = 0.0) -> int:
-        return self.world.spawn(self.world.catalog.unit(name), owner, (x, y), facing)
+        return lifecycle.spawn(self.world, self.world.catalog.unit(name), owner, (x, y), facing)
 
     def respond(self) -> sc.ResponseObservation:
         return sc.ResponseObservation.FromString(b"".join(observe(self.game, self.seat)))

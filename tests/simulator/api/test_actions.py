@@ -8,12 +8,18 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, raw_pb2, spatial_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from simulator import casting
+from simulator.abilities import Ability
+from simulator.action_result import ActionResult
+from simulator.api import game
 from simulator.casting import is_modelled
 from simulator.catalog import load_catalog
 from simulator.client import Client, command, interface
 from simulator.status import Status
+from simulator.world import World
 
 OBSERVER, STALKER, ZEALOT, PROBE, PHOENIX, NEXUS = 82, 74, 73, 84, 78, 59
+BLINK, GENERAL_BLINK = 1442, 3687
 GENERAL_STOP, GENERAL_HOLD, GENERAL_MOVE, GENERAL_PATROL, GENERAL_ATTACK = 3665, 3793, 3794, 3795, 3674
 ABILITIES = tuple({a.id: a for card in load_catalog().cards for a in card if is_modelled(a)}.values())
 Result = error_pb2.ActionResult
@@ -205,6 +211,51 @@ def test_several_actions_are_done_and_reported_in_their_order() -> None:
     seen = client.step(4)
     assert [action.action_raw.unit_command.ability_id for action in seen.actions] == [16, 18, 23]
     assert [order.ability_id for order in seen.observation.raw_data.units[0].orders] == [23]
+
+
+def judgements(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The abilities whose use is judged from now on, in order.
+
+    The engine, which looks again when a unit begins, stands still.
+    """
+    asked: list[int] = []
+    refusal = casting.refusal
+
+    def counted(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
+        asked.append(ability.id)
+        return refusal(world, slot, ability, free=free)
+
+    def stand_still(world: World, loops: int) -> None:
+        world.loop += loops
+
+    monkeypatch.setattr(casting, "refusal", counted)
+    monkeypatch.setattr(game, "advance", stand_still)
+    return asked
+
+
+def blinkers(count: int) -> Client:
+    everything = debug_pb2.DebugCommand(game_state=debug_pb2.tech_tree)
+    return stage(everything, *make(STALKER, 1, *[(16.0 + 2 * n, 16.0) for n in range(count)]))
+
+
+@pytest.mark.parametrize("asked", [GENERAL_BLINK, BLINK])
+def test_an_order_is_judged_once(monkeypatch: pytest.MonkeyPatch, asked: int) -> None:
+    client = blinkers(1)
+    order = command(asked, tags(client), point=(20.0, 20.0))
+    judged = judgements(monkeypatch)
+    assert client.act(order) == [Result.Value("Success")]
+    client.ask(step=sc.RequestStep(count=1))
+    assert judged == [BLINK]
+
+
+def test_an_order_is_judged_again_if_another_has_taken_effect_since(monkeypatch: pytest.MonkeyPatch) -> None:
+    client = blinkers(2)
+    orders = [command(GENERAL_BLINK, [tag], point=(20.0, 20.0)) for tag in tags(client)]
+    judged = judgements(monkeypatch)
+    assert client.act(*orders) == [Result.Value("Success")] * 2
+    assert judged == [BLINK] * 2
+    client.ask(step=sc.RequestStep(count=1))
+    assert judged == [BLINK] * 3
 
 
 def test_a_raw_command_is_also_told_as_a_click() -> None:

@@ -13,7 +13,7 @@ from simulator import buffs
 from simulator.api import layers
 from simulator.api.layers import Frame
 from simulator.api.sight import Display
-from simulator.fields import Field
+from simulator.area_effects import AreaEffect
 
 SCREEN = {
     1: "creep power selected hallucinations cloaked blip active buildable pathable placeholder",
@@ -133,13 +133,13 @@ def test_density_counts_the_units_on_a_pixel(make_table: Any) -> None:
 # what lies on ground and units ----------------------------------------------------------------------------------------
 
 
-def field(owner: int, x: float, y: float, *, radius: float = 2.0, effect: int = 1) -> Field:
-    return Field("storm", owner, [(x, y)], radius, 0, 100, effect=effect)
+def field(owner: int, x: float, y: float, *, radius: float = 2.0, effect: int = 1) -> AreaEffect:
+    return AreaEffect("storm", owner, [(x, y)], radius, 0, 100, effect=effect)
 
 
 def test_an_effect_is_a_disc_of_its_id_and_radius(make_table: Any) -> None:
     table = make_table(options((128, 128)))
-    table.world.fields += [field(2, 16, 16), field(1, 24, 8, radius=1.0, effect=11), field(1, 4, 4, effect=0)]
+    table.world.area_effects += [field(2, 16, 16), field(1, 24, 8, radius=1.0, effect=11), field(1, 4, 4, effect=0)]
     image = table.screen("effects")
     assert set(np.unique(image)) == {0, 1, 11}
     assert np.count_nonzero(image == 1) == pytest.approx(np.pi * (2 * 4) ** 2, rel=0.05)
@@ -148,7 +148,7 @@ def test_an_effect_is_a_disc_of_its_id_and_radius(make_table: Any) -> None:
 
 def test_effects_in_the_fog_are_told_to_their_owner_alone(make_table: Any) -> None:
     table = make_table(options(), fog=True)
-    table.world.fields += [field(2, 8, 8), field(1, 24, 24, effect=6)]
+    table.world.area_effects += [field(2, 8, 8), field(1, 24, 24, effect=6)]
     assert set(np.unique(table.screen("effects"))) == {0, 6}
     table.put("Stalker", 1, 8, 12)
     table.game.step(8)

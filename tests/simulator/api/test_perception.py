@@ -9,9 +9,9 @@ from s2clientprotocol import raw_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator import buffs, casting
+from simulator.action_result import ActionResult
 from simulator.api.sight import Display
 from simulator.client import command
-from simulator.refusal import Refusal
 from simulator.tick import advance
 from simulator.world import Mishap
 
@@ -158,8 +158,8 @@ def test_a_transport_tells_who_is_inside(make_table: Any) -> None:
 def test_an_order_that_failed_on_the_way_is_an_action_error_once(make_table: Any) -> None:
     table = make_table(RAW)
     tag = table.world.tag_of(table.put("Marine", 1, 10, 16))
-    table.world.mishaps.append(Mishap(1, 1, tag, 380, Refusal.NOT_ENOUGH_ENERGY))
-    table.world.mishaps.append(Mishap(1, 2, tag, 380, Refusal.COOLDOWN))
+    table.world.mishaps.append(Mishap(1, 1, tag, 380, ActionResult.NOT_ENOUGH_ENERGY))
+    table.world.mishaps.append(Mishap(1, 2, tag, 380, ActionResult.COOLDOWN))
     errors = table.respond().action_errors
     assert [(e.unit_tag, e.ability_id, e.result) for e in errors] == [(tag, 380, 17)]
     assert not table.respond().action_errors

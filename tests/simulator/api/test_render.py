@@ -17,9 +17,9 @@ from simulator.api.painting import palette, sprites
 from simulator.api.painting.silhouettes import CODES, OUTLINES, code_of, outline_of
 from simulator.api.sight import OBSERVER, Alliance
 from simulator.api.viewer import Viewer
+from simulator.area_effects import AreaEffect
 from simulator.catalog import VERSION_OF_BUILD, load_catalog
 from simulator.client import Client, command, interface
-from simulator.fields import Field
 
 Image = NDArray[Any]
 
@@ -109,7 +109,9 @@ def test_images_of_every_size_can_be_painted_from_everywhere(
     table = make_table(sc.InterfaceOptions(render=setup(screen, minimap, width)), "braxis_ledge")
     for k, name in enumerate(("Nexus", "Zergling", "Carrier", "ForceField", "MineralField", "Larva")):
         table.put(name, k % 3, 5.0 * k + 1, 16.0)
-    table.world.fields += [Field("any", 2, [(9.0, 9.0), (40.0, 9.0)], 2.0, 0, 9, effect=k) for k in range(1, 14)]
+    table.world.area_effects += [
+        AreaEffect("any", 2, [(9.0, 9.0), (40.0, 9.0)], 2.0, 0, 9, effect=k) for k in range(1, 14)
+    ]
     table.seat.hands.camera = camera  # farther off than a client can point it
     sent = table.observe().render_data
     assert len(sent.map.data) == 3 * screen[0] * screen[1]
@@ -204,7 +206,7 @@ def test_a_buff_is_a_pip_below_its_bearer(make_table: Any, caster: int, colour: 
 def test_an_effect_is_painted_in_its_radius(make_table: Any) -> None:
     table = make_table(options())
     bare = table.picture()
-    table.world.fields.append(Field("storm", 2, [(16.0, 16.0)], 1.5, 0, 100, effect=1))
+    table.world.area_effects.append(AreaEffect("storm", 2, [(16.0, 16.0)], 1.5, 0, 100, effect=1))
     rows, columns = np.nonzero((table.picture() != bare).any(axis=2))
     for changed in (rows, columns):
         assert changed.min() == pytest.approx(96 - 12, abs=2)
@@ -263,7 +265,7 @@ def test_what_a_player_does_not_see_leaves_no_trace(make_table: Any) -> None:
         if enemies:
             for x in (22.0, 24.0):
                 table.put("Marine", 2, x, 24)
-            table.world.fields.append(Field("storm", 2, [(22.0, 22.0)], 1.5, 0, 100, effect=1))
+            table.world.area_effects.append(AreaEffect("storm", 2, [(22.0, 22.0)], 1.5, 0, 100, effect=1))
             table.put("DarkTemplar", 2, 8, 6)
         table.game.step(1)
         pictures += [table.picture(), table.overview()]
@@ -465,7 +467,7 @@ def test_effects_and_power_are_told_in_raw_data(make_table: Any) -> None:
     table = make_table(sc.InterfaceOptions(raw=True))
     pylon = table.put("Pylon", 1, 10, 12)
     table.put("Nexus", 1, 24, 12)  # hastens warping in, and powers nothing
-    table.world.fields.append(Field("bile", 2, [(16.0, 18.0)], 0.5, 0, 100, effect=11))
+    table.world.area_effects.append(AreaEffect("bile", 2, [(16.0, 18.0)], 0.5, 0, 100, effect=11))
     raw = table.observe().raw_data
     (effect,) = raw.effects
     assert (effect.effect_id, effect.owner, effect.alliance, effect.radius) == (11, 2, Alliance.ENEMY, 0.5)

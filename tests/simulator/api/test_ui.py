@@ -68,10 +68,10 @@ def test_a_click_on_the_production_panel_calls_a_job_off(table: Table) -> None:
     select(table, nexus)
     click = sc.Action()
     click.action_ui.production_panel.unit_index = 1
-    assert judge(table.seat, click) == 1
+    assert judge(table.seat, click).result == 1
     perform(table.seat, click, 1)
     assert len(table.world.jobs[nexus]) == 1
-    assert judge(table.seat, click) != 1
+    assert judge(table.seat, click).result != 1
 
 
 def test_a_transport_with_somebody_inside_has_the_cargo_panel(table: Table) -> None:
@@ -242,6 +242,6 @@ def test_enemies_obey_when_a_player_controls_them(table: Table) -> None:
     action.action_raw.unit_command.unit_tags.append(table.world.tag_of(foe))
     action.action_raw.unit_command.target_world_space_pos.x = 40.0
     action.action_raw.unit_command.target_world_space_pos.y = 40.0
-    assert judge(table.seat, action) != 1
+    assert judge(table.seat, action).result != 1
     switch(table, debug_pb2.control_enemy)
-    assert judge(table.seat, action) == 1
+    assert judge(table.seat, action).result == 1

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting, commands
+from simulator import buffs, casting, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, load_catalog
 from simulator.columns import NOBODY
 from simulator.maps import GameMap, map_from
 from simulator.players import PlayerSetup
-from simulator.refusal import Refusal
 from simulator.scenariofile import parse_scenario
 from simulator.tick import advance
 from simulator.world import World
@@ -51,7 +51,7 @@ class Field:
         unit = self.world.catalog.unit(name)
         if unit.structure and unit.needs_creep:
             self._paint_creep(x, y)
-        return self.world.spawn(unit, owner, (x, y), facing)
+        return lifecycle.spawn(self.world, unit, owner, (x, y), facing)
 
     def still(self, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
         """Put a unit that stays where it is and fights nobody."""
@@ -78,11 +78,13 @@ class Field:
 
     def why_not(
         self, slot: int, ability: int, target: int = NOBODY, point: tuple[float, float] | None = None
-    ) -> Refusal:
+    ) -> ActionResult:
         """Why a unit can't use an ability like this now."""
         number = self.world.catalog.ability(ability)
         why = casting.refusal(self.world, slot, number)
-        return casting.aim_refusal(self.world, Cast(slot, number, target, point)) if why is Refusal.SUCCESS else why
+        return (
+            casting.aim_refusal(self.world, Cast(slot, number, target, point)) if why is ActionResult.SUCCESS else why
+        )
 
     def research(self, player: int, *names: str) -> None:
         for name in names:

@@ -48,7 +48,7 @@ def _give(world: World, player: int, slot: int, ability: int, chance: random.Ran
         point = (x + chance.uniform(-9, 9), y + chance.uniform(-9, 9))
     queue = chance.random() < 0.2
     command = abilities.Command(ability, (world.tag_of(slot),), target, point, queue)
-    abilities.carry_out(world, player, command)
+    abilities.carry_out(world, abilities.judge(world, player, command))
 
 
 def check(world: World) -> None:

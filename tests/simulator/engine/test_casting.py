@@ -9,10 +9,10 @@ import pytest
 
 from simulator import buffs, casting, commands
 from simulator.abilities import Aim, Filter, Need
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
-from simulator.skills import SKILLS
+from simulator.skills.registry import SKILLS
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Trick:
         self.held = 0
         self.ended: list[int] = []
         self.lasts = lasts
-        self.refusal = Refusal.SUCCESS
+        self.refusal = ActionResult.SUCCESS
 
     def skill(self) -> Skill:
         hold = self.hold if self.lasts else None
@@ -56,7 +56,7 @@ def trick(monkeypatch: pytest.MonkeyPatch) -> Trick:
 
 def ability(field: Any, **changes: Any) -> Ability:
     """An ability like no other, known to the field's own catalog."""
-    made: Ability = dataclasses.replace(field.world.catalog.abilities[0], id=1, does="trick", link="Trick", **changes)
+    made: Ability = dataclasses.replace(field.world.catalog.abilities[0], id=1, effect="trick", link="Trick", **changes)
     field.world.catalog = dataclasses.replace(
         field.world.catalog, ability_of_id={**field.world.catalog.ability_of_id, 1: made}
     )
@@ -72,19 +72,19 @@ def caster(field: Any, x: float = 10.0, y: float = 16.0) -> int:
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"energy": 101.0}, Refusal.NOT_ENOUGH_ENERGY),
-        ({"energy": 100.0}, Refusal.SUCCESS),
-        ({"life": 40.0}, Refusal.NOT_ENOUGH_LIFE),
-        ({"minerals": 1}, Refusal.NOT_ENOUGH_MINERALS),
-        ({"vespene": 1}, Refusal.NOT_ENOUGH_VESPENE),
-        ({"requires": Need("unit", "Nexus", "done")}, Refusal.TECH_REQUIREMENTS_NOT_MET),
-        ({"requires": Need("upgrade", "PsiStormTech", "done")}, Refusal.TECH_REQUIREMENTS_NOT_MET),
-        ({"shown_if": Need("behavior", "PsiStorm", "done")}, Refusal.TECH_REQUIREMENTS_NOT_MET),
-        ({"requires": Need("not", parts=(Need("unit", "Nexus", "done"),))}, Refusal.SUCCESS),
+        ({"energy": 101.0}, ActionResult.NOT_ENOUGH_ENERGY),
+        ({"energy": 100.0}, ActionResult.SUCCESS),
+        ({"life": 40.0}, ActionResult.NOT_ENOUGH_LIFE),
+        ({"minerals": 1}, ActionResult.NOT_ENOUGH_MINERALS),
+        ({"vespene": 1}, ActionResult.NOT_ENOUGH_VESPENE),
+        ({"requires": Need("unit", "Nexus", "done")}, ActionResult.TECH_REQUIREMENTS_NOT_MET),
+        ({"requires": Need("upgrade", "PsiStormTech", "done")}, ActionResult.TECH_REQUIREMENTS_NOT_MET),
+        ({"shown_if": Need("behavior", "PsiStorm", "done")}, ActionResult.TECH_REQUIREMENTS_NOT_MET),
+        ({"requires": Need("not", parts=(Need("unit", "Nexus", "done"),))}, ActionResult.SUCCESS),
     ],
 )
 @pytest.mark.usefixtures("trick")
-def test_what_an_ability_needs(field: Any, changes: dict[str, Any], why: Refusal) -> None:
+def test_what_an_ability_needs(field: Any, changes: dict[str, Any], why: ActionResult) -> None:
     slot = caster(field)
     assert casting.refusal(field.world, slot, ability(field, **changes)) is why
 
@@ -97,28 +97,28 @@ def test_a_debug_state_takes_a_need_away(field: Any, cheat: str) -> None:
         "tech_tree": {"requires": Need("unit", "Nexus", "done")},
     }
     slot, made = caster(field), ability(field, **lacking[cheat])
-    assert casting.refusal(field.world, slot, made) is not Refusal.SUCCESS
+    assert casting.refusal(field.world, slot, made) is not ActionResult.SUCCESS
     field.world.players[1].cheats.append(cheat)
-    assert casting.refusal(field.world, slot, made) is Refusal.SUCCESS
+    assert casting.refusal(field.world, slot, made) is ActionResult.SUCCESS
 
 
 @pytest.mark.parametrize(
     ("victim", "owner", "words", "why"),
     [
-        ("Marine", 2, Filter(("Biological",)), Refusal.SUCCESS),
-        ("Stalker", 2, Filter(("Biological",)), Refusal.MUST_TARGET_BIOLOGICAL_UNITS),
-        ("Marine", 1, Filter((), ("Player",)), Refusal.CANT_TARGET_YOUR_OWN_UNITS),
-        ("Marine", 2, Filter((), ("Enemy",)), Refusal.CANT_TARGET_ENEMY_UNITS),
-        ("Colossus", 2, Filter((), ("Massive",)), Refusal.CANT_TARGET_MASSIVE_UNITS),
-        ("Mutalisk", 2, Filter(("Ground",)), Refusal.MUST_TARGET_GROUND_UNITS),
-        ("Marine", 2, Filter(("Air",)), Refusal.MUST_TARGET_AIR_UNITS),
-        ("Nexus", 2, Filter((), ("Structure",)), Refusal.CANT_TARGET_STRUCTURES),
-        ("MineralField", 0, Filter((), ("Neutral",)), Refusal.CANT_TARGET_NEUTRAL_UNITS),
-        ("Zealot", 2, Filter(("CanHaveEnergy",)), Refusal.MUST_TARGET_ENERGY_CAPABLE_UNITS),
+        ("Marine", 2, Filter(("Biological",)), ActionResult.SUCCESS),
+        ("Stalker", 2, Filter(("Biological",)), ActionResult.MUST_TARGET_BIOLOGICAL_UNITS),
+        ("Marine", 1, Filter((), ("Player",)), ActionResult.CANT_TARGET_YOUR_OWN_UNITS),
+        ("Marine", 2, Filter((), ("Enemy",)), ActionResult.CANT_TARGET_ENEMY_UNITS),
+        ("Colossus", 2, Filter((), ("Massive",)), ActionResult.CANT_TARGET_MASSIVE_UNITS),
+        ("Mutalisk", 2, Filter(("Ground",)), ActionResult.MUST_TARGET_GROUND_UNITS),
+        ("Marine", 2, Filter(("Air",)), ActionResult.MUST_TARGET_AIR_UNITS),
+        ("Nexus", 2, Filter((), ("Structure",)), ActionResult.CANT_TARGET_STRUCTURES),
+        ("MineralField", 0, Filter((), ("Neutral",)), ActionResult.CANT_TARGET_NEUTRAL_UNITS),
+        ("Zealot", 2, Filter(("CanHaveEnergy",)), ActionResult.MUST_TARGET_ENERGY_CAPABLE_UNITS),
     ],
 )
 @pytest.mark.usefixtures("trick")
-def test_whom_an_ability_may_be_aimed_at(field: Any, victim: str, owner: int, words: Filter, why: Refusal) -> None:
+def test_whom_an_ability_may_be_aimed_at(field: Any, victim: str, owner: int, words: Filter, why: ActionResult) -> None:
     slot, target = caster(field), field.put(victim, owner, 12, 16)
     made = ability(field, filters=words, aim=Aim.UNIT, range=9.0)
     assert casting.aim_refusal(field.world, Cast(slot, made, target)) is why
@@ -195,7 +195,7 @@ def test_an_ability_that_fails_on_the_way_is_told_to_the_player(field: Any, tric
     field.world.energy[slot] = 0.0
     field.play(60)
     assert not trick.effects
-    assert [(m.player, m.ability, m.refusal) for m in field.world.mishaps] == [(1, 1, Refusal.NOT_ENOUGH_ENERGY)]
+    assert [(m.player, m.ability, m.refusal) for m in field.world.mishaps] == [(1, 1, ActionResult.NOT_ENOUGH_ENERGY)]
 
 
 def test_a_cast_waits_in_the_queue(field: Any, trick: Trick) -> None:
@@ -282,7 +282,7 @@ def test_what_a_carrier_holds_dies_with_it(field: Any) -> None:
 def test_timed_life_ends(field: Any) -> None:
     slot = field.put("Marine", 1, 10, 16)
     field.world.expires[slot] = 50
-    field.world._population_changed()
+    field.world.population_changed()
     field.play(49)
     assert field.world.alive[slot]
     field.play(1)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from simulator import commands
+from simulator import commands, lifecycle, pathing
+from simulator.layers import Layer
 from simulator.placement import free_places
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ def wall(world: World, gap: int) -> None:
 
 def crowd(world: World, name: str, count: int, at: tuple[float, float]) -> np.ndarray[Any, np.dtype[np.int64]]:
     kind = world.catalog.unit(name)
-    return np.array([world.spawn(kind, 1, place) for place in free_places(world, kind, at, count)])
+    return np.array([lifecycle.spawn(world, kind, 1, place) for place in free_places(world, kind, at, count)])
 
 
 def loops_until(field: Any, done: Callable[[], Any], limit: int) -> int:
@@ -74,7 +74,7 @@ def test_100_units_pass_the_ramp_of_a_base(make_field: Callable[..., Any]) -> No
     field = make_field("simple64")
     world = field.world
     slots = crowd(world, "Zergling", 100, BASE)
-    way = world.ground.surface(Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    way = pathing.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
     commands.move(world, slots.tolist(), OUTSIDE)
     alone = way / (world.catalog.unit("Zergling").speed_n / 16)
     near = loops_until(field, lambda: np.hypot(*(world.pos[slots] - OUTSIDE).T).max() < 9, 2000)
@@ -87,7 +87,7 @@ def test_a_walk_is_as_long_as_the_distance_that_is_told(make_field: Callable[...
     field = make_field("simple64")
     world = field.world
     marine = field.put("Marine", 1, *BASE)
-    told = world.ground.surface(Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    told = pathing.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
     assert told > 1.2 * math.dist(BASE, OUTSIDE), "there is something to walk around"
     commands.move(world, [marine], OUTSIDE)
     walked = 0.0

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting, commands, sites, supply
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -167,21 +167,23 @@ def test_an_unfinished_structure_does_nothing(field: Field) -> None:
 @pytest.mark.parametrize(
     ("name", "point", "refusal"),
     [
-        ("Pylon", (30.0, 30.0), Refusal.SUCCESS),
-        ("Pylon", (-3.0, 30.0), Refusal.CANT_BUILD_LOCATION_INVALID),
-        ("Pylon", (40.0, 40.0), Refusal.CANT_BUILD_ON_THAT),  # a structure
-        ("Pylon", (50.0, 20.0), Refusal.CANT_BUILD_ON_THAT),  # an enemy's unit
-        ("Pylon", (52.0, 30.0), Refusal.SUCCESS),  # one's own unit makes room
-        ("Nexus", (26.5, 20.5), Refusal.SUCCESS),  # three cells from the mineral field
-        ("Nexus", (25.5, 20.5), Refusal.CANT_BUILD_TOO_CLOSE_TO_RESOURCES),
-        ("Gateway", (43.5, 40.5), Refusal.SUCCESS),
-        ("Gateway", (30.5, 30.5), Refusal.CANT_BUILD_TOO_FAR_FROM_POWER),
-        ("SpawningPool", (30.5, 30.5), Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
-        ("Assimilator", (10.5, 50.5), Refusal.SUCCESS),
-        ("Assimilator", (30.5, 50.5), Refusal.CANT_BUILD_LOCATION_INVALID),
+        ("Pylon", (30.0, 30.0), ActionResult.SUCCESS),
+        ("Pylon", (-3.0, 30.0), ActionResult.CANT_BUILD_LOCATION_INVALID),
+        ("Pylon", (40.0, 40.0), ActionResult.CANT_BUILD_ON_THAT),  # a structure
+        ("Pylon", (50.0, 20.0), ActionResult.CANT_BUILD_ON_THAT),  # an enemy's unit
+        ("Pylon", (52.0, 30.0), ActionResult.SUCCESS),  # one's own unit makes room
+        ("Nexus", (26.5, 20.5), ActionResult.SUCCESS),  # three cells from the mineral field
+        ("Nexus", (25.5, 20.5), ActionResult.CANT_BUILD_TOO_CLOSE_TO_RESOURCES),
+        ("Gateway", (43.5, 40.5), ActionResult.SUCCESS),
+        ("Gateway", (30.5, 30.5), ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER),
+        ("SpawningPool", (30.5, 30.5), ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
+        ("Assimilator", (10.5, 50.5), ActionResult.SUCCESS),
+        ("Assimilator", (30.5, 50.5), ActionResult.CANT_BUILD_LOCATION_INVALID),
     ],
 )
-def test_where_a_structure_may_stand(field: Field, name: str, point: tuple[float, float], refusal: Refusal) -> None:
+def test_where_a_structure_may_stand(
+    field: Field, name: str, point: tuple[float, float], refusal: ActionResult
+) -> None:
     field.put("Pylon", 1, 40.0, 40.0)
     field.put("Zergling", 2, 50.0, 20.0)
     field.put("Zealot", 1, 52.0, 30.0)
@@ -198,15 +200,15 @@ def test_what_stands_in_the_way_when_the_builder_comes_ends_the_order(field: Fie
     field.play(80)
     assert not has(field, "Pylon")
     assert field.world.players[1].minerals == 2000.0
-    assert field.world.mishaps[0].refusal is Refusal.CANT_BUILD_ON_THAT
+    assert field.world.mishaps[0].refusal is ActionResult.CANT_BUILD_ON_THAT
 
 
 def test_a_structure_needs_what_comes_before_it(field: Field) -> None:
     probe = field.put("Probe", 1, 20.0, 20.0)
     core = CATALOG.ability(BUILD["CyberneticsCore"])
-    assert casting.refusal(field.world, probe, core) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, probe, core) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.put("Gateway", 1, 30.5, 30.5)
-    assert casting.refusal(field.world, probe, core) is Refusal.SUCCESS
+    assert casting.refusal(field.world, probe, core) is ActionResult.SUCCESS
 
 
 # add-ons --------------------------------------------------------------------------------------------------------------
@@ -215,16 +217,16 @@ def test_a_structure_needs_what_comes_before_it(field: Field) -> None:
 def test_a_tech_lab_is_built_at_the_side_and_lets_marauders_be_trained(field: Field) -> None:
     barracks = field.put("Barracks", 1, 30.5, 30.5)
     marauder = CATALOG.ability(563)
-    assert casting.refusal(field.world, barracks, marauder) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, barracks, marauder) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     order(field, barracks, TECHLAB)
     lab = find(field, "BarracksTechLab")
     assert field.world.pos[lab].tolist() == [33.0, 30.0]
     assert (field.world.players[1].minerals, field.world.players[1].vespene) == (1950.0, 1975.0)
-    assert casting.refusal(field.world, barracks, CATALOG.ability(560)) is Refusal.CANT_QUEUE_THAT_ORDER
+    assert casting.refusal(field.world, barracks, CATALOG.ability(560)) is ActionResult.CANT_QUEUE_THAT_ORDER
     field.play(401)
     assert field.world.addon[barracks] == lab
     field.put("SupplyDepot", 1, 10.0, 10.0)
-    assert casting.refusal(field.world, barracks, marauder) is Refusal.SUCCESS
+    assert casting.refusal(field.world, barracks, marauder) is ActionResult.SUCCESS
 
 
 def test_an_add_on_can_be_called_off(field: Field) -> None:
@@ -239,4 +241,4 @@ def test_an_add_on_can_be_called_off(field: Field) -> None:
 def test_an_add_on_needs_its_place(field: Field) -> None:
     barracks = field.put("Barracks", 1, 30.5, 30.5)
     field.put("SupplyDepot", 1, 33.0, 30.0)
-    assert casting.refusal(field.world, barracks, CATALOG.ability(TECHLAB)) is Refusal.CANT_BUILD_ON_THAT
+    assert casting.refusal(field.world, barracks, CATALOG.ability(TECHLAB)) is ActionResult.CANT_BUILD_ON_THAT

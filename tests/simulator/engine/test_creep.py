@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import casting, commands
+from simulator import casting, commands, lifecycle
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.systems.creep import makers, needy
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def test_a_hall_keeps_its_creep_when_it_becomes_a_lair(ground: Any) -> None:
     hall = ground.put("Hatchery", 2, 32.5, 32.5)
     ground.play(1)
     before = ground.world.creep.copy()
-    ground.world.become(hall, ground.world.catalog.unit("Lair"))
+    lifecycle.become(ground.world, hall, ground.world.catalog.unit("Lair"))
     ground.play(100)
     assert (ground.world.creep == before).all()
 
@@ -171,7 +171,7 @@ def test_creep_comes_from_what_makes_it_and_from_overlords(version: str) -> None
 
 def test_a_structure_off_creep_withers(ground: Any) -> None:
     world = ground.world
-    pool = world.spawn(world.catalog.unit("SpawningPool"), 2, (20.5, 20.5))
+    pool = lifecycle.spawn(world, world.catalog.unit("SpawningPool"), 2, (20.5, 20.5))
     ground.play(1)
     before, regained = float(world.life[pool]), float(world.life_regen[pool])
     ground.play(160)
@@ -182,7 +182,7 @@ def test_a_structure_off_creep_withers(ground: Any) -> None:
 
 def test_a_structure_on_creep_does_not_wither(ground: Any) -> None:
     ground.put("Hatchery", 2, 32.5, 32.5)
-    pool = ground.world.spawn(ground.world.catalog.unit("SpawningPool"), 2, (38.5, 32.5))
+    pool = lifecycle.spawn(ground.world, ground.world.catalog.unit("SpawningPool"), 2, (38.5, 32.5))
     ground.play(100)
     assert ground.world.life[pool] == ground.world.life_max[pool]
 
@@ -228,7 +228,7 @@ def test_an_overlords_creep_recedes(ground: Any, overlord: int, how: str) -> Non
 def test_creep_from_overlords_needs_a_lair(ground: Any) -> None:
     slot = ground.put("Overlord", 1, 45.5, 45.5)
     ability = ground.world.catalog.ability(GENERATE)
-    assert casting.refusal(ground.world, slot, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(ground.world, slot, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_creep_is_part_of_what_decides_the_future(ground: Any) -> None:

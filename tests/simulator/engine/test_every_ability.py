@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, casting, commands, harvesting, production, targets
+from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
 from simulator.abilities import Aim
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
 from simulator.columns import NOBODY
 from simulator.maps import load_map
 from simulator.players import PlayerSetup
-from simulator.refusal import Refusal
-from simulator.skills import SKILLS
+from simulator.skills.registry import SKILLS
 from simulator.systems import creep
 from simulator.tick import advance
+from simulator.traits import refresh
 from simulator.world import World
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ NEUTRAL = (("MineralField", 8, 32.5), ("VespeneGeyser", 8.5, 40.5), ("VespeneGey
 def modelled(version: str) -> list[Ability]:
     catalog = load_catalog(version)
     found = {a.id: a for unit in catalog.units if not unit.not_in_melee for a in catalog.abilities_of(unit.row)}
-    return [a for _, a in sorted(found.items()) if a.does in SKILLS]
+    return [a for _, a in sorted(found.items()) if a.effect in SKILLS]
 
 
 def stage(version: str) -> World:
@@ -61,7 +62,7 @@ def stage(version: str) -> World:
     world.players[1].cheats += ["free", "tech_tree", "cooldown", "food"]
     for owner, group in ((1, OWN), (2, FOES), (0, NEUTRAL)):
         for name, x, y in group:
-            slot = world.spawn(world.catalog.unit(name), owner, (x, y))
+            slot = lifecycle.spawn(world, world.catalog.unit(name), owner, (x, y))
             world.energy[slot] = world.energy_max[slot]
             if owner and not world.unit_type(slot).structure:
                 world.life[slot] *= 0.6
@@ -75,7 +76,7 @@ def casters(world: World, ability: Ability) -> Iterator[int]:
     for name in ability.users:
         unit = world.catalog.unit(name) if name in world.catalog.row_of_name else None
         if unit is not None and ability in world.catalog.abilities_of(unit.row):
-            slot = world.spawn(unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
+            slot = lifecycle.spawn(world, unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
             world.energy[slot] = world.energy_max[slot]
             yield slot
             world.remove(slot)
@@ -120,7 +121,7 @@ def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], Non
 
 def _fill(world: World, slot: int) -> None:
     """Put a passenger into a carrier."""
-    passenger = world.spawn(world.catalog.unit("SCV"), 1, CENTRE)
+    passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, CENTRE)
     world.stow(passenger, slot)
 
 
@@ -128,39 +129,45 @@ def _man(world: World, slot: int) -> None:
     """Put soldiers with stimpacks into a Bunker, and an enemy before it."""
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     for name in ("Marine", "Marauder"):
-        world.stow(world.spawn(world.catalog.unit(name), 1, CENTRE), slot)
+        world.stow(lifecycle.spawn(world, world.catalog.unit(name), 1, CENTRE), slot)
     x, y = world.pos[slot].tolist()
     for passenger in world.passengers(slot):
         world.pos[passenger] = x, y
-        world.refresh(passenger)
-    targets.engage(world, world.passengers(slot)[0], world.spawn(world.catalog.unit("Roach"), 2, (x, y + 4.0)))
+        refresh(world, passenger)
+    targets.engage(
+        world, world.passengers(slot)[0], lifecycle.spawn(world, world.catalog.unit("Roach"), 2, (x, y + 4.0))
+    )
 
 
 def _worker(world: World, slot: int) -> None:
     """Put a worker beside a structure that calls workers in."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("SCV"), 1, (x, y - 5.0))
+    lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (x, y - 5.0))
 
 
 def _pair(world: World, slot: int) -> None:
     """Tell a second Templar to merge, too."""
-    partner = world.spawn(world.unit_type(slot), 1, (31.0, 33.0))
+    partner = lifecycle.spawn(world, world.unit_type(slot), 1, (31.0, 33.0))
     casting.use(world, [partner], world.catalog.ability(1766))
 
 
 def _split(world: World, slot: int) -> None:
     """Have an Adept shift its phase; a shade becomes that of another Adept."""
-    adept = slot if world.unit_type(slot).name == "Adept" else world.spawn(world.catalog.unit("Adept"), 1, CENTRE)
+    adept = (
+        slot
+        if world.unit_type(slot).name == "Adept"
+        else lifecycle.spawn(world, world.catalog.unit("Adept"), 1, CENTRE)
+    )
     casting.use(world, [adept], world.catalog.ability(2544), point=(36.0, 32.0))
     if adept != slot:
-        world.fields[-1].target = world.tag_of(slot)
+        world.area_effects[-1].target = world.tag_of(slot)
 
 
 def _power(world: World, slot: int) -> None:
     """Put a Pylon and a Stalker that lacks shields beside a battery."""
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
-    stalker = world.spawn(world.catalog.unit("Stalker"), 1, (x, y + 4.0))
+    lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    stalker = lifecycle.spawn(world, world.catalog.unit("Stalker"), 1, (x, y + 4.0))
     world.shields[stalker] = 10.0
     world.damaged_loop[stalker] = LONGEST
     advance(world, 2)
@@ -175,7 +182,7 @@ def _recharge(world: World, slot: int) -> None:
 def _battery(world: World, slot: int) -> None:
     """Put a Shield Battery with power beside a Nexus."""
     x, y = world.pos[slot].tolist()
-    _power(world, world.spawn(world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
+    _power(world, lifecycle.spawn(world, world.catalog.unit("ShieldBattery"), 1, (x - 4.5, y - 5.5)))
 
 
 def _queue(world: World, slot: int) -> None:
@@ -185,15 +192,15 @@ def _queue(world: World, slot: int) -> None:
 
 def _in_the_making(world: World, slot: int) -> None:
     world.build_progress[slot], world.build_loops[slot] = 0.5, 100.0
-    world.refresh(slot)
+    refresh(world, slot)
 
 
 def _at_work(world: World, slot: int) -> None:
     """Have an SCV build the structure, or the SCV build another one."""
     worker = world.unit_type(slot).worker
-    site = world.spawn(world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
+    site = lifecycle.spawn(world, world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
     _in_the_making(world, site)
-    world.site[slot if worker else world.spawn(world.catalog.unit("SCV"), 1, (34.0, 42.0))] = site
+    world.site[slot if worker else lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (34.0, 42.0))] = site
 
 
 def _load_up(world: World, slot: int) -> None:
@@ -211,17 +218,17 @@ def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
     """Have the unit begin the morph or add-on that an ability calls off, or else be in the making itself."""
     x, y = world.pos[slot].tolist()
     if world.unit_type(slot).structure:
-        world.spawn(world.catalog.unit("Pylon"), 1, (x - 4.0, y))
+        lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y))
         advance(world, 1)
     card = world.catalog.abilities_of(int(world.type[slot]))
-    if not any(a.link == cancel.link and a.does != "cancel" and casting.use(world, [slot], a) for a in card):
+    if not any(a.link == cancel.link and a.effect != "cancel" and casting.use(world, [slot], a) for a in card):
         _in_the_making(world, slot)
     advance(world, 2)
 
 
 def _near_power(world: World, slot: int) -> None:
     x, y = world.pos[slot].tolist()
-    world.spawn(world.catalog.unit("Pylon"), 1, (x - 3.0, y))
+    lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 3.0, y))
     advance(world, 1)
 
 
@@ -244,9 +251,9 @@ def _morphing(*kinds: str) -> Callable[[World, int], None]:
         name = world.unit_type(slot).name
         before = next((a for a in world.catalog.abilities if a.numbers.get("cocoon") == name), None)
         if before is not None:
-            world.become(slot, world.catalog.unit(before.users[0]))
+            lifecycle.become(world, slot, world.catalog.unit(before.users[0]))
         x, y = world.pos[slot].tolist()
-        found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.does in kinds)
+        found = next(a for a in world.catalog.abilities_of(int(world.type[slot])) if a.effect in kinds)
         found = before or found
         casting.use(world, [slot], found, point=(x, y) if found.requires_point else None)
         advance(world, 12 if before is not None else 3)
@@ -296,14 +303,14 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
 def attempt(world: World, ability: Ability) -> list[int]:
     """Give the order to the first caster and at the first aim that takes it; returns who did."""
     for slot in casters(world, ability):
-        if ability.does == "cancel":
+        if ability.effect == "cancel":
             begin_what_it_cancels(world, slot, ability)
-        if ability.does in PREPARE:
-            PREPARE[ability.does](world, slot)
-        if casting.refusal(world, slot, ability) is not Refusal.SUCCESS:
+        if ability.effect in PREPARE:
+            PREPARE[ability.effect](world, slot)
+        if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
             continue
         for target, point in aims(world, slot, ability):
-            if casting.aim_refusal(world, Cast(slot, ability, target, point)) is Refusal.SUCCESS:
+            if casting.aim_refusal(world, Cast(slot, ability, target, point)) is ActionResult.SUCCESS:
                 taken = casting.use(world, [slot], ability, target=world.tag_of(target), point=point)
                 if taken:
                     return taken
@@ -312,7 +319,7 @@ def attempt(world: World, ability: Ability) -> list[int]:
 
 def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch, *, inert: bool) -> tuple[str, int]:
     """The world's digest soon after the effect, and how often it took effect."""
-    skill, calls = SKILLS[ability.does], 0
+    skill, calls = SKILLS[ability.effect], 0
 
     def effect(world: World, cast: Cast) -> None:
         nonlocal calls
@@ -322,7 +329,7 @@ def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch,
 
     with monkeypatch.context() as patch:
         world = stage(version)
-        patch.setitem(SKILLS, ability.does, dataclasses.replace(skill, effect=effect))
+        patch.setitem(SKILLS, ability.effect, dataclasses.replace(skill, effect=effect))
         assert attempt(world, ability), "no unit could use it"
         for _ in range(LONGEST):
             if calls:
@@ -339,14 +346,14 @@ def cases() -> Iterator[Any]:
             known = usual.get(a.id)
             same = version != DEFAULT_VERSION and known == a and known.numbers == a.numbers
             marks = [pytest.mark.slow] if same else []
-            yield pytest.param(version, a, id=f"{version}-{a.id}-{a.does}", marks=marks)
+            yield pytest.param(version, a, id=f"{version}-{a.id}-{a.effect}", marks=marks)
 
 
 @pytest.mark.parametrize(("version", "ability"), list(cases()))
 def test_an_ability_with_a_rule_changes_the_world(
     version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if getattr(SKILLS[ability.does], "give", None) is not None:
+    if getattr(SKILLS[ability.effect], "give", None) is not None:
         world, idle = stage(version), stage(version)
         assert attempt(world, ability), "no unit could use it"
         assert world.digest() != idle.digest()

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from simulator import commands
-from simulator.armament import set_weapon
 from simulator.catalog import load_catalog
 from simulator.players import PlayerSetup
+from simulator.traits import set_weapon
 from simulator.world import World
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import buffs, casting, commands, harvesting
+from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.maps import load_map
 from simulator.players import PlayerSetup
-from simulator.refusal import Refusal
 from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
@@ -189,13 +189,13 @@ def test_an_order_that_waits_begins_after_the_load_is_delivered(base: Base) -> N
 @pytest.mark.parametrize(
     ("worker", "target", "owner", "refusal"),
     [
-        ("Probe", "Nexus", 1, Refusal.MUST_TARGET_RESOURCES),
-        ("Probe", "VespeneGeyser", 0, Refusal.MUST_BUILD_REFINERY_FIRST),
-        ("Probe", "Assimilator", 2, Refusal.CANT_HARVEST_THAT_RESOURCE),
-        ("Probe", "MineralField", 0, Refusal.SUCCESS),
+        ("Probe", "Nexus", 1, ActionResult.MUST_TARGET_RESOURCES),
+        ("Probe", "VespeneGeyser", 0, ActionResult.MUST_BUILD_REFINERY_FIRST),
+        ("Probe", "Assimilator", 2, ActionResult.CANT_HARVEST_THAT_RESOURCE),
+        ("Probe", "MineralField", 0, ActionResult.SUCCESS),
     ],
 )
-def test_what_can_be_gathered(field: Field, worker: str, target: str, owner: int, refusal: Refusal) -> None:
+def test_what_can_be_gathered(field: Field, worker: str, target: str, owner: int, refusal: ActionResult) -> None:
     slot, resource = field.put(worker, 1, 54.5, 50.5), field.put(target, owner, 60.5, 50.5)
     assert casting.aim_refusal(field.world, Cast(slot, field.world.catalog.ability(298), resource)) is refusal
 

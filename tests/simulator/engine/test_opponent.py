@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import supply
+from simulator import lifecycle, supply
 from simulator.maps import load_map
 from simulator.opponent.levels import LEVELS, level_of
 from simulator.players import GameResult, PlayerSetup
@@ -58,7 +58,7 @@ def test_it_attacks_with_a_wave_and_wins_when_no_structure_is_left() -> None:
     home = world.players[2].start
     assert home is not None
     for i in range(40):
-        world.spawn(world.catalog.unit("Marine"), 2, (home[0] - 4.0 + i % 8, home[1] + 4.0 + i // 8))
+        lifecycle.spawn(world, world.catalog.unit("Marine"), 2, (home[0] - 4.0 + i % 8, home[1] + 4.0 + i // 8))
     advance(world, 2500)
     assert world.ended
     assert [player.result for player in world.players[1:]] == [GameResult.DEFEAT, GameResult.VICTORY]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting, power
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,7 +55,7 @@ def test_a_structure_without_power_neither_fights_nor_works(field: Field) -> Non
     field.world.players[1].minerals = 1000.0
     field.play(1)
     casting.use(field.world, [gateway], CATALOG.ability(916))
-    assert casting.refusal(field.world, gateway, CATALOG.ability(917)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, gateway, CATALOG.ability(917)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.play(10)
     field.world.life[pylon] = 0.0
     field.play(2)
@@ -64,7 +64,7 @@ def test_a_structure_without_power_neither_fights_nor_works(field: Field) -> Non
     field.play(40)
     assert field.world.jobs[gateway][0].done == done
     assert field.world.life[foe] == 45.0
-    assert casting.refusal(field.world, gateway, CATALOG.ability(916)) is Refusal.CANT_TRAIN_TOO_FAR_FROM_POWER
+    assert casting.refusal(field.world, gateway, CATALOG.ability(916)) is ActionResult.CANT_TRAIN_TOO_FAR_FROM_POWER
     field.put("Pylon", 1, 30.0, 34.0)
     field.play(40)
     assert field.world.jobs[gateway][0].done > done

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting, supply
+from simulator.action_result import ActionResult
 from simulator.buffs import apply
 from simulator.catalog import load_catalog
 from simulator.columns import NOBODY
 from simulator.production import QUEUE, REACTOR_QUEUE
-from simulator.refusal import Refusal
 from simulator.skills import production as skills
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def test_a_queue_has_room_for_five(rich: Field) -> None:
     barracks = rich.put("Barracks", 1, 16.0, 16.0)
     for _ in range(QUEUE):
         assert order(rich, [barracks], TRAIN["Marine"])
-    assert casting.refusal(rich.world, barracks, CATALOG.ability(560)) is Refusal.QUEUE_IS_FULL
+    assert casting.refusal(rich.world, barracks, CATALOG.ability(560)) is ActionResult.QUEUE_IS_FULL
     assert not order(rich, [barracks], TRAIN["Marine"])
     assert rich.world.players[1].minerals == 1000.0 - QUEUE * 50
 
@@ -95,12 +95,12 @@ def test_of_several_structures_the_one_with_the_shortest_queue_trains(rich: Fiel
 @pytest.mark.parametrize(
     ("minerals", "room", "refusal"),
     [
-        (49.0, True, Refusal.NOT_ENOUGH_MINERALS),
-        (50.0, False, Refusal.NOT_ENOUGH_FOOD),
-        (50.0, True, Refusal.SUCCESS),
+        (49.0, True, ActionResult.NOT_ENOUGH_MINERALS),
+        (50.0, False, ActionResult.NOT_ENOUGH_FOOD),
+        (50.0, True, ActionResult.SUCCESS),
     ],
 )
-def test_what_can_be_trained(field: Field, minerals: float, room: bool, refusal: Refusal) -> None:
+def test_what_can_be_trained(field: Field, minerals: float, room: bool, refusal: ActionResult) -> None:
     nexus = field.put("Nexus", 1, 16.0, 16.0)
     field.world.players[1].minerals = minerals
     for i in range(14 + (not room)):
@@ -148,7 +148,7 @@ def test_calling_off_gives_everything_back(rich: Field) -> None:
     assert (rich.world.players[1].minerals, len(rich.world.jobs[nexus])) == (950.0, 1)
     order(rich, [nexus], CANCEL["Nexus"])
     assert (rich.world.players[1].minerals, rich.world.jobs) == (1000.0, {})
-    assert casting.refusal(rich.world, nexus, CATALOG.ability(1831)) is Refusal.CANT_FIND_CANCEL_ORDER
+    assert casting.refusal(rich.world, nexus, CATALOG.ability(1831)) is ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 def test_a_click_calls_off_the_job_at_its_place(rich: Field) -> None:
@@ -201,11 +201,11 @@ def test_new_units_go_to_the_rally_point_and_workers_to_their_own(rich: Field) -
 
 def test_a_command_center_becomes_an_orbital_command(rich: Field) -> None:
     centre = rich.put("CommandCenter", 1, 16.5, 16.5)
-    assert casting.refusal(rich.world, centre, CATALOG.ability(1516)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(rich.world, centre, CATALOG.ability(1516)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     rich.put("Barracks", 1, 24.5, 24.5)
     order(rich, [centre], 1516)
     assert rich.world.players[1].minerals == 850.0
-    assert casting.refusal(rich.world, centre, CATALOG.ability(524)) is Refusal.CANT_QUEUE_THAT_ORDER
+    assert casting.refusal(rich.world, centre, CATALOG.ability(524)) is ActionResult.CANT_QUEUE_THAT_ORDER
     rich.play(int(CATALOG.ability(1516).loops))
     assert rich.world.unit_type(centre).name == "OrbitalCommand"
     assert rich.world.energy[centre] == pytest.approx(50.0, abs=0.1)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from simulator.abilities import Ability
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CATALOG = load_catalog()
 LATER = ("HighCapacityBarrels", "LurkerRange")  # their upgrade's own row has the price of a later version
-RESEARCHES = [a for a in CATALOG.abilities if a.does == "research" and a.users and a.loops]
+RESEARCHES = [a for a in CATALOG.abilities if a.effect == "research" and a.users and a.loops]
 WARP_GATE = 1568
 
 
@@ -35,13 +35,13 @@ def test_research_costs_lasts_and_is_done_once(field: Field) -> None:
     field.play(1)
     assert casting.use(field.world, [core, other], ability) == [core]
     assert (player.minerals, player.vespene) == (500.0 - ability.minerals, 500.0 - ability.vespene)
-    assert casting.refusal(field.world, other, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, other, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.play(int(ability.loops) - 1)
     assert player.upgrades == []
     field.play(1)
     assert player.upgrades == [CATALOG.upgrade(ability.upgrade).id]
     assert field.world.alerts[-1].name == "ResearchComplete"
-    assert casting.refusal(field.world, other, ability) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert casting.refusal(field.world, other, ability) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_research_that_is_called_off_can_be_begun_again(field: Field) -> None:
@@ -53,7 +53,7 @@ def test_research_that_is_called_off_can_be_begun_again(field: Field) -> None:
     casting.use(field.world, [core], ability)
     casting.use(field.world, [core], CATALOG.ability(306))
     assert (player.minerals, player.vespene, player.underway) == (50.0, 50.0, [])
-    assert casting.refusal(field.world, core, ability) is Refusal.SUCCESS
+    assert casting.refusal(field.world, core, ability) is ActionResult.SUCCESS
 
 
 def test_a_finished_upgrade_counts_for_units_that_are_there(field: Field) -> None:

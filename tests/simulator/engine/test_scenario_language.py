@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from simulator import lifecycle
 from simulator.maps import MapError, map_from
 from simulator.orders import OrderKind
 from simulator.places import Grid, Region, Span
@@ -153,7 +154,7 @@ def test_units_in_the_making_count_only_where_it_is_said_and_passengers_always()
     )
     world = world_of(text)
     assert names(world, 1) == ["Medivac"]
-    slot = world.spawn(world.catalog.unit("Marine"), 1, (20, 20))
+    slot = lifecycle.spawn(world, world.catalog.unit("Marine"), 1, (20, 20))
     world.build_progress[slot] = 0.4
     advance(world, 2)
     assert world.players[1].score.curriculum == 11

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator import commands
+from simulator import commands, lifecycle
 from simulator.maps import load_map
 from simulator.players import NEUTRAL, GameResult
 from simulator.tick import advance, new_game
+from simulator.traits import refresh
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -34,7 +35,7 @@ def calm(name: str) -> World:
     world.stats.range[:] = -100.0
     world.stats.scan[:] = -100.0
     for slot in world.live.tolist():
-        world.refresh(slot)
+        refresh(world, slot)
     return world
 
 
@@ -201,9 +202,9 @@ def test_a_marine_counts_once_when_it_is_made() -> None:
     world = new_game(load_map("BuildMarines"))
     marine = world.catalog.unit("Marine")
     advance(world, 2)
-    slot = world.spawn(marine, 1, (33, 25))
+    slot = lifecycle.spawn(world, marine, 1, (33, 25))
     world.build_progress[slot] = 0.5
-    world.spawn(marine, 1, (34, 25))
+    lifecycle.spawn(world, marine, 1, (34, 25))
     advance(world, 3)
     assert world.players[1].score.curriculum == 1
     world.build_progress[slot] = 1.0

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from simulator.layers import Layer
 from simulator.maps import load_map, map_names
 from simulator.players import NEUTRAL
 from simulator.tick import advance, new_game
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.world import World

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 from simulator.skills import carrier as carriers
 
 VERSIONS = ("4.10", "5.0.13")
@@ -47,26 +47,26 @@ def test_it_builds_up_to_eight_for_15_minerals_each(make_field: Any, version: st
     for _ in range(4):
         assert field.order(slot, ARM)
     assert field.world.players[1].minerals == 100.0 - 4 * 15.0
-    assert field.why_not(slot, ARM) is Refusal.CANT_HOLD_ANY_MORE_AMMO
+    assert field.why_not(slot, ARM) is ActionResult.CANT_HOLD_ANY_MORE_AMMO
     field.play(loops - 1)
     assert len(field.world.passengers(slot)) == 4
     field.play(2)
     assert len(field.world.passengers(slot)) == 5
     field.play(3 * loops)
     assert len(field.world.passengers(slot)) == 8
-    assert field.why_not(slot, ARM) is Refusal.CANT_HOLD_ANY_MORE_AMMO
+    assert field.why_not(slot, ARM) is ActionResult.CANT_HOLD_ANY_MORE_AMMO
 
 
 def test_it_needs_the_minerals_and_queues_five_at_most(field: Any) -> None:
     slot = carrier(field)
     field.world.players[1].minerals = 14.0
-    assert field.why_not(slot, ARM) is Refusal.NOT_ENOUGH_MINERALS
+    assert field.why_not(slot, ARM) is ActionResult.NOT_ENOUGH_MINERALS
     for lost in carriers.crew_of(field.world, slot):
         field.world.remove(lost)
     field.world.players[1].minerals = 500.0
     for _ in range(5):
         field.order(slot, ARM)
-    assert field.why_not(slot, ARM) is Refusal.QUEUE_IS_FULL
+    assert field.why_not(slot, ARM) is ActionResult.QUEUE_IS_FULL
 
 
 @pytest.mark.parametrize("version", VERSIONS)

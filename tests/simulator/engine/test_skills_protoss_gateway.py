@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 BLINK, STRIDE, CHARGE, SHIFT, CANCEL_SHIFT, CANCEL_SHADE = 1442, 2700, 1819, 2544, 2594, 2596
@@ -49,14 +49,14 @@ def test_a_blink_needs_its_research_and_cools_down(make_field: Any, version: str
     field = make_field(version=version)
     number, upgrade, cooldown = BLINKS[name]
     slot = field.put(name, 1, 8.0, 8.0)
-    assert field.why_not(slot, number, point=(12.0, 8.0)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, number, point=(12.0, 8.0)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.research(1, upgrade)
     field.order(slot, number, point=(12.0, 8.0))
     field.play(1)
     field.play(cooldown - 1)
-    assert field.why_not(slot, number, point=(8.0, 8.0)) is Refusal.COOLDOWN
+    assert field.why_not(slot, number, point=(8.0, 8.0)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(slot, number, point=(8.0, 8.0)) is Refusal.SUCCESS
+    assert field.why_not(slot, number, point=(8.0, 8.0)) is ActionResult.SUCCESS
 
 
 def test_a_blink_onto_a_body_or_a_wall_ends_beside_it(field: Any) -> None:
@@ -87,7 +87,7 @@ def test_nobody_blinks_out_of_a_fungal_growth(field: Any) -> None:
     slot = field.put("Stalker", 1, 8.0, 8.0)
     field.research(1, "BlinkTech")
     buffs.apply(field.world, slot, "FungalGrowth")
-    assert field.why_not(slot, BLINK, point=(12.0, 8.0)) is Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+    assert field.why_not(slot, BLINK, point=(12.0, 8.0)) is ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
 
 
 def test_what_waits_behind_a_blink_is_done_after_it(field: Any) -> None:
@@ -186,9 +186,9 @@ def test_a_charge_that_reaches_nobody_is_over_after_56_loops(field: Any) -> None
     assert counted == 55
 
 
-@pytest.mark.parametrize(("away", "why"), [(3.9, Refusal.SUCCESS), (4.1, Refusal.TARGET_IS_OUT_OF_RANGE),
-                                           (0.5, Refusal.TARGET_IS_TOO_CLOSE)])  # fmt: skip
-def test_a_zealot_may_be_told_to_charge_whom_it_can_reach(field: Any, away: float, why: Refusal) -> None:
+@pytest.mark.parametrize(("away", "why"), [(3.9, ActionResult.SUCCESS), (4.1, ActionResult.TARGET_IS_OUT_OF_RANGE),
+                                           (0.5, ActionResult.TARGET_IS_TOO_CLOSE)])  # fmt: skip
+def test_a_zealot_may_be_told_to_charge_whom_it_can_reach(field: Any, away: float, why: ActionResult) -> None:
     field.research(1, "Charge")
     zealot, enemy = charger(field, away)
     assert field.why_not(zealot, CHARGE, enemy) is why
@@ -217,7 +217,7 @@ def test_an_adept_stands_after_160_loops_where_its_shade_has_gone(make_field: An
     assert place(field, adept) == pytest.approx((20.0, 8.0), abs=0.1)
     assert field.world.life[adept] == 33.0
     assert field.world.players[1].score.lost_units == 0
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 def test_a_shade_walks_where_it_is_told_and_can_neither_fight_nor_be_hurt(field: Any) -> None:
@@ -248,7 +248,7 @@ def test_a_shift_can_be_given_up_by_either(field: Any, told: str) -> None:
 
 def test_there_is_nothing_to_give_up_without_a_shift(field: Any) -> None:
     adept = field.put("Adept", 1, 8.0, 8.0)
-    assert field.why_not(adept, CANCEL_SHIFT) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(adept, CANCEL_SHIFT) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_a_shade_goes_with_its_adept(field: Any) -> None:
@@ -263,9 +263,9 @@ def test_a_phase_shift_cools_down_for_16_seconds(field: Any) -> None:
     adept = field.put("Adept", 1, 8.0, 8.0)
     field.order(adept, SHIFT, point=(20.0, 8.0))
     field.play(255)
-    assert field.why_not(adept, SHIFT, point=(8.0, 8.0)) is Refusal.COOLDOWN
+    assert field.why_not(adept, SHIFT, point=(8.0, 8.0)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(adept, SHIFT, point=(8.0, 8.0)) is Refusal.SUCCESS
+    assert field.why_not(adept, SHIFT, point=(8.0, 8.0)) is ActionResult.SUCCESS
 
 
 def test_an_adept_escapes_from_a_stasis_and_takes_over_its_shade_s_orders(field: Any) -> None:

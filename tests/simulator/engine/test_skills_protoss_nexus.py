@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import buffs, casting, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 RECALL, NEXUS_RECALL, TIME_WARP, CLOAK, CHRONO, OVERCHARGE = 142, 3757, 2244, 4122, 3755, 4107
@@ -68,14 +68,14 @@ def test_a_nexus_recalls_what_is_within_2_5_and_no_nexus_does_for_a_while(
     assert field.order(nexus, NEXUS_RECALL, point=(8.0, 8.0))
     field.play(1)
     assert field.world.energy[nexus] == pytest.approx(150.0, abs=0.1)
-    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 8.0)) is Refusal.COOLDOWN
+    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 8.0)) is ActionResult.COOLDOWN
     field.play(81)
     assert math.dist(field.world.pos[near], (24.5, 24.5)) < 6.0
     assert math.dist(field.world.pos[far], (8.0, 11.2)) < 0.1
     field.play(cooldown - 82)
-    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 11.0)) is Refusal.COOLDOWN
+    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 11.0)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 11.0)) is Refusal.SUCCESS
+    assert field.why_not(second, NEXUS_RECALL, point=(8.0, 11.0)) is ActionResult.SUCCESS
 
 
 def test_without_its_caster_a_recall_takes_nobody_along(field: Any) -> None:
@@ -92,7 +92,7 @@ def test_without_its_caster_a_recall_takes_nobody_along(field: Any) -> None:
 
 def test_there_must_be_somebody_to_recall(field: Any) -> None:
     ship = put(field, "Mothership", 1, 26.0, 26.0)
-    assert field.why_not(ship, RECALL, point=(10.0, 10.0)) is Refusal.CANT_TARGET_THAT_UNIT
+    assert field.why_not(ship, RECALL, point=(10.0, 10.0)) is ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # Time Warp ------------------------------------------------------------------------------------------------------------
@@ -111,7 +111,7 @@ def test_a_time_warp_grows_and_then_slows_enemies_for_160_loops(
     usual = {s: float(field.world.step_max[s]) for s in (roach, beyond, flyer, friend)}
     assert field.order(ship, TIME_WARP, point=(16.0, 8.0))
     field.play(1)
-    (warp,) = field.world.fields
+    (warp,) = field.world.area_effects
     assert (warp.effect, warp.radius) == (3, radius)
     field.play(grows - 1)
     assert field.world.step_max[roach] == usual[roach]
@@ -124,7 +124,7 @@ def test_a_time_warp_grows_and_then_slows_enemies_for_160_loops(
     assert field.world.step_max[roach] < usual[roach]
     field.play(5)
     assert field.world.step_max[roach] == usual[roach]
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 # the cloaking field ---------------------------------------------------------------------------------------------------
@@ -155,9 +155,9 @@ def test_in_5_0_13_the_cloaking_field_is_an_ability_of_448_loops(make_field: Any
     assert field.world.cloaked[zealot]
     field.play(5)
     assert not field.world.cloaked[zealot]
-    assert field.why_not(ship, CLOAK) is Refusal.COOLDOWN
+    assert field.why_not(ship, CLOAK) is ActionResult.COOLDOWN
     field.play(1120 - 452)
-    assert field.why_not(ship, CLOAK) is Refusal.SUCCESS
+    assert field.why_not(ship, CLOAK) is ActionResult.SUCCESS
 
 
 # Chrono Boost and batteries -------------------------------------------------------------------------------------------
@@ -188,13 +188,13 @@ def test_a_chrono_boost_lets_a_structure_work_half_again_as_fast_for_448_loops(m
 
 
 @pytest.mark.parametrize(("name", "owner", "why"), [
-    ("Nexus", 1, Refusal.SUCCESS),
-    ("Forge", 1, Refusal.SUCCESS),
-    ("Pylon", 1, Refusal.CANT_TARGET_THAT_UNIT),
-    ("Gateway", 2, Refusal.CANT_TARGET_ENEMY_UNITS),
-    ("Zealot", 1, Refusal.MUST_TARGET_STRUCTURES),
+    ("Nexus", 1, ActionResult.SUCCESS),
+    ("Forge", 1, ActionResult.SUCCESS),
+    ("Pylon", 1, ActionResult.CANT_TARGET_THAT_UNIT),
+    ("Gateway", 2, ActionResult.CANT_TARGET_ENEMY_UNITS),
+    ("Zealot", 1, ActionResult.MUST_TARGET_STRUCTURES),
 ])  # fmt: skip
-def test_what_can_be_boosted(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_what_can_be_boosted(field: Any, name: str, owner: int, why: ActionResult) -> None:
     nexus = put(field, "Nexus", 1, 8.5, 8.5)
     assert field.why_not(nexus, CHRONO, put(field, name, owner, 20.5, 8.5)) is why
 
@@ -228,17 +228,17 @@ def test_what_a_battery_refuses(make_field: Any, version: str) -> None:
     put(field, "Pylon", 1, 8.0, 14.0)
     battery, stalker = put(field, "ShieldBattery", 1, 8.0, 8.0, 90.0), put(field, "Stalker", 1, 12.0, 8.0)
     number = RECHARGE[version]
-    assert field.why_not(battery, number, stalker) is Refusal.CANT_TARGET_THAT_UNIT
+    assert field.why_not(battery, number, stalker) is ActionResult.CANT_TARGET_THAT_UNIT
     field.world.shields[stalker] = 10.0
-    assert field.why_not(battery, number, stalker) is Refusal.SUCCESS
+    assert field.why_not(battery, number, stalker) is ActionResult.SUCCESS
     far = put(field, "Stalker", 1, 20.0, 8.0)
     field.world.shields[far] = 1.0
-    assert field.why_not(battery, number, far) is Refusal.TARGET_IS_OUT_OF_RANGE
+    assert field.why_not(battery, number, far) is ActionResult.TARGET_IS_OUT_OF_RANGE
     enemy = put(field, "Stalker", 2, 10.0, 10.0)
     field.world.shields[enemy] = 1.0
-    assert field.why_not(battery, number, enemy) is Refusal.CANT_TARGET_ENEMY_UNITS
+    assert field.why_not(battery, number, enemy) is ActionResult.CANT_TARGET_ENEMY_UNITS
     field.world.energy[battery] = 9.0 if version == "5.0.13" else 0.0
-    assert field.why_not(battery, number, stalker) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(battery, number, stalker) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -273,12 +273,12 @@ def test_an_overcharged_battery_works_half_again_as_fast_and_for_nothing(make_fi
 
 
 @pytest.mark.parametrize(("name", "x", "why"), [
-    ("ShieldBattery", 26.0, Refusal.TARGET_IS_OUT_OF_RANGE),
-    ("PhotonCannon", 14.0, Refusal.CANT_TARGET_THAT_UNIT),
-    ("ShieldBattery", 14.0, Refusal.SUCCESS),
+    ("ShieldBattery", 26.0, ActionResult.TARGET_IS_OUT_OF_RANGE),
+    ("PhotonCannon", 14.0, ActionResult.CANT_TARGET_THAT_UNIT),
+    ("ShieldBattery", 14.0, ActionResult.SUCCESS),
 ])  # fmt: skip
 def test_only_a_battery_within_10_of_a_nexus_can_be_overcharged(
-    make_field: Any, name: str, x: float, why: Refusal
+    make_field: Any, name: str, x: float, why: ActionResult
 ) -> None:
     field = make_field(version="5.0.13")
     nexus = put(field, "Nexus", 1, 8.5, 8.5)

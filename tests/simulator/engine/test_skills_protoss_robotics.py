@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
-from simulator.damage import wound
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
+from simulator.damage import apply_damage
 
 VERSIONS = ("4.10", "5.0.13")
 NOVA, SURVEY, OBSERVE, PHASE, TRANSPORT = 2346, 3741, 3739, 1528, 1530
@@ -104,20 +104,20 @@ def test_a_disruptor_hardly_moves_while_its_nova_flies_and_cools_down_for_30_sec
     field.order(slot, NOVA, point=(14.0, 8.0))
     field.play(1)
     assert field.world.step_max[slot] * 16 == pytest.approx(2.25 - 2.2382)
-    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is Refusal.COOLDOWN
+    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is ActionResult.COOLDOWN
     field.play(48)
     assert field.world.step_max[slot] * 16 == pytest.approx(2.25)
     field.play(480 - 49)
-    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is Refusal.COOLDOWN
+    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is Refusal.SUCCESS
+    assert field.why_not(slot, NOVA, point=(9.0, 9.0)) is ActionResult.SUCCESS
 
 
 # the barrier ----------------------------------------------------------------------------------------------------------
 
 
 def hit(field: Any, victim: int, amount: float) -> None:
-    wound(field.world, -1, 2, victim, amount)
+    apply_damage(field.world, -1, 2, victim, amount)
 
 
 def test_in_4_10_the_first_damage_raises_a_barrier_of_100_for_3_seconds(make_field: Any) -> None:

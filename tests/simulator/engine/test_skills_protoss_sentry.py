@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 GUARDIAN_SHIELD, FORCE_FIELD, ARCHON_IMAGE = 76, 1526, 146
@@ -38,7 +38,7 @@ def test_a_guardian_shield_lasts_as_long_as_the_version_says_and_then_its_buff_r
     assert field.order(slot, GUARDIAN_SHIELD)
     last_seen = last_covered = 0
     for loop in field.loops(loops + 30):
-        if field.world.fields:
+        if field.world.area_effects:
             last_seen = loop
         if buffs.has(field.world, slot, "GuardianShield"):
             last_covered = loop
@@ -66,7 +66,7 @@ def test_clients_are_told_of_the_shield_as_effect_2_with_its_radius_where_the_se
     field.order(slot, GUARDIAN_SHIELD)
     commands.move(field.world, [slot], (14.0, 10.0))
     field.play(20)
-    (shield,) = field.world.fields
+    (shield,) = field.world.area_effects
     assert (shield.effect, shield.radius, shield.owner) == (2, 4.5, 1)
     assert shield.at == pytest.approx(tuple(field.world.pos[slot]), abs=2.25 / 16 + 1e-6)
     assert field.world.catalog.buff("GuardianShield").id == 18
@@ -97,13 +97,13 @@ def test_a_guardian_shield_costs_75_energy_and_cools_down(make_field: Any, versi
     slot = sentry(field)
     field.order(slot, GUARDIAN_SHIELD)
     assert field.world.energy[slot] == 125.0
-    assert field.why_not(slot, GUARDIAN_SHIELD) is Refusal.COOLDOWN
+    assert field.why_not(slot, GUARDIAN_SHIELD) is ActionResult.COOLDOWN
     field.play(math.ceil(cooldown) - 1)
-    assert field.why_not(slot, GUARDIAN_SHIELD) is Refusal.COOLDOWN
+    assert field.why_not(slot, GUARDIAN_SHIELD) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(slot, GUARDIAN_SHIELD) is Refusal.SUCCESS
+    assert field.why_not(slot, GUARDIAN_SHIELD) is ActionResult.SUCCESS
     field.world.energy[slot] = 74.9
-    assert field.why_not(slot, GUARDIAN_SHIELD) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(slot, GUARDIAN_SHIELD) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 @pytest.mark.parametrize("how", ["dead", "scrambled"])
@@ -117,7 +117,7 @@ def test_a_guardian_shield_ends_with_its_sentry(field: Any, how: str) -> None:
     else:
         buffs.apply(field.world, slot, "RavenScramblerMissile")
     field.play(12)
-    assert not field.world.fields
+    assert not field.world.area_effects
     assert not buffs.has(field.world, friend, "GuardianShield")
 
 
@@ -267,13 +267,13 @@ def test_an_image_has_no_abilities_but_walks_and_stops(field: Any) -> None:
     image = next(s for s in field.world.live.tolist() if s != slot)
     field.world.energy[image] = 200.0
     enemy = field.put("Sentry", 2, 13.0, 10.0)
-    assert field.why_not(image, 140, enemy) is Refusal.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
+    assert field.why_not(image, 140, enemy) is ActionResult.YOU_CANT_ISSUE_COMMANDS_TO_THAT_UNIT
     assert commands.move(field.world, [image], (15.0, 15.0)) == [image]
 
 
 def test_a_sentry_needs_75_energy_for_an_image(field: Any) -> None:
-    assert field.why_not(sentry(field, energy=74.0), ARCHON_IMAGE) is Refusal.NOT_ENOUGH_ENERGY
-    assert field.why_not(sentry(field, energy=75.0), ARCHON_IMAGE) is Refusal.SUCCESS
+    assert field.why_not(sentry(field, energy=74.0), ARCHON_IMAGE) is ActionResult.NOT_ENOUGH_ENERGY
+    assert field.why_not(sentry(field, energy=75.0), ARCHON_IMAGE) is ActionResult.SUCCESS
 
 
 def test_nobody_holds_on_to_an_image_that_is_gone(field: Any) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.stats import AIR_PLANE, GROUND_PLANE
 
 VERSIONS = ("4.10", "5.0.13")
@@ -96,13 +96,13 @@ def test_a_beam_ends_early_and_half_a_second_later_the_unit_is_free(make_field: 
 
 
 @pytest.mark.parametrize(("name", "owner", "why"), [
-    ("Colossus", 2, Refusal.CANT_TARGET_MASSIVE_UNITS),
-    ("Mutalisk", 2, Refusal.MUST_TARGET_GROUND_UNITS),
-    ("PhotonCannon", 2, Refusal.CANT_TARGET_STRUCTURES),
-    ("Zealot", 1, Refusal.SUCCESS),  # own units may be lifted
-    ("SiegeTank", 2, Refusal.SUCCESS),
+    ("Colossus", 2, ActionResult.CANT_TARGET_MASSIVE_UNITS),
+    ("Mutalisk", 2, ActionResult.MUST_TARGET_GROUND_UNITS),
+    ("PhotonCannon", 2, ActionResult.CANT_TARGET_STRUCTURES),
+    ("Zealot", 1, ActionResult.SUCCESS),  # own units may be lifted
+    ("SiegeTank", 2, ActionResult.SUCCESS),
 ])  # fmt: skip
-def test_what_can_be_lifted(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_what_can_be_lifted(field: Any, name: str, owner: int, why: ActionResult) -> None:
     phoenix = put(field, "Phoenix", 1, 8.0, 8.0)
     assert field.why_not(phoenix, LIFT, still(field, name, owner, 12.0, 8.0)) is why
 
@@ -122,8 +122,8 @@ def test_nobody_is_lifted_twice_and_nothing_is_let_go_that_is_not_held(field: An
     stalker = still(field, "Stalker", 2, 12.0, 9.0)
     field.order(one, LIFT, stalker)
     field.play(2)
-    assert field.why_not(other, LIFT, stalker) is Refusal.MUST_TARGET_GROUND_UNITS
-    assert field.why_not(other, LET_GO) is Refusal.CANT_FIND_CANCEL_ORDER
+    assert field.why_not(other, LIFT, stalker) is ActionResult.MUST_TARGET_GROUND_UNITS
+    assert field.why_not(other, LET_GO) is ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 def test_a_phoenix_lifts_from_4_away_and_needs_50_energy(field: Any) -> None:
@@ -135,7 +135,7 @@ def test_a_phoenix_lifts_from_4_away_and_needs_50_energy(field: Any) -> None:
     away = 22.0 - field.world.pos[phoenix, 0]
     assert 4.0 + 0.75 + 0.625 - 0.35 <= away <= 4.0 + 0.75 + 0.625 + 1e-6
     field.world.energy[phoenix] = 49.0
-    assert field.why_not(phoenix, LIFT, still(field, "Marine", 2, 20.0, 12.0)) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(phoenix, LIFT, still(field, "Marine", 2, 20.0, 12.0)) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 def test_who_can_only_shoot_down_lets_go_of_the_lifted_and_who_shoots_up_takes_over(field: Any) -> None:
@@ -186,19 +186,19 @@ def test_a_pulsar_beam_deals_15_and_22_to_light_past_armor(field: Any) -> None:
 
 def test_a_pulsar_beam_is_switched_off_and_can_be_on_again_after_four_seconds(field: Any) -> None:
     oracle = put(field, "Oracle", 1, 8.0, 8.0)
-    assert field.why_not(oracle, NO_PULSE) is Refusal.ERROR
+    assert field.why_not(oracle, NO_PULSE) is ActionResult.ERROR
     field.order(oracle, PULSE)
     field.play(10)
-    assert field.why_not(oracle, PULSE) is Refusal.COOLDOWN
+    assert field.why_not(oracle, PULSE) is ActionResult.COOLDOWN
     assert field.order(oracle, NO_PULSE)
     assert not has(field, oracle, "OracleWeapon")
     field.play(53)
-    assert field.why_not(oracle, PULSE) is Refusal.COOLDOWN
+    assert field.why_not(oracle, PULSE) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(oracle, PULSE) is Refusal.SUCCESS
+    assert field.why_not(oracle, PULSE) is ActionResult.SUCCESS
     field.order(oracle, PULSE)
     field.play(70)
-    assert field.why_not(oracle, PULSE) is Refusal.ERROR
+    assert field.why_not(oracle, PULSE) is ActionResult.ERROR
 
 
 @pytest.mark.parametrize(("version", "energy", "cooldown", "loops"), [("4.10", 50, 40, 672), ("5.0.13", 25, 224, 448)])
@@ -219,9 +219,9 @@ def test_a_revelation_shows_enemies_around_a_point_cloaked_ones_too(
     assert field.world.visible[1, hidden]
     assert not field.world.cloaked[hidden]
     field.play(cooldown - 1)
-    assert field.why_not(oracle, REVEAL, point=(20.0, 8.0)) is Refusal.COOLDOWN
+    assert field.why_not(oracle, REVEAL, point=(20.0, 8.0)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(oracle, REVEAL, point=(20.0, 8.0)) is Refusal.SUCCESS
+    assert field.why_not(oracle, REVEAL, point=(20.0, 8.0)) is ActionResult.SUCCESS
     field.play(loops - cooldown - 1)
     assert field.world.visible[1, hidden]
     field.play(6)
@@ -301,9 +301,9 @@ def test_a_trap_catches_ground_enemies_within_5_once_one_comes_within_3(make_fie
 def test_a_trap_can_t_be_set_where_nothing_can_stand(field: Any) -> None:
     oracle = put(field, "Oracle", 1, 8.0, 8.0)
     field.put("Pylon", 1, 12.0, 12.0)
-    assert field.why_not(oracle, TRAP, point=(12.0, 12.0)) is Refusal.CANT_BUILD_LOCATION_INVALID
+    assert field.why_not(oracle, TRAP, point=(12.0, 12.0)) is ActionResult.CANT_BUILD_LOCATION_INVALID
     field.world.energy[oracle] = 49.0
-    assert field.why_not(oracle, TRAP, point=(15.0, 15.0)) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(oracle, TRAP, point=(15.0, 15.0)) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 # Void Ray -------------------------------------------------------------------------------------------------------------
@@ -333,14 +333,14 @@ def test_an_aligned_void_ray_deals_6_more_to_armored_and_is_slower(make_field: A
 
 def test_an_alignment_lasts_20_seconds_cools_down_for_60_and_can_be_given_up(field: Any) -> None:
     ray = put(field, "VoidRay", 1, 8.0, 8.0)
-    assert field.why_not(ray, UNALIGN) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(ray, UNALIGN) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.order(ray, ALIGN)
     field.play(319)
     assert has(field, ray, "VoidRaySwarmDamageBoost")
     field.play(1)
     assert not has(field, ray, "VoidRaySwarmDamageBoost")
     field.play(960 - 321)
-    assert field.why_not(ray, ALIGN) is Refusal.COOLDOWN
+    assert field.why_not(ray, ALIGN) is ActionResult.COOLDOWN
     field.play(1)
     field.order(ray, ALIGN)
     assert field.order(ray, UNALIGN)

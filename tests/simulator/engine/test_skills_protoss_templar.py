@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import buffs, casting, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 PSI_STORM, FEEDBACK, MERGE, MERGE_WITH = 1036, 140, 1766, 1767
@@ -97,11 +97,11 @@ def test_clients_see_a_storm_as_effect_1_and_buff_28(field: Any) -> None:
     victim = still(field, "Roach", 2, 16.0, 8.0)
     field.order(slot, PSI_STORM, point=(16.0, 8.0))
     field.play(1)
-    (storm,) = field.world.fields
+    (storm,) = field.world.area_effects
     assert (storm.effect, storm.at, storm.radius) == (1, (16.0, 8.0), 1.5)
     assert [field.world.catalog.buffs[r].id for r in field.world.buffs.of(victim)["buff"]] == [28]
     for _ in field.loops(80):
-        if not field.world.fields:
+        if not field.world.area_effects:
             break
     assert field.world.loop - 1 == math.ceil(6 * 0.5712 * 16)
 
@@ -109,16 +109,16 @@ def test_clients_see_a_storm_as_effect_1_and_buff_28(field: Any) -> None:
 def test_a_storm_needs_its_research_energy_and_two_seconds_between_two(field: Any) -> None:
     slot = field.put("HighTemplar", 1, 8.0, 8.0)
     field.world.energy[slot] = 200.0
-    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.research(1, "PsiStormTech")
     field.order(slot, PSI_STORM, point=(12.0, 8.0))
     field.play(1)
     assert field.world.energy[slot] == pytest.approx(125.0, abs=0.1)
-    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is Refusal.COOLDOWN
+    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is ActionResult.COOLDOWN
     field.play(32)
-    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is Refusal.SUCCESS
+    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is ActionResult.SUCCESS
     field.world.energy[slot] = 74.0
-    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(slot, PSI_STORM, point=(12.0, 8.0)) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 def test_of_many_templars_told_to_storm_one_does(field: Any) -> None:
@@ -147,13 +147,15 @@ def test_feedback_takes_all_energy_and_half_of_it_as_damage_from_its_range(
 
 
 @pytest.mark.parametrize(("name", "why"), [
-    ("Nexus", Refusal.CANT_TARGET_THAT_UNIT),
-    ("OrbitalCommand", Refusal.CANT_TARGET_THAT_UNIT),
-    ("ShieldBattery", Refusal.CANT_TARGET_THAT_UNIT),
-    ("Marine", Refusal.MUST_TARGET_ENERGY_CAPABLE_UNITS),
-    ("Medivac", Refusal.SUCCESS),
+    ("Nexus", ActionResult.CANT_TARGET_THAT_UNIT),
+    ("OrbitalCommand", ActionResult.CANT_TARGET_THAT_UNIT),
+    ("ShieldBattery", ActionResult.CANT_TARGET_THAT_UNIT),
+    ("Marine", ActionResult.MUST_TARGET_ENERGY_CAPABLE_UNITS),
+    ("Medivac", ActionResult.SUCCESS),
 ])  # fmt: skip
-def test_feedback_is_for_enemies_with_energy_but_not_for_these_structures(field: Any, name: str, why: Refusal) -> None:
+def test_feedback_is_for_enemies_with_energy_but_not_for_these_structures(
+    field: Any, name: str, why: ActionResult
+) -> None:
     slot = templar(field)
     assert field.why_not(slot, FEEDBACK, still(field, name, 2, 12.0, 8.0)) is why
 
@@ -162,8 +164,8 @@ def test_feedback_is_not_for_friends_nor_for_who_has_no_energy_left(field: Any) 
     slot = templar(field)
     empty = still(field, "Medivac", 2, 12.0, 8.0)
     field.world.energy[empty] = 0.0
-    assert field.why_not(slot, FEEDBACK, empty) is Refusal.MUST_TARGET_ENERGY_CAPABLE_UNITS
-    assert field.why_not(slot, FEEDBACK, templar(field, 12.0, 12.0)) is Refusal.CANT_TARGET_YOUR_OWN_UNITS
+    assert field.why_not(slot, FEEDBACK, empty) is ActionResult.MUST_TARGET_ENERGY_CAPABLE_UNITS
+    assert field.why_not(slot, FEEDBACK, templar(field, 12.0, 12.0)) is ActionResult.CANT_TARGET_YOUR_OWN_UNITS
 
 
 # Archons --------------------------------------------------------------------------------------------------------------
@@ -221,13 +223,13 @@ def test_a_templar_may_be_told_whom_to_merge_with(field: Any) -> None:
 
 
 @pytest.mark.parametrize(("name", "owner", "why"), [
-    ("Zealot", 1, Refusal.CANT_TARGET_THAT_UNIT),
-    ("HighTemplar", 2, Refusal.MUST_TARGET_YOUR_OWN_UNITS),
+    ("Zealot", 1, ActionResult.CANT_TARGET_THAT_UNIT),
+    ("HighTemplar", 2, ActionResult.MUST_TARGET_YOUR_OWN_UNITS),
 ])  # fmt: skip
-def test_only_an_own_templar_is_a_partner(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_only_an_own_templar_is_a_partner(field: Any, name: str, owner: int, why: ActionResult) -> None:
     slot = templar(field)
     assert field.why_not(slot, MERGE_WITH, field.put(name, owner, 12.0, 8.0)) is why
-    assert field.why_not(slot, MERGE_WITH, slot) is Refusal.CANT_TARGET_THAT_UNIT
+    assert field.why_not(slot, MERGE_WITH, slot) is ActionResult.CANT_TARGET_THAT_UNIT
 
 
 def test_a_templar_that_dies_on_the_way_leaves_the_other_one_idle(field: Any) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, casting, commands
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.refusal import Refusal
 from simulator.skills.buildings import Radar, radars
 
 VERSIONS = ("4.10", "5.0.13")
@@ -46,12 +46,12 @@ def test_a_sweep_shows_what_is_cloaked_in_its_circle_for_its_time(foggy: Any) ->
     assert not world.visible[1, hidden]
     assert foggy.order(slot, SCAN, point=(24, 24))
     assert world.energy[slot] == pytest.approx(60 - ability.energy, abs=0.3)
-    assert [(f.effect, f.radius, f.at, f.detects) for f in world.fields] == [(6, 13, (24, 24), True)]
+    assert [(f.effect, f.radius, f.at, f.detects) for f in world.area_effects] == [(6, 13, (24, 24), True)]
     foggy.play(4)
     assert world.visible[1, hidden]
     assert world.visibility[1, 24, 24] == 2
     foggy.play(int(ability.numbers["duration_loops"]) + 1)
-    assert not world.fields
+    assert not world.area_effects
     foggy.play(4)
     assert not world.visible[1, hidden]
     assert world.visibility[1, 24, 24] == 1
@@ -61,7 +61,7 @@ def test_a_sweep_needs_energy_and_of_several_the_one_with_most_is_used(field: An
     world = field.world
     poor, rich = orbital(field), field.put("OrbitalCommand", 1, 14.5, 5.5)
     world.energy[poor], world.energy[rich] = 49.0, 120.0
-    assert field.why_not(poor, SCAN, point=(20, 20)) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(poor, SCAN, point=(20, 20)) is ActionResult.NOT_ENOUGH_ENERGY
     world.energy[poor] = 55.0
     assert casting.use(world, [poor, rich], world.catalog.ability(SCAN), point=(20, 20))
     assert sorted([world.energy[poor], world.energy[rich]]) in ([5.0, 120.0], [55.0, 70.0])
@@ -96,9 +96,9 @@ def test_a_mule_is_called_onto_minerals_that_it_mines(field: Any) -> None:
 def test_a_mule_is_not_called_onto_units_or_into_the_fog(foggy: Any) -> None:
     slot, marine = orbital(foggy), foggy.still("Marine", 1, 12, 5)
     foggy.play(5)
-    assert foggy.why_not(slot, MULE, marine) is Refusal.MUST_TARGET_RESOURCES
-    assert foggy.why_not(slot, MULE, point=(29, 29)) is Refusal.MUST_TARGET_VISIBLE_LOCATION
-    assert foggy.why_not(slot, MULE, point=(8, 10)) is Refusal.SUCCESS
+    assert foggy.why_not(slot, MULE, marine) is ActionResult.MUST_TARGET_RESOURCES
+    assert foggy.why_not(slot, MULE, point=(29, 29)) is ActionResult.MUST_TARGET_VISIBLE_LOCATION
+    assert foggy.why_not(slot, MULE, point=(8, 10)) is ActionResult.SUCCESS
 
 
 # extra supplies -------------------------------------------------------------------------------------------------------
@@ -109,14 +109,14 @@ def test_extra_supplies_arrive_once_per_depot(field: Any) -> None:
     slot, depot = orbital(field), field.put("SupplyDepot", 1, 12, 12)
     world.energy[slot] = 150.0
     assert field.order(slot, SUPPLIES, depot)
-    assert field.why_not(slot, SUPPLIES, depot) is Refusal.CANT_TARGET_THAT_UNIT
+    assert field.why_not(slot, SUPPLIES, depot) is ActionResult.CANT_TARGET_THAT_UNIT
     field.play(int(ability.numbers["delay_loops"]) - 1)
     assert not buffs.has(world, depot, "SupplyDrop")
     field.play(2)
     assert buffs.has(world, depot, "SupplyDrop")
     assert world.catalog.buff("SupplyDrop").supply == ability.numbers["supply"] == 8
-    assert field.why_not(slot, SUPPLIES, depot) is Refusal.CANT_TARGET_THAT_UNIT
-    assert field.why_not(slot, SUPPLIES, slot) is Refusal.CANT_TARGET_THAT_UNIT
+    assert field.why_not(slot, SUPPLIES, depot) is ActionResult.CANT_TARGET_THAT_UNIT
+    assert field.why_not(slot, SUPPLIES, slot) is ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # repair ---------------------------------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ def test_repair_stops_when_the_money_is_gone(field: Any) -> None:
     assert world.players[1].minerals == pytest.approx(0, abs=0.1)
     assert world.life[other] < 110
     assert world.order_kind[slot] == 0
-    assert field.why_not(slot, REPAIR, other) is Refusal.NOT_ENOUGH_MINERALS
+    assert field.why_not(slot, REPAIR, other) is ActionResult.NOT_ENOUGH_MINERALS
 
 
 @pytest.mark.parametrize("start", [(4.0, 4.0), (12.5, 4.0), (20.0, 20.0), (8.5, 12.0)])
@@ -198,10 +198,11 @@ def test_a_worker_follows_what_drives_away(field: Any) -> None:
 
 @pytest.mark.parametrize(
     ("name", "owner", "life", "why"),
-    [("Marine", 1, 10, Refusal.MUST_TARGET_MECHANICAL_UNITS), ("SiegeTank", 2, 10, Refusal.CANT_TARGET_ENEMY_UNITS),
-     ("SiegeTank", 1, 175, Refusal.REQUIRES_REPAIR_TARGET), ("SiegeTank", 1, 10, Refusal.SUCCESS)],
+    [("Marine", 1, 10, ActionResult.MUST_TARGET_MECHANICAL_UNITS),
+     ("SiegeTank", 2, 10, ActionResult.CANT_TARGET_ENEMY_UNITS),
+     ("SiegeTank", 1, 175, ActionResult.REQUIRES_REPAIR_TARGET), ("SiegeTank", 1, 10, ActionResult.SUCCESS)],
 )  # fmt: skip
-def test_what_can_be_repaired(field: Any, name: str, owner: int, life: float, why: Refusal) -> None:
+def test_what_can_be_repaired(field: Any, name: str, owner: int, life: float, why: ActionResult) -> None:
     slot, other = worker(field, 10, 10), field.still(name, owner, 12, 10)
     field.world.life[other] = life
     assert field.why_not(slot, REPAIR, other) is why
@@ -271,9 +272,9 @@ def test_landing_takes_its_time_above_the_place(field: Any) -> None:
 def test_a_structure_does_not_land_on_others_or_off_the_map(field: Any) -> None:
     slot = field.put("BarracksFlying", 1, 10.5, 10.5)
     field.put("SupplyDepotLowered", 1, 20, 20)
-    assert field.why_not(slot, LAND_BARRACKS, point=(20.5, 20.5)) is not Refusal.SUCCESS
-    assert field.why_not(slot, LAND_BARRACKS, point=(0.5, 0.5)) is not Refusal.SUCCESS
-    assert field.why_not(slot, LAND_BARRACKS, point=(14.5, 10.5)) is Refusal.SUCCESS
+    assert field.why_not(slot, LAND_BARRACKS, point=(20.5, 20.5)) is not ActionResult.SUCCESS
+    assert field.why_not(slot, LAND_BARRACKS, point=(0.5, 0.5)) is not ActionResult.SUCCESS
+    assert field.why_not(slot, LAND_BARRACKS, point=(14.5, 10.5)) is ActionResult.SUCCESS
 
 
 def test_an_add_on_stays_behind_and_serves_who_lands_beside_it(field: Any) -> None:
@@ -365,7 +366,7 @@ def test_salvage_gives_three_quarters_back_when_it_is_done(field: Any) -> None:
 def test_a_bunker_with_somebody_inside_is_not_salvaged(field: Any) -> None:
     slot, marine = field.put("Bunker", 1, 10.5, 10.5), field.put("Marine", 1, 14, 10)
     field.world.stow(marine, slot)
-    assert field.why_not(slot, SALVAGE) is Refusal.ERROR
+    assert field.why_not(slot, SALVAGE) is ActionResult.ERROR
 
 
 # depots and radar -----------------------------------------------------------------------------------------------------

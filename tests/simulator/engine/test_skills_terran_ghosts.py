@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 SNIPE, EMP, CLOAK, UNCLOAK, HOLD_FIRE, FREE, NUKE, CANCEL_NUKE = 2714, 1628, 382, 383, 36, 38, 1622, 1623
@@ -71,20 +71,20 @@ def test_a_new_order_drops_the_shot_and_gives_the_energy_back(field: Any) -> Non
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
     [
-        ("SiegeTank", 2, Refusal.MUST_TARGET_BIOLOGICAL_UNITS),
-        ("Hatchery", 2, Refusal.CANT_TARGET_STRUCTURES),
-        ("Marine", 1, Refusal.CANT_TARGET_YOUR_OWN_UNITS),
-        ("Marine", 2, Refusal.SUCCESS),
+        ("SiegeTank", 2, ActionResult.MUST_TARGET_BIOLOGICAL_UNITS),
+        ("Hatchery", 2, ActionResult.CANT_TARGET_STRUCTURES),
+        ("Marine", 1, ActionResult.CANT_TARGET_YOUR_OWN_UNITS),
+        ("Marine", 2, ActionResult.SUCCESS),
     ],
 )
-def test_whom_a_snipe_may_be_aimed_at(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_whom_a_snipe_may_be_aimed_at(field: Any, name: str, owner: int, why: ActionResult) -> None:
     ghost, victim = field.still("Ghost", 1, 6, 10, energy=60), field.still(name, owner, 12.5, 10.5)
     assert field.why_not(ghost, SNIPE, victim) is why
 
 
 def test_a_snipe_needs_energy(field: Any) -> None:
     ghost, victim = field.still("Ghost", 1, 6, 10, energy=49), field.still("Marine", 2, 12, 10)
-    assert field.why_not(ghost, SNIPE, victim) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(ghost, SNIPE, victim) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 def test_a_snipe_is_lost_on_a_target_beyond_the_leash_where_there_is_one(field: Any) -> None:
@@ -155,7 +155,7 @@ def test_a_cloak_hides_its_bearer_until_the_energy_is_used_up(
 ) -> None:
     world, ability = field.world, field.world.catalog.ability(number)
     slot: int = field.still(name, 1, 10, 10, energy=40)
-    assert field.why_not(slot, number) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, number) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.research(1, research)
     assert field.order(slot, number)
     assert world.energy[slot] == 40 - ability.energy == 15
@@ -175,9 +175,9 @@ def test_a_cloak_hides_its_bearer_until_the_energy_is_used_up(
 def test_a_cloak_is_put_on_once_and_taken_off_at_once(field: Any) -> None:
     field.research(1, "PersonalCloaking")
     slot: int = field.still("Ghost", 1, 10, 10, energy=100)
-    assert field.why_not(slot, UNCLOAK) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, UNCLOAK) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.order(slot, CLOAK)
-    assert field.why_not(slot, CLOAK) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, CLOAK) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     assert field.order(slot, UNCLOAK)
     assert not field.world.cloaked[slot]
 
@@ -197,7 +197,7 @@ def test_a_detector_sees_a_cloaked_ghost(field: Any) -> None:
 def test_a_ghost_that_holds_its_fire_fights_only_when_told(field: Any) -> None:
     world = field.world
     ghost, victim = field.put("Ghost", 1, 10, 10), field.still("Hatchery", 2, 16, 10)
-    assert field.why_not(ghost, FREE) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(ghost, FREE) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.order(ghost, HOLD_FIRE)
     field.play(60)
     assert world.life[victim] == 1500
@@ -239,7 +239,7 @@ def test_a_nuke_comes_down_after_its_time_in_rings_of_damage(field: Any) -> None
     assert field.order(ghost, NUKE, point=point)
     field.play(1)
     begun = world.loop
-    assert [(f.effect, f.at) for f in world.fields] == [(7, point)]
+    assert [(f.effect, f.at) for f in world.area_effects] == [(7, point)]
     falls = int(numbers["delay_loops"] + numbers["post_detonate_damage_delay_loops"])
     field.play(falls - 1)
     assert all(world.life[slot] > 499 for slot in victims)
@@ -267,10 +267,10 @@ def test_structures_take_more_of_a_nuke(field: Any) -> None:
 
 def test_a_strike_uses_up_one_nuke_and_needs_one(field: Any) -> None:
     ghost = armed(field)
-    assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.SUCCESS
+    assert field.why_not(ghost, NUKE, point=(17, 16)) is ActionResult.SUCCESS
     field.order(ghost, NUKE, point=(17, 16))
     field.play(2)
-    assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(ghost, NUKE, point=(17, 16)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     assert not any(field.world.unit_type(s).name == "Nuke" for s in range(field.world.top) if field.world.alive[s])
 
 
@@ -279,7 +279,7 @@ def test_an_academy_arms_a_nuke_that_a_ghost_then_calls(field: Any) -> None:
     ghost, academy = field.still("Ghost", 1, 6, 16), field.put("GhostAcademy", 1, 4.5, 28.5)
     field.put("Factory", 1, 10.5, 28.5)
     world.players[1].minerals = world.players[1].vespene = 100.0
-    assert field.why_not(ghost, NUKE, point=(17, 16)) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(ghost, NUKE, point=(17, 16)) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     assert field.order(academy, ARM)
     field.play(int(world.catalog.ability(ARM).loops) + 2)
     assert field.order(ghost, NUKE, point=(17, 16))
@@ -298,7 +298,7 @@ def test_a_strike_is_lost_when_the_ghost_stops_painting(field: Any, how: str) ->
     else:
         world.life[ghost] = 0.0
     field.play(2)
-    assert not world.fields
+    assert not world.area_effects
     field.play(30)
     assert world.life[victim] == 500
 
@@ -313,4 +313,4 @@ def test_a_strike_that_is_down_needs_no_painter_any_more(field: Any) -> None:
 
 
 def test_there_is_nothing_to_cancel_without_a_strike(field: Any) -> None:
-    assert field.why_not(armed(field), CANCEL_NUKE) is Refusal.CANT_FIND_CANCEL_ORDER
+    assert field.why_not(armed(field), CANCEL_NUKE) is ActionResult.CANT_FIND_CANCEL_ORDER

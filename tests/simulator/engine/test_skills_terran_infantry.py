@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from simulator import buffs, commands
+from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 STIM, STIM_MARAUDER, KD8 = 380, 253, 2588
@@ -67,13 +67,13 @@ def test_a_second_stimpack_begins_the_time_anew_and_does_not_add_up(field: Any) 
 
 def test_stimpacks_need_their_research_and_more_life_than_they_cost(field: Any) -> None:
     slot = field.put("Marine", 1, 10, 10)
-    assert field.why_not(slot, STIM) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, STIM) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.research(1, "Stimpack")
     field.world.life[slot] = 10.0
-    assert field.why_not(slot, STIM) is Refusal.NOT_ENOUGH_LIFE
+    assert field.why_not(slot, STIM) is ActionResult.NOT_ENOUGH_LIFE
     assert not field.order(slot, STIM)
     field.world.life[slot] = 10.5
-    assert field.why_not(slot, STIM) is Refusal.SUCCESS
+    assert field.why_not(slot, STIM) is ActionResult.SUCCESS
 
 
 def test_a_stimmed_marine_fires_more_often_by_the_factor(field: Any) -> None:
@@ -198,7 +198,7 @@ def test_a_charge_does_not_throw_what_is_massive_built_or_a_larva(field: Any, na
             break
     assert world.life[victim] < before
     assert not buffs.has(world, victim, "ReaperKD8Knockback")
-    assert not [item for item in world.fields if item.does == "knockback"]
+    assert not [item for item in world.area_effects if item.rule == "knockback"]
 
 
 def test_a_charge_is_a_body_that_nobody_can_touch_and_is_gone_with_its_explosion(field: Any) -> None:
@@ -217,20 +217,20 @@ def test_a_reaper_walks_into_range_and_has_to_wait_for_the_next_charge(field: An
     reaper = field.still("Reaper", 1, 4, 10)
     assert field.order(reaper, KD8, point=(16, 10))
     for _ in field.loops(100):
-        if world.fields:
+        if world.area_effects:
             break
     radius = world.radius[reaper]
     assert math.dist(world.pos[reaper].tolist(), (16, 10)) == pytest.approx(ability.range + radius, abs=0.3)
-    assert field.why_not(reaper, KD8, point=(16, 10)) is Refusal.COOLDOWN
+    assert field.why_not(reaper, KD8, point=(16, 10)) is ActionResult.COOLDOWN
     field.play(int(ability.cooldown_loops) - 1)
-    assert field.why_not(reaper, KD8, point=(16, 10)) is Refusal.COOLDOWN
+    assert field.why_not(reaper, KD8, point=(16, 10)) is ActionResult.COOLDOWN
     field.play(1)
-    assert field.why_not(reaper, KD8, point=(16, 10)) is Refusal.SUCCESS
+    assert field.why_not(reaper, KD8, point=(16, 10)) is ActionResult.SUCCESS
 
 
 def test_a_charge_is_not_thrown_at_flyers(field: Any) -> None:
     reaper, flyer = field.still("Reaper", 1, 10, 10), field.still("Mutalisk", 2, 13, 10)
-    assert field.why_not(reaper, KD8, flyer) is Refusal.MUST_TARGET_GROUND_UNITS
+    assert field.why_not(reaper, KD8, flyer) is ActionResult.MUST_TARGET_GROUND_UNITS
 
 
 def test_both_versions_have_the_same_stimpack() -> None:

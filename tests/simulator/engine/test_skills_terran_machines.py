@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import buffs, casting, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 SIEGE, UNSIEGE, ASSAULT, FIGHTER, HELLBAT, HELLION, HIGH_IMPACT, EXPLOSIVE = 388, 390, 403, 405, 1998, 1978, 2362, 2364
@@ -81,9 +81,9 @@ def test_what_can_be_cancelled_is(field: Any, name: str, number: int, cancel: in
 def test_a_viking_does_not_land_where_nobody_can_stand(field: Any) -> None:
     slot = field.put("VikingFighter", 1, 10.5, 10.5)
     field.put("Barracks", 2, 10.5, 10.5)
-    assert field.why_not(slot, ASSAULT) is Refusal.CANT_LAND_LOCATION_INVALID
+    assert field.why_not(slot, ASSAULT) is ActionResult.CANT_LAND_LOCATION_INVALID
     field.world.pos[slot] = (14, 10)
-    assert field.why_not(slot, ASSAULT) is Refusal.SUCCESS
+    assert field.why_not(slot, ASSAULT) is ActionResult.SUCCESS
 
 
 def test_stop_does_not_keep_a_tank_from_sieging(field: Any) -> None:
@@ -127,9 +127,9 @@ def test_the_splash_of_a_sieged_tank_hurts_friends(field: Any) -> None:
 
 def test_hellbats_need_an_armory(field: Any) -> None:
     slot = field.put("Hellion", 1, 6, 10)
-    assert field.why_not(slot, HELLBAT) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, HELLBAT) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.put("Armory", 1, 20.5, 20.5)
-    assert field.why_not(slot, HELLBAT) is Refusal.SUCCESS
+    assert field.why_not(slot, HELLBAT) is ActionResult.SUCCESS
 
 
 # Widow Mine -----------------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ def test_a_burrowed_mine_is_hidden_and_fires_by_itself_after_taking_aim(field: A
     assert not world.visible[2, slot]
     victim = field.still("Ultralisk", 2, 10 + ability.range + 1.0, 10)
     begun = field.until(lambda: world.casts[slot])
-    fired = field.until(lambda: world.fields)
+    fired = field.until(lambda: world.area_effects)
     assert ability.prep_loops <= fired - begun <= ability.prep_loops + 2
     field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == pytest.approx(ability.numbers["damage"])
@@ -248,9 +248,9 @@ def test_a_mine_fires_once_per_cooldown_and_only_from_the_ground(field: Any) -> 
     life = world.life[victim]
     field.play(int(ability.cooldown_loops) - 40)
     assert world.life[victim] == pytest.approx(life, abs=13)  # Zerg regain life
-    assert field.why_not(slot, MINE_ATTACK, victim) is Refusal.COOLDOWN
+    assert field.why_not(slot, MINE_ATTACK, victim) is ActionResult.COOLDOWN
     above = field.still("WidowMine", 1, 20, 20)
-    assert field.why_not(above, MINE_ATTACK, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(above, MINE_ATTACK, victim) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_a_mine_lets_go_of_who_leaves_its_range_in_time(field: Any) -> None:
@@ -261,16 +261,16 @@ def test_a_mine_lets_go_of_who_leaves_its_range_in_time(field: Any) -> None:
     field.play(10)
     world.pos[victim] = (22, 10)
     field.play(40)
-    assert not world.fields
+    assert not world.area_effects
     assert world.life[victim] == 500
 
 
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
-    [("Hatchery", 2, Refusal.CANT_TARGET_STRUCTURES), ("Marine", 1, Refusal.CANT_TARGET_YOUR_OWN_UNITS),
-     ("Larva", 2, Refusal.CANT_TARGET_THAT_UNIT), ("Mutalisk", 2, Refusal.SUCCESS)],
+    [("Hatchery", 2, ActionResult.CANT_TARGET_STRUCTURES), ("Marine", 1, ActionResult.CANT_TARGET_YOUR_OWN_UNITS),
+     ("Larva", 2, ActionResult.CANT_TARGET_THAT_UNIT), ("Mutalisk", 2, ActionResult.SUCCESS)],
 )  # fmt: skip
-def test_whom_a_mine_may_fire_at(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_whom_a_mine_may_fire_at(field: Any, name: str, owner: int, why: ActionResult) -> None:
     slot = mine(field)
     assert field.why_not(slot, MINE_ATTACK, field.still(name, owner, 14, 10)) is why
 
@@ -291,7 +291,7 @@ def test_a_lock_marks_its_target_and_silences_the_cyclones_own_weapon(field: Any
     slot, victim = locked(field)
     assert buffs.has(field.world, victim, "LockOn")
     assert not field.world.can_attack[slot]
-    assert field.why_not(slot, LOCK_ON, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, LOCK_ON, victim) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_the_missiles_of_a_lock_add_up_to_what_the_tables_say(field: Any) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from simulator import buffs
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 
 VERSIONS = ("4.10", "5.0.13")
 TURRET, MATRIX, SHREDDER = 1764, 3747, 3753
@@ -46,8 +46,8 @@ def test_an_auto_turret_stands_on_the_grid_fires_and_falls_after_its_time(field:
 def test_an_auto_turret_needs_room(field: Any) -> None:
     slot = raven(field)
     field.put("SupplyDepot", 2, 9, 10)
-    assert field.why_not(slot, TURRET, point=(9, 10)) is not Refusal.SUCCESS
-    assert field.why_not(slot, TURRET, point=(9, 14)) is Refusal.SUCCESS
+    assert field.why_not(slot, TURRET, point=(9, 10)) is not ActionResult.SUCCESS
+    assert field.why_not(slot, TURRET, point=(9, 14)) is ActionResult.SUCCESS
 
 
 def test_an_interference_matrix_keeps_a_machine_from_fighting_for_its_time(field: Any) -> None:
@@ -66,10 +66,10 @@ def test_an_interference_matrix_keeps_a_machine_from_fighting_for_its_time(field
 
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
-    [("Marine", 2, Refusal.MUST_TARGET_MECHANICAL_UNITS), ("HighTemplar", 2, Refusal.SUCCESS),
-     ("Bunker", 2, Refusal.CANT_TARGET_STRUCTURES), ("SiegeTank", 1, Refusal.CANT_TARGET_YOUR_OWN_UNITS)],
+    [("Marine", 2, ActionResult.MUST_TARGET_MECHANICAL_UNITS), ("HighTemplar", 2, ActionResult.SUCCESS),
+     ("Bunker", 2, ActionResult.CANT_TARGET_STRUCTURES), ("SiegeTank", 1, ActionResult.CANT_TARGET_YOUR_OWN_UNITS)],
 )  # fmt: skip
-def test_whom_an_interference_matrix_may_be_aimed_at(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_whom_an_interference_matrix_may_be_aimed_at(field: Any, name: str, owner: int, why: ActionResult) -> None:
     assert field.why_not(raven(field), MATRIX, field.still(name, owner, 12.5, 10.5)) is why
 
 
@@ -87,11 +87,11 @@ def test_an_interference_matrix_uncovers_who_is_cloaked(field: Any) -> None:
 def test_in_5_0_13_nobody_is_jammed_twice_and_research_is_needed(make_field: Any) -> None:
     field = make_field(version="5.0.13")
     bare, victim = field.still("Raven", 1, 6, 12, energy=150), field.still("SiegeTank", 2, 14, 10)
-    assert field.why_not(bare, MATRIX, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(bare, MATRIX, victim) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     slot = raven(field)
     field.order(slot, MATRIX, victim)
     field.play(3)
-    assert field.why_not(bare, MATRIX, victim) is Refusal.ALREADY_TARGETED
+    assert field.why_not(bare, MATRIX, victim) is ActionResult.ALREADY_TARGETED
 
 
 def test_an_anti_armor_missile_weakens_all_around_its_target_for_its_time(field: Any) -> None:
@@ -114,11 +114,11 @@ def test_an_anti_armor_missile_flies_at_its_speed_and_gives_up_on_who_runs_far(f
     world, numbers = field.world, field.world.catalog.ability(SHREDDER).numbers
     slot, victim = raven(field, 4), field.still("Mutalisk", 2, 13, 10)
     field.order(slot, SHREDDER, victim)
-    begun = field.until(lambda: world.fields)
+    begun = field.until(lambda: world.area_effects)
     world.pos[victim] = (31, 10)
     field.play(16)
-    assert world.fields[0].at[0] == pytest.approx(4 + MECHANICS.shredder_speed_n, abs=0.3)
-    lost = field.until(lambda: not world.fields)
+    assert world.area_effects[0].at[0] == pytest.approx(4 + MECHANICS.shredder_speed_n, abs=0.3)
+    lost = field.until(lambda: not world.area_effects)
     assert lost - begun == numbers["patience_loops"]
     assert not buffs.has(world, victim, "RavenShredderMissileArmorReductionUISubtruct")
     assert MECHANICS.shredder_speed_n * numbers["patience_loops"] / 16 > numbers["patience_range"]
@@ -130,7 +130,7 @@ def test_abilities_need_their_energy(field: Any) -> None:
         ability = field.world.catalog.ability(number)
         field.world.energy[slot] = ability.energy - 1
         target, point = (NOBODY, (8.0, 10.0)) if number == TURRET else (victim, None)
-        assert field.why_not(slot, number, target, point) is Refusal.NOT_ENOUGH_ENERGY
+        assert field.why_not(slot, number, target, point) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 def test_a_raven_detects(field: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from simulator import buffs, casting, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 YAMATO, JUMP, GUARD, LEAVE, HEAL, BOOST = 401, 2358, 2558, 2560, 386, 2116
@@ -34,7 +34,7 @@ def test_the_yamato_cannon_fires_when_it_is_charged(field: Any) -> None:
     slot, victim = cruiser(field), field.still("Ultralisk", 2, 13, 10)
     assert field.order(slot, YAMATO, victim)
     field.play(1)
-    fired = field.until(lambda: world.fields)
+    fired = field.until(lambda: world.area_effects)
     assert fired == 1 + ability.numbers["cast_time_loops"]
     field.until(lambda: world.life[victim] < 500)
     assert 500 - world.life[victim] == ability.numbers["damage"] == 240
@@ -51,7 +51,7 @@ def test_a_charge_that_is_broken_off_costs_the_cooldown_only_where_the_tables_sa
     assert world.life[victim] == 500
     assert casting.cooldown_left(world, slot, ability) > 0 if "interrupt_cooldown_loops" in ability.numbers else True
     assert field.why_not(slot, YAMATO, victim) is (
-        Refusal.COOLDOWN if world.catalog.version == "5.0.13" else Refusal.SUCCESS
+        ActionResult.COOLDOWN if world.catalog.version == "5.0.13" else ActionResult.SUCCESS
     )
 
 
@@ -66,7 +66,7 @@ def test_a_charge_follows_its_target_as_far_as_the_slop(field: Any) -> None:
 
 def test_the_yamato_cannon_needs_its_research(field: Any) -> None:
     slot, victim = field.still("Battlecruiser", 1, 4, 10), field.still("Ultralisk", 2, 12, 10)
-    assert field.why_not(slot, YAMATO, victim) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, YAMATO, victim) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 # tactical jump --------------------------------------------------------------------------------------------------------
@@ -106,7 +106,7 @@ def test_orders_given_during_a_jump_wait_for_its_end(field: Any) -> None:
 def test_a_ship_caught_in_fungal_growth_can_not_jump(field: Any) -> None:
     slot = cruiser(field)
     buffs.apply(field.world, slot, "FungalGrowth")
-    assert field.why_not(slot, JUMP, point=(20, 20)) is Refusal.ERROR
+    assert field.why_not(slot, JUMP, point=(20, 20)) is ActionResult.ERROR
 
 
 # Liberator ------------------------------------------------------------------------------------------------------------
@@ -124,10 +124,10 @@ def test_a_zone_is_set_up_in_its_time_and_shown_to_everybody(field: Any) -> None
     world, numbers = field.world, field.world.catalog.ability(GUARD).numbers
     slot = field.put("Liberator", 1, 9, 10)
     field.order(slot, GUARD, point=(14, 10))
-    begun = field.until(lambda: world.fields)
-    assert [(f.effect, f.radius, f.at) for f in world.fields] == [(8, numbers["radius"], (14, 10))]
+    begun = field.until(lambda: world.area_effects)
+    assert [(f.effect, f.radius, f.at) for f in world.area_effects] == [(8, numbers["radius"], (14, 10))]
     assert begun < 10
-    working = field.until(lambda: world.fields[0].effect == 9)
+    working = field.until(lambda: world.area_effects[0].effect == 9)
     assert working == begun + numbers["setup_loops"]
     morph = world.catalog.ability(TO_GROUND)
     done = field.until(lambda: world.unit_type(slot).name == "LiberatorAG")
@@ -180,7 +180,7 @@ def test_the_zone_ends_with_the_mode_and_the_ship_takes_off(field: Any) -> None:
     slot = guarding(field)
     assert field.order(slot, LEAVE)
     field.play(1)
-    assert not [f for f in world.fields if f.effect]
+    assert not [f for f in world.area_effects if f.effect]
     begun = world.loop
     done = field.until(lambda: world.unit_type(slot).name == "Liberator")
     assert done == pytest.approx(begun + world.catalog.ability(TO_AIR).loops, abs=1.5)
@@ -193,7 +193,7 @@ def test_the_zone_ends_with_its_ship(field: Any) -> None:
     slot = guarding(field)
     field.world.life[slot] = 0.0
     field.play(2)
-    assert not field.world.fields
+    assert not field.world.area_effects
 
 
 def test_a_liberator_carried_away_from_its_zone_gives_it_up(field: Any) -> None:
@@ -201,7 +201,7 @@ def test_a_liberator_carried_away_from_its_zone_gives_it_up(field: Any) -> None:
     slot = guarding(field)
     world.pos[slot] = (3, 10)
     field.play(60)
-    assert not world.fields
+    assert not world.area_effects
     assert world.unit_type(slot).name == "Liberator"
 
 
@@ -213,7 +213,7 @@ def test_research_lets_zones_lie_farther_away(field: Any) -> None:
     assert casting.as_is(world, slot, ability).range == ability.range + more
     field.order(slot, GUARD, point=(4 + 0.75 + ability.range + more, 10))
     field.play(3)
-    assert world.fields
+    assert world.area_effects
     assert world.pos[slot].tolist() == [4, 10]
 
 
@@ -270,10 +270,10 @@ def test_one_unit_is_healed_by_one_medivac_at_a_time(field: Any) -> None:
 
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
-    [("SiegeTank", 1, Refusal.MUST_TARGET_BIOLOGICAL_UNITS), ("Marine", 2, Refusal.CANT_TARGET_ENEMY_UNITS),
-     ("Marine", 1, Refusal.SUCCESS)],
+    [("SiegeTank", 1, ActionResult.MUST_TARGET_BIOLOGICAL_UNITS), ("Marine", 2, ActionResult.CANT_TARGET_ENEMY_UNITS),
+     ("Marine", 1, ActionResult.SUCCESS)],
 )  # fmt: skip
-def test_whom_a_medivac_heals(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_whom_a_medivac_heals(field: Any, name: str, owner: int, why: ActionResult) -> None:
     slot, other = field.still("Medivac", 1, 10, 10, energy=50), field.still(name, owner, 12, 10)
     field.world.life[other] = 20.0
     assert field.why_not(slot, HEAL, other) is why
@@ -281,9 +281,9 @@ def test_whom_a_medivac_heals(field: Any, name: str, owner: int, why: Refusal) -
 
 def test_who_is_well_is_not_healed_and_without_energy_nobody_is(field: Any) -> None:
     slot, marine = field.still("Medivac", 1, 10, 10, energy=50), field.still("Marine", 1, 12, 10)
-    assert field.why_not(slot, HEAL, marine) is Refusal.REQUIRES_HEAL_TARGET
+    assert field.why_not(slot, HEAL, marine) is ActionResult.REQUIRES_HEAL_TARGET
     field.world.life[marine], field.world.energy[slot] = 10.0, 0.0
-    assert field.why_not(slot, HEAL, marine) is Refusal.NOT_ENOUGH_ENERGY
+    assert field.why_not(slot, HEAL, marine) is ActionResult.NOT_ENOUGH_ENERGY
 
 
 def test_the_afterburners_speed_a_medivac_up_for_their_time(field: Any) -> None:
@@ -294,9 +294,9 @@ def test_the_afterburners_speed_a_medivac_up_for_their_time(field: Any) -> None:
     assert world.step_max[slot] == pytest.approx(step * ability.numbers["move_speed_multiplier"])
     field.play(int(ability.numbers["duration_loops"]))
     assert world.step_max[slot] == pytest.approx(step)
-    assert field.why_not(slot, BOOST) is Refusal.COOLDOWN
+    assert field.why_not(slot, BOOST) is ActionResult.COOLDOWN
     field.play(int(ability.cooldown_loops - ability.numbers["duration_loops"]))
-    assert field.why_not(slot, BOOST) is Refusal.SUCCESS
+    assert field.why_not(slot, BOOST) is ActionResult.SUCCESS
 
 
 def test_research_shortens_the_afterburners_cooldown(field: Any) -> None:

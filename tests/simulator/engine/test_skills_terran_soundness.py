@@ -35,7 +35,7 @@ def order_somebody(field: Any, rng: np.random.Generator) -> None:
         commands.move(world, [slot], (x, y), queue=queue)
         return
     ability = card[int(rng.integers(len(card)))]
-    if ability.does in casting.ORDINARY:
+    if ability.effect in casting.ORDINARY:
         commands.attack_move(world, [slot], (x, y), queue=queue)
         return
     target = int(rng.choice(world.live)) if Aim.UNIT in ability.aim and rng.random() < 0.7 else -1
@@ -52,7 +52,7 @@ def assert_sound(world: Any) -> None:
     assert (world.life[live] <= world.life_max[live] + EDGE).all()
     assert (world.energy[live] >= 0.0).all()
     assert (world.energy[live] <= world.energy_max[live] + EDGE).all()
-    assert len(world.fields) < 200
+    assert len(world.area_effects) < 200
 
 
 def played(make_field: Any, version: str, seed: int) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from simulator import buffs, casting, commands
-from simulator.refusal import Refusal
+from simulator.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 LOAD = {"Medivac": 394, "WarpPrism": 911, "OverlordTransport": 1406, "Bunker": 407, "NydusNetwork": 1437}
@@ -66,17 +66,17 @@ def test_a_flying_carrier_fetches_who_it_is_told_to_load(make_field: Any, versio
 
 
 @pytest.mark.parametrize(("name", "cargo", "why"), [
-    ("Medivac", "Marine", Refusal.SUCCESS),
-    ("Medivac", "Thor", Refusal.SUCCESS),
-    ("Medivac", "VikingFighter", Refusal.CANT_LOAD_THAT_UNIT),
-    ("Medivac", "SupplyDepot", Refusal.CANT_LOAD_THAT_UNIT),
-    ("Bunker", "Marauder", Refusal.SUCCESS),
-    ("Bunker", "SCV", Refusal.SUCCESS),
-    ("Bunker", "Hellion", Refusal.MUST_TARGET_BIOLOGICAL_UNITS),
-    ("NydusNetwork", "Ultralisk", Refusal.SUCCESS),
-    ("NydusNetwork", "Mutalisk", Refusal.CANT_LOAD_THAT_UNIT),
+    ("Medivac", "Marine", ActionResult.SUCCESS),
+    ("Medivac", "Thor", ActionResult.SUCCESS),
+    ("Medivac", "VikingFighter", ActionResult.CANT_LOAD_THAT_UNIT),
+    ("Medivac", "SupplyDepot", ActionResult.CANT_LOAD_THAT_UNIT),
+    ("Bunker", "Marauder", ActionResult.SUCCESS),
+    ("Bunker", "SCV", ActionResult.SUCCESS),
+    ("Bunker", "Hellion", ActionResult.MUST_TARGET_BIOLOGICAL_UNITS),
+    ("NydusNetwork", "Ultralisk", ActionResult.SUCCESS),
+    ("NydusNetwork", "Mutalisk", ActionResult.CANT_LOAD_THAT_UNIT),
 ])  # fmt: skip
-def test_whom_a_carrier_takes(field: Any, name: str, cargo: str, why: Refusal) -> None:
+def test_whom_a_carrier_takes(field: Any, name: str, cargo: str, why: ActionResult) -> None:
     carrier = put(field, name, 1, 8.5, 8.5)
     unit = put(field, cargo, 1, 10.6, 8.5)
     judged = field.why_not(carrier, LOAD[name], unit)
@@ -87,17 +87,19 @@ def test_nobody_gets_into_what_is_full_or_an_enemy_s(field: Any) -> None:
     carrier = put(field, "Medivac", 1, 8.0, 8.0)
     fill(field, carrier, "Thor")
     assert field.why_not(carrier, LOAD["Medivac"], put(field, "Marine", 1, 9.0, 9.0)) is (
-        Refusal.NOT_ENOUGH_ROOM_TO_LOAD_UNIT
+        ActionResult.NOT_ENOUGH_ROOM_TO_LOAD_UNIT
     )
     empty = put(field, "Medivac", 1, 8.0, 12.0)
-    assert field.why_not(empty, LOAD["Medivac"], put(field, "Marine", 2, 9.0, 9.0)) is Refusal.CANT_TARGET_ENEMY_UNITS
+    assert (
+        field.why_not(empty, LOAD["Medivac"], put(field, "Marine", 2, 9.0, 9.0)) is ActionResult.CANT_TARGET_ENEMY_UNITS
+    )
 
 
 @pytest.mark.parametrize("buff", ["FungalGrowthSlowMovement", "GravitonBeam", "NexusMassRecallWarpOut"])
 def test_who_is_held_can_t_be_loaded(field: Any, buff: str) -> None:
     carrier, unit = put(field, "Medivac", 1, 8.0, 8.0), put(field, "Marine", 1, 9.0, 9.0)
     buffs.apply(field.world, unit, buff)
-    assert field.why_not(carrier, LOAD["Medivac"], unit) is Refusal.CANT_LOAD_THAT_UNIT
+    assert field.why_not(carrier, LOAD["Medivac"], unit) is ActionResult.CANT_LOAD_THAT_UNIT
 
 
 @pytest.mark.parametrize("name", ["Bunker", "NydusNetwork"])
@@ -145,7 +147,7 @@ def test_a_command_center_calls_its_nearest_workers(field: Any) -> None:
 
 def test_without_workers_there_is_nobody_to_load(field: Any) -> None:
     center = put(field, "CommandCenter", 1, 10.5, 10.5)
-    assert field.why_not(center, LOAD_WORKERS) is Refusal.LOAD_ALL_NO_TARGETS_FOUND
+    assert field.why_not(center, LOAD_WORKERS) is ActionResult.LOAD_ALL_NO_TARGETS_FOUND
 
 
 # out ------------------------------------------------------------------------------------------------------------------
@@ -220,15 +222,15 @@ def test_one_passenger_can_be_named(field: Any, name: str) -> None:
 @pytest.mark.parametrize(("name", "number"), [*UNLOAD_AT.items(), *UNLOAD_ALL.items(), *UNLOAD_UNIT.items()])
 def test_an_empty_carrier_has_nothing_to_unload(field: Any, name: str, number: int) -> None:
     carrier = put(field, name, 1, 10.5, 10.5)
-    assert field.why_not(carrier, number, point=(9.0, 9.0)) is Refusal.NO_CARGO_TO_UNLOAD
+    assert field.why_not(carrier, number, point=(9.0, 9.0)) is ActionResult.NO_CARGO_TO_UNLOAD
 
 
 def test_nobody_is_let_out_where_nobody_can_stand(field: Any) -> None:
     carrier = put(field, "Medivac", 1, 8.0, 8.0)
     fill(field, carrier, "Marine")
     field.world.ground.block(63, np.array([(x, y) for x in range(16, 32) for y in range(32)]))
-    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(26.0, 8.0)) is Refusal.CANT_UNLOAD_UNITS_THERE
-    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(17.0, 8.0)) is Refusal.SUCCESS
+    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(26.0, 8.0)) is ActionResult.CANT_UNLOAD_UNITS_THERE
+    assert field.why_not(carrier, UNLOAD_AT["Medivac"], point=(17.0, 8.0)) is ActionResult.SUCCESS
 
 
 def test_nydus_entrances_share_what_is_inside_and_let_out_four_a_second(field: Any) -> None:
@@ -325,7 +327,7 @@ def test_a_bunker_s_passengers_shoot_at_whom_it_is_told_to(field: Any) -> None:
     assert {int(field.world.target[m]) for m in marines} == {far}
     field.play(30)
     assert field.world.life[far] < 145.0
-    assert field.why_not(bunker, SHOOT, beyond) is Refusal.TARGET_IS_OUT_OF_RANGE
+    assert field.why_not(bunker, SHOOT, beyond) is ActionResult.TARGET_IS_OUT_OF_RANGE
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -333,7 +335,7 @@ def test_a_bunker_s_marines_use_their_stimpacks_when_it_is_told_so(make_field: A
     field = make_field(version=version)
     bunker = put(field, "Bunker", 1, 8.5, 8.5)
     marine, marauder = fill(field, bunker, "Marine", "Marauder")
-    assert field.why_not(bunker, STIM_MARINES) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(bunker, STIM_MARINES) is ActionResult.TECH_REQUIREMENTS_NOT_MET
     field.research(1, "Stimpack")
     assert field.order(bunker, STIM_MARINES)
     assert buffs.has(field.world, marine, "Stimpack")
@@ -344,5 +346,5 @@ def test_a_bunker_s_marines_use_their_stimpacks_when_it_is_told_so(make_field: A
 def test_an_empty_bunker_shoots_at_nobody(field: Any) -> None:
     bunker = put(field, "Bunker", 1, 8.5, 8.5)
     roach = put(field, "Roach", 2, 13.0, 8.5)
-    assert field.why_not(bunker, SHOOT, roach) is Refusal.CANT_ATTACK_WEAPONS_DISABLED
-    assert field.why_not(bunker, CEASE) is Refusal.CANT_ATTACK_WEAPONS_DISABLED
+    assert field.why_not(bunker, SHOOT, roach) is ActionResult.CANT_ATTACK_WEAPONS_DISABLED
+    assert field.why_not(bunker, CEASE) is ActionResult.CANT_ATTACK_WEAPONS_DISABLED

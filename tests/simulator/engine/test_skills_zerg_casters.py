@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from simulator import buffs, commands, tick
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.refusal import Refusal
+from simulator.damage import apply_damage
 from simulator.systems import acquire
 
 if TYPE_CHECKING:
@@ -111,18 +111,18 @@ def test_a_caster_walks_up_to_its_range_pays_and_cools_down(arena: Any, ability:
 def test_without_energy_there_is_no_spell(arena: Any, ability: int) -> None:
     slot, target, point = aim_for(arena, ability)
     arena.world.energy[slot] = arena.world.catalog.ability(ability).energy - 0.01
-    assert arena.why_not(slot, ability, target, point) is Refusal.NOT_ENOUGH_ENERGY
+    assert arena.why_not(slot, ability, target, point) is ActionResult.NOT_ENOUGH_ENERGY
     arena.world.energy[slot] += 0.02
-    assert arena.why_not(slot, ability, target, point) is Refusal.SUCCESS
+    assert arena.why_not(slot, ability, target, point) is ActionResult.SUCCESS
 
 
 def test_bile_waits_for_its_cooldown(arena: Any) -> None:
     slot = caster(arena, BILE)
     assert arena.order(slot, BILE, point=(14.0, 16.0))
     arena.play(2)
-    assert arena.why_not(slot, BILE, point=(14.0, 16.0)) is Refusal.COOLDOWN
+    assert arena.why_not(slot, BILE, point=(14.0, 16.0)) is ActionResult.COOLDOWN
     arena.play(int(arena.world.catalog.ability(BILE).cooldown_loops))
-    assert arena.why_not(slot, BILE, point=(14.0, 16.0)) is Refusal.SUCCESS
+    assert arena.why_not(slot, BILE, point=(14.0, 16.0)) is ActionResult.SUCCESS
 
 
 # Ravager --------------------------------------------------------------------------------------------------------------
@@ -136,13 +136,13 @@ def test_bile_harms_friend_and_foe_on_the_ground_and_in_the_air(arena: Any, name
     before = arena.vitals(target)
     assert arena.order(slot, BILE, point=(x, y))
     arena.play(1)
-    (bile,) = world.fields
+    (bile,) = world.area_effects
     assert (bile.effect, bile.at, bile.radius) == (11, (x, y), numbers["radius"])
     falls = numbers["delay_loops"] + numbers["fall_loops"]
     arena.play(int(falls) - 1)
     assert arena.vitals(target) >= before
     arena.play(1)
-    assert not world.fields
+    assert not world.area_effects
     assert before - arena.vitals(target) == pytest.approx(numbers["damage"], abs=0.5)
 
 
@@ -240,18 +240,20 @@ def test_neural_parasite_ends_with_the_infestors_hold(arena: Any, cause: str) ->
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
     [
-        ("Ultralisk", 2, Refusal.CANT_TARGET_THAT_UNIT),
-        ("Forge", 2, Refusal.CANT_TARGET_STRUCTURES),
-        ("Roach", 1, Refusal.CANT_TARGET_YOUR_OWN_UNITS),
+        ("Ultralisk", 2, ActionResult.CANT_TARGET_THAT_UNIT),
+        ("Forge", 2, ActionResult.CANT_TARGET_STRUCTURES),
+        ("Roach", 1, ActionResult.CANT_TARGET_YOUR_OWN_UNITS),
     ],
 )
-def test_neural_parasite_has_its_limits(arena: Any, name: str, owner: int, why: Refusal) -> None:
+def test_neural_parasite_has_its_limits(arena: Any, name: str, owner: int, why: ActionResult) -> None:
     slot, target = caster(arena, NEURAL), victim(arena, name, owner=owner)
     assert arena.why_not(slot, NEURAL, target) is why
 
 
-@pytest.mark.parametrize(("version", "why"), [("4.10", Refusal.SUCCESS), ("5.0.13", Refusal.CANT_TARGET_HEROIC_UNITS)])
-def test_a_newer_mothership_is_heroic(make_field: Callable[..., Any], version: str, why: Refusal) -> None:
+@pytest.mark.parametrize(
+    ("version", "why"), [("4.10", ActionResult.SUCCESS), ("5.0.13", ActionResult.CANT_TARGET_HEROIC_UNITS)]
+)
+def test_a_newer_mothership_is_heroic(make_field: Callable[..., Any], version: str, why: ActionResult) -> None:
     field = make_field(version=version)
     field.research(1, "NeuralParasite")
     slot, target = caster(field, NEURAL), victim(field, "Mothership")
@@ -261,7 +263,7 @@ def test_a_newer_mothership_is_heroic(make_field: Callable[..., Any], version: s
 def test_neural_parasite_must_be_researched(make_field: Callable[..., Any]) -> None:
     field = make_field()
     slot, target = caster(field, NEURAL), victim(field)
-    assert field.why_not(slot, NEURAL, target) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, NEURAL, target) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 def test_an_infested_terran_hatches_from_a_thrown_egg_and_lives_for_its_time(make_field: Callable[..., Any]) -> None:
@@ -293,7 +295,7 @@ def test_a_shroud_halves_what_flyers_deal(make_field: Callable[..., Any], attack
     field.play(2)
     assert buffs.has(world, target, "AmorphousArmorcloud")
     before = float(world.life[target])
-    wound(world, enemy, 2, target, 20.0, kind="ranged")
+    apply_damage(world, enemy, 2, target, 20.0, kind="ranged")
     assert before - world.life[target] == pytest.approx(20.0 * share)
     field.play(int(numbers["duration_loops"]) + 12)
     assert not buffs.has(world, target, "AmorphousArmorcloud")
@@ -309,7 +311,7 @@ def test_a_blinding_cloud_leaves_no_reach_to_whoever_is_in_it(arena: Any) -> Non
     cannon = arena.put("SporeCrawler", 2, 14, 18)
     assert arena.order(slot, CLOUD, point=(14.0, 16.5))
     arena.play(2)
-    (cloud,) = world.fields
+    (cloud,) = world.area_effects
     assert (cloud.effect, cloud.radius) == (10, numbers["radius"])
     assert world.detects[cannon] == 0.0
     life = float(world.life[enemy])
@@ -320,7 +322,7 @@ def test_a_blinding_cloud_leaves_no_reach_to_whoever_is_in_it(arena: Any) -> Non
     assert world.life[enemy] >= life
     assert world.reach[marine] == 0.0
     arena.play(60)
-    assert not world.fields
+    assert not world.area_effects
     assert world.life[enemy] < life
     assert world.detects[cannon] > 0.0
 
@@ -348,9 +350,9 @@ def test_abduct_pulls_units_out_of_the_ground(arena: Any, name: str, becomes: st
     assert arena.world.unit_type(target).name == becomes
 
 
-@pytest.mark.parametrize(("name", "why"), [("Ultralisk", Refusal.CANT_TARGET_THAT_UNIT),
-                                           ("Forge", Refusal.CANT_TARGET_STRUCTURES)])  # fmt: skip
-def test_abduct_has_its_limits(arena: Any, name: str, why: Refusal) -> None:
+@pytest.mark.parametrize(("name", "why"), [("Ultralisk", ActionResult.CANT_TARGET_THAT_UNIT),
+                                           ("Forge", ActionResult.CANT_TARGET_STRUCTURES)])  # fmt: skip
+def test_abduct_has_its_limits(arena: Any, name: str, why: ActionResult) -> None:
     slot, target = caster(arena, ABDUCT), victim(arena, name, 16.5, 16.5)
     assert arena.why_not(slot, ABDUCT, target) is why
 
@@ -404,7 +406,7 @@ def test_consume_turns_a_structures_life_into_energy(arena: Any) -> None:
 
 def test_a_full_viper_consumes_nothing(arena: Any) -> None:
     slot, target = caster(arena, CONSUME), arena.put("Hatchery", 1, 15.5, 16.5)
-    assert arena.why_not(slot, CONSUME, target) is Refusal.CANT_TARGET_THAT_UNIT
+    assert arena.why_not(slot, CONSUME, target) is ActionResult.CANT_TARGET_THAT_UNIT
 
 
 # Queen ----------------------------------------------------------------------------------------------------------------
@@ -430,21 +432,23 @@ def test_transfusion_heals_at_once_and_over_time(arena: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "owner", "why"),
     [
-        ("Disruptor", 1, Refusal.MUST_TARGET_BIOLOGICAL_UNITS),
-        ("Roach", 2, Refusal.CANT_TARGET_ENEMY_UNITS),
-        ("Zergling", 1, Refusal.REQUIRES_HEAL_TARGET),
+        ("Disruptor", 1, ActionResult.MUST_TARGET_BIOLOGICAL_UNITS),
+        ("Roach", 2, ActionResult.CANT_TARGET_ENEMY_UNITS),
+        ("Zergling", 1, ActionResult.REQUIRES_HEAL_TARGET),
     ],
 )
-def test_transfusion_has_its_limits(arena: Any, name: str, owner: int, why: Refusal) -> None:
+def test_transfusion_has_its_limits(arena: Any, name: str, owner: int, why: ActionResult) -> None:
     arena.world.growth.add(0, "Hatchery", (10, 16), 0, grown=True)
     arena.world.growth.settle()
     slot, target = caster(arena, TRANSFUSE), victim(arena, name, 12, 16, owner)
     assert arena.why_not(slot, TRANSFUSE, target) is why
 
 
-@pytest.mark.parametrize(("version", "why"), [("4.10", Refusal.SUCCESS),
-                                              ("5.0.13", Refusal.TECH_REQUIREMENTS_NOT_MET)])  # fmt: skip
-def test_a_newer_queen_transfuses_on_creep_only(make_field: Callable[..., Any], version: str, why: Refusal) -> None:
+@pytest.mark.parametrize(("version", "why"), [("4.10", ActionResult.SUCCESS),
+                                              ("5.0.13", ActionResult.TECH_REQUIREMENTS_NOT_MET)])  # fmt: skip
+def test_a_newer_queen_transfuses_on_creep_only(
+    make_field: Callable[..., Any], version: str, why: ActionResult
+) -> None:
     field = make_field(version=version)
     slot, friend = caster(field, TRANSFUSE), victim(field, "Roach", 12, 16, 1)
     field.world.life[friend] = 10.0

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from simulator import casting, commands, supply
+from simulator.action_result import ActionResult
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND, load_catalog
 from simulator.columns import NOBODY
 from simulator.orders import MOVE, OrderKind
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +31,7 @@ def rules(does: str, *, named: str = "") -> list[Any]:
         catalog = load_catalog(version)
         for ability in catalog.abilities:
             users = [u for u in ability.users if ability in catalog.abilities_of(catalog.unit(u).row)]
-            fits = ability.does == does and ability.name.startswith(named) and users
+            fits = ability.effect == does and ability.name.startswith(named) and users
             if fits and catalog.unit(users[0]).race == "zerg":
                 found.append(pytest.param(version, ability, id=f"{version}-{ability.name}"))
     return found
@@ -81,11 +81,11 @@ def test_most_units_burrow_only_with_the_upgrade(make_field: Callable[..., Any],
         _, ability = param.values
         able[ability.id] = field.put(ability.users[0], 1, 10, 16)
         free = ability.users[0] == "LurkerMP"
-        expected = Refusal.SUCCESS if free else Refusal.TECH_REQUIREMENTS_NOT_MET
+        expected = ActionResult.SUCCESS if free else ActionResult.TECH_REQUIREMENTS_NOT_MET
         assert field.why_not(able[ability.id], ability.id) is expected
     assert len(able) > 10
     field.research(1, "Burrow")
-    assert {field.why_not(slot, number) for number, slot in able.items()} == {Refusal.SUCCESS}
+    assert {field.why_not(slot, number) for number, slot in able.items()} == {ActionResult.SUCCESS}
 
 
 def test_what_is_burrowed_is_neither_seen_nor_attacks(make_field: Callable[..., Any]) -> None:
@@ -126,7 +126,7 @@ def test_orders_wait_until_a_unit_is_burrowed(make_field: Callable[..., Any]) ->
 def test_burrowing_can_be_called_off(make_field: Callable[..., Any]) -> None:
     field = ready(make_field, "4.10")
     slot = field.put("Hydralisk", 1, *CENTRE)
-    assert field.why_not(slot, 1383) is Refusal.CANT_FIND_CANCEL_ORDER
+    assert field.why_not(slot, 1383) is ActionResult.CANT_FIND_CANCEL_ORDER
     assert field.order(slot, 1382)
     field.play(3)
     assert field.order(slot, 1383)
@@ -140,12 +140,12 @@ def test_burrowed_roaches_heal_and_walk_with_their_upgrade(make_field: Callable[
     world, slot = field.world, field.put("RoachBurrowed", 1, *CENTRE)
     world.life[slot] = 50.0
     assert commands.move(world, [slot], (40.0, 32.5)) == []
-    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is Refusal.UNIT_CANT_MOVE
+    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is ActionResult.UNIT_CANT_MOVE
     field.play(32)
     healed = world.catalog.unit("RoachBurrowed").life_regen_n / LOOPS_PER_NORMAL_SECOND * 32
     assert world.life[slot] == pytest.approx(50.0 + healed)
     field.research(1, "TunnelingClaws")
-    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is Refusal.SUCCESS
+    assert casting.refusal(world, slot, world.catalog.ability(MOVE)) is ActionResult.SUCCESS
     assert commands.move(world, [slot], (40.0, 32.5)) == [slot]
     field.play(32)
     claws = next(c.value for c in world.catalog.upgrade("TunnelingClaws").changes if c.field == "Speed")
@@ -223,14 +223,14 @@ def test_a_morph_called_off_gives_the_unit_and_most_of_the_price_back(
     slot = field.put(ability.users[0], 1, *CENTRE)
     assert field.order(slot, ability.id)
     field.play(20)
-    own = [a for a in world.catalog.abilities if a.does == "cancel_growth" and a.link == ability.link]
+    own = [a for a in world.catalog.abilities if a.effect == "cancel_growth" and a.link == ability.link]
     cancel = own[0] if own else world.catalog.ability(QUEUE_CANCEL)  # as 4.10's Baneling cocoon has it
     assert field.order(slot, cancel.id)
     field.play(2)
     assert world.unit_type(slot).name == ability.users[0]
     assert player.minerals == 1000.0 - ability.minerals + int(0.75 * ability.minerals)
     assert player.vespene == 1000.0 - ability.vespene + int(0.75 * ability.vespene)
-    assert field.why_not(slot, cancel.id) is Refusal.CANT_FIND_CANCEL_ORDER
+    assert field.why_not(slot, cancel.id) is ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 @pytest.mark.parametrize(("version", "ability"), rules("grow"))
@@ -238,11 +238,11 @@ def test_a_morph_needs_its_price(make_field: Callable[..., Any], version: str, a
     field = ready(make_field, version)
     slot, player = field.put(ability.users[0], 1, *CENTRE), field.world.players[1]
     player.minerals = ability.minerals - 1.0
-    assert field.why_not(slot, ability.id) is Refusal.NOT_ENOUGH_MINERALS
+    assert field.why_not(slot, ability.id) is ActionResult.NOT_ENOUGH_MINERALS
     player.minerals, player.vespene = float(ability.minerals), ability.vespene - 1.0
-    assert field.why_not(slot, ability.id) is Refusal.NOT_ENOUGH_VESPENE
+    assert field.why_not(slot, ability.id) is ActionResult.NOT_ENOUGH_VESPENE
     player.cheats.clear()
-    assert field.why_not(slot, ability.id) is Refusal.TECH_REQUIREMENTS_NOT_MET
+    assert field.why_not(slot, ability.id) is ActionResult.TECH_REQUIREMENTS_NOT_MET
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -285,14 +285,14 @@ def test_a_crawler_walks_to_another_place_and_takes_root_there(
 @pytest.mark.parametrize(
     ("point", "why"),
     [
-        ((40.0, 32.0), Refusal.SUCCESS),
-        ((60.0, 60.0), Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
-        ((32.5, 40.5), Refusal.CANT_BUILD_ON_THAT),
-        ((0.0, 0.0), Refusal.CANT_BUILD_LOCATION_INVALID),
+        ((40.0, 32.0), ActionResult.SUCCESS),
+        ((60.0, 60.0), ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
+        ((32.5, 40.5), ActionResult.CANT_BUILD_ON_THAT),
+        ((0.0, 0.0), ActionResult.CANT_BUILD_LOCATION_INVALID),
     ],
 )
 def test_a_crawler_takes_root_on_free_creep_only(
-    make_field: Callable[..., Any], point: tuple[float, float], why: Refusal
+    make_field: Callable[..., Any], point: tuple[float, float], why: ActionResult
 ) -> None:
     field = make_field(FLAT)
     field.world.growth.paint(20, 20, 50, 50)
@@ -326,27 +326,29 @@ def test_a_tumor_grows_burrows_and_plants_one_other(make_field: Callable[..., An
     while not world.burrowed[tumor]:
         field.play(1)
     assert burrow.loops <= world.loop - grown <= burrow.loops + burrow.random_loops + 3
-    assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is Refusal.COOLDOWN
+    assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is ActionResult.COOLDOWN
     field.play(int(plant.numbers["first_use_after_loops"]) + 1)
     far = 34.5 + plant.range + float(world.radius[tumor]) + 0.6
-    assert field.why_not(tumor, PLANT, point=(far, 32.5)) is Refusal.TARGET_IS_OUT_OF_RANGE
+    assert field.why_not(tumor, PLANT, point=(far, 32.5)) is ActionResult.TARGET_IS_OUT_OF_RANGE
     assert field.order(tumor, PLANT, point=(far - 1.0, 32.5))
     field.play(2)
     assert world.catalog.unit("CreepTumor").row in world.type[world.live]
     field.play(2000)
-    assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is Refusal.COOLDOWN
+    assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is ActionResult.COOLDOWN
 
 
 @pytest.mark.parametrize(
     ("point", "why"),
     [
-        ((34.0, 32.0), Refusal.SUCCESS),
-        ((60.0, 60.0), Refusal.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
-        ((32.5, 40.5), Refusal.CANT_BUILD_ON_THAT),
-        ((-3.0, 5.0), Refusal.CANT_BUILD_LOCATION_INVALID),
+        ((34.0, 32.0), ActionResult.SUCCESS),
+        ((60.0, 60.0), ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE),
+        ((32.5, 40.5), ActionResult.CANT_BUILD_ON_THAT),
+        ((-3.0, 5.0), ActionResult.CANT_BUILD_LOCATION_INVALID),
     ],
 )
-def test_a_tumor_needs_free_creep(make_field: Callable[..., Any], point: tuple[float, float], why: Refusal) -> None:
+def test_a_tumor_needs_free_creep(
+    make_field: Callable[..., Any], point: tuple[float, float], why: ActionResult
+) -> None:
     field = make_field(FLAT)
     field.world.growth.paint(20, 20, 50, 50)
     field.put("Hatchery", 2, 32.5, 40.5)

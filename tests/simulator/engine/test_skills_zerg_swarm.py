@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, commands, tick
+from simulator import buffs, commands, lifecycle, tick
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
 from simulator.skills import larvae
 from simulator.systems import acquire
 
@@ -81,7 +81,7 @@ def test_a_larva_that_is_used_is_replaced(field: Any) -> None:
     slot = field.put("Hatchery", 1, 32.5, 32.5)
     field.play(100)
     first = int(larvae.of(field.world, slot)[0])
-    field.world.become(first, field.world.catalog.unit("Egg"))
+    lifecycle.become(field.world, first, field.world.catalog.unit("Egg"))
     field.play(MECHANICS.larva_loops)
     assert len(larvae.of(field.world, slot)) == 2
     field.play(2)
@@ -148,10 +148,10 @@ def test_a_hall_has_at_most_nineteen_larvae(field: Any) -> None:
 
 
 @pytest.mark.parametrize(("name", "owner", "why"), [
-    ("Hatchery", 1, Refusal.SUCCESS), ("Hatchery", 2, Refusal.CANT_TARGET_ENEMY_UNITS),
-    ("SpawningPool", 1, Refusal.CANT_TARGET_THAT_UNIT),
+    ("Hatchery", 1, ActionResult.SUCCESS), ("Hatchery", 2, ActionResult.CANT_TARGET_ENEMY_UNITS),
+    ("SpawningPool", 1, ActionResult.CANT_TARGET_THAT_UNIT),
 ])  # fmt: skip
-def test_only_own_town_halls_are_injected(field: Any, name: str, owner: int, why: Refusal) -> None:
+def test_only_own_town_halls_are_injected(field: Any, name: str, owner: int, why: ActionResult) -> None:
     slot, queen = field.put(name, owner, 32.5, 32.5), field.put("Queen", 1, 32, 28)
     field.world.energy[queen] = 60.0
     assert field.why_not(queen, INJECT, slot) is why
@@ -171,7 +171,7 @@ def test_a_swarm_host_sends_two_locusts_that_live_for_their_time(field: Any, hos
     assert len(hatched) == numbers["count"]
     begun = world.loop
     assert not world.targetable[hatched].any()
-    assert field.why_not(slot, LOCUSTS, point=(50.0, 32.0)) is Refusal.COOLDOWN
+    assert field.why_not(slot, LOCUSTS, point=(50.0, 32.0)) is ActionResult.COOLDOWN
     field.play(int(numbers["spawn_stun_loops"]) + 12)
     assert len(those(field, "LocustMPFlying")) == numbers["count"]
     field.play(150)
@@ -182,7 +182,7 @@ def test_a_swarm_host_sends_two_locusts_that_live_for_their_time(field: Any, hos
     field.play(int(numbers["life_random_loops"]) + 3)
     assert "LocustMPFlying" not in census(field)
     field.play(int(record.cooldown_loops - life))
-    assert field.why_not(slot, LOCUSTS, point=(50.0, 32.0)) is Refusal.SUCCESS
+    assert field.why_not(slot, LOCUSTS, point=(50.0, 32.0)) is ActionResult.SUCCESS
 
 
 def test_locusts_swoop_down_on_what_they_meet(field: Any) -> None:
@@ -293,10 +293,10 @@ def test_banelings_set_each_other_off_and_are_credited_with_whom_they_kill(field
 @pytest.mark.usefixtures("peace")
 def test_a_baneling_attacks_structures_when_it_is_told_to_look_for_them(field: Any) -> None:
     slot = field.put("Baneling", 1, 32, 32)
-    assert field.why_not(slot, BUILDINGS_OFF) is Refusal.ERROR
+    assert field.why_not(slot, BUILDINGS_OFF) is ActionResult.ERROR
     assert field.order(slot, BUILDINGS_ON)
     assert buffs.has(field.world, slot, "VolatileBurstBuilding")
-    assert field.why_not(slot, BUILDINGS_ON) is Refusal.ERROR
+    assert field.why_not(slot, BUILDINGS_ON) is ActionResult.ERROR
     assert field.order(slot, BUILDINGS_OFF)
     assert not buffs.has(field.world, slot, "VolatileBurstBuilding")
 
@@ -392,7 +392,7 @@ def test_caustic_spray_harms_a_structure_more_the_longer_it_lasts(field: Any) ->
     field.play(20)
     assert field.vitals(target) == left
     assert not buffs.has(world, slot, "ChannelingCausticSpray")
-    assert field.why_not(slot, SPRAY, target) is Refusal.COOLDOWN
+    assert field.why_not(slot, SPRAY, target) is ActionResult.COOLDOWN
 
 
 def test_a_lurker_that_holds_its_fire_picks_nobody(field: Any) -> None:

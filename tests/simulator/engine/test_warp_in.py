@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator import casting, supply
+from simulator.action_result import ActionResult
 from simulator.buffs import apply
 from simulator.casts import Cast
 from simulator.catalog import load_catalog
-from simulator.refusal import Refusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,11 +70,11 @@ def test_a_unit_is_there_at_once_and_finished_later(gate: Gate, point: tuple[flo
 def test_the_gate_is_ready_again_after_the_time_of_the_unit(gate: Gate, number: int, loops: int) -> None:
     gate.warp(number, (50.0, 47.0))
     ability = CATALOG.ability(number)
-    assert casting.refusal(gate.world, gate.slot, ability) is Refusal.COOLDOWN
+    assert casting.refusal(gate.world, gate.slot, ability) is ActionResult.COOLDOWN
     gate.field.play(loops - 1)
-    assert casting.refusal(gate.world, gate.slot, ability) is Refusal.COOLDOWN
+    assert casting.refusal(gate.world, gate.slot, ability) is ActionResult.COOLDOWN
     gate.field.play(1)
-    assert casting.refusal(gate.world, gate.slot, ability) is Refusal.SUCCESS
+    assert casting.refusal(gate.world, gate.slot, ability) is ActionResult.SUCCESS
 
 
 def test_chrono_boost_makes_the_gate_ready_sooner(gate: Gate) -> None:
@@ -82,20 +82,20 @@ def test_chrono_boost_makes_the_gate_ready_sooner(gate: Gate) -> None:
     apply(gate.world, gate.slot, "ChronoBoostEnergyCost")
     ready = CATALOG.ability(ZEALOT)
     loops = gate.field.loops(448)
-    done = next(loop for loop in loops if casting.refusal(gate.world, gate.slot, ready) is Refusal.SUCCESS)
+    done = next(loop for loop in loops if casting.refusal(gate.world, gate.slot, ready) is ActionResult.SUCCESS)
     assert done - 1 == pytest.approx(448 / 1.5, abs=1.5)
 
 
 @pytest.mark.parametrize(
     ("point", "refusal"),
     [
-        ((50.0, 47.0), Refusal.SUCCESS),
-        ((35.0, 40.0), Refusal.CANT_BUILD_TOO_FAR_FROM_POWER),
-        ((50.0, 50.0), Refusal.CANT_WARP_IN_UNITS_THERE),  # the Pylon itself
-        ((48.0, 52.0), Refusal.CANT_WARP_IN_UNITS_THERE),  # somebody stands there
+        ((50.0, 47.0), ActionResult.SUCCESS),
+        ((35.0, 40.0), ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER),
+        ((50.0, 50.0), ActionResult.CANT_WARP_IN_UNITS_THERE),  # the Pylon itself
+        ((48.0, 52.0), ActionResult.CANT_WARP_IN_UNITS_THERE),  # somebody stands there
     ],
 )
-def test_where_units_can_be_warped_in(gate: Gate, point: tuple[float, float], refusal: Refusal) -> None:
+def test_where_units_can_be_warped_in(gate: Gate, point: tuple[float, float], refusal: ActionResult) -> None:
     gate.field.put("Zealot", 1, 48.0, 52.0)
     cast = Cast(gate.slot, CATALOG.ability(STALKER), point=point)
     assert casting.aim_refusal(gate.world, cast) is refusal

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands
-from simulator.armament import set_weapon
+from simulator import commands, lifecycle
 from simulator.launchers import LAUNCHERS
+from simulator.traits import set_weapon
 
 
 def dummy(field: Any, name: str, x: float, y: float, owner: int = 2) -> int:
@@ -210,7 +210,7 @@ def test_a_unit_that_changes_its_form_in_a_fight_goes_on_with_its_new_weapon(fie
     target = dummy(field, "Marauder", 16, 16)
     tank = shot_at(field, "SiegeTank", 8, target)
     one_shot(field, tank)
-    world.become(tank, world.catalog.unit("SiegeTankSieged"))
+    lifecycle.become(world, tank, world.catalog.unit("SiegeTankSieged"))
     assert world.catalog.weapons[int(world.weapon[tank])].id == "CrucioShockCannon"
     assert world.reach[tank] == 13
 

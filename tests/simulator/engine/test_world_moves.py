@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands
+from simulator import commands, lifecycle, pathing
+from simulator.layers import Layer
 from simulator.maps import load_map
 from simulator.placement import free_places
 from simulator.tick import advance, new_game
-from simulator.traits import Layer
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -33,7 +33,7 @@ def all_on_their_surface(world: World) -> bool:
     for slot in world.live.tolist():
         if world.walled[slot]:
             continue
-        surface = world.ground.surface(Layer(int(world.layer[slot])))
+        surface = pathing.surface(world.ground, Layer(int(world.layer[slot])))
         if not surface.flat[surface.cell(world.pos[slot])]:
             return False
     return bool(np.isfinite(world.pos[world.live]).all())
@@ -60,7 +60,7 @@ def test_no_unit_ever_stands_where_it_can_not(make_field: Any, terrain: str, nam
     for i, name in enumerate(names):
         unit = world.catalog.unit(name)
         (place,) = free_places(world, unit, (14.0, 14.0), 1)
-        world.spawn(unit, 1 + i % 2, place)
+        lifecycle.spawn(world, unit, 1 + i % 2, place)
     for kind, point, other, queue in told:
         slots = world.units_of(1).tolist()
         if kind in ("hold", "stop"):
@@ -80,7 +80,7 @@ def test_a_crowd_told_to_one_point_settles_without_overlap(field: Any) -> None:
     for name, count in (("Zealot", 8), ("Stalker", 6), ("Zergling", 10)):
         unit = world.catalog.unit(name)
         for place in free_places(world, unit, (8.0, 16.0), count):
-            world.spawn(unit, 1, place)
+            lifecycle.spawn(world, unit, 1, place)
     slots = world.units_of(1).tolist()
     commands.move(world, slots, (24, 16))
     field.play(400)
@@ -177,7 +177,7 @@ def test_64_zerglings_pass_the_ramps_without_getting_stuck(make_field: Any) -> N
     world = field.world
     unit = world.catalog.unit("Zergling")
     for place in free_places(world, unit, (16.0, 9.0), 64):
-        world.spawn(unit, 2, place)
+        lifecycle.spawn(world, unit, 2, place)
     commands.move(world, world.units_of(2).tolist(), (16, 16))
     field.play(450)
     assert (world.pos[world.live, 1] > 12.9).all()
@@ -202,7 +202,7 @@ def test_melee_units_spread_around_their_target(field: Any) -> None:
     commands.hold(world, [target])
     unit = world.catalog.unit("Zergling")
     for place in free_places(world, unit, (10.0, 16.0), 12):
-        world.spawn(unit, 1, place)
+        lifecycle.spawn(world, unit, 1, place)
     commands.attack_unit(world, world.units_of(1).tolist(), world.tag_of(target))
     field.play(200)
     assert int(world.in_reach[world.units_of(1)].sum()) >= 9

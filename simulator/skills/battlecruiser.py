@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from simulator import buffs
+from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
-from simulator.damage import wound
-from simulator.fields import source_slot
+from simulator.damage import apply_damage
 from simulator.mechanics import MECHANICS
-from simulator.refusal import Refusal
-from simulator.skills import flight, teleport
+from simulator.skills import projectiles, teleport
 from simulator.skills.skill import Skill, gap, number
 
 if TYPE_CHECKING:
+    from simulator.area_effects import AreaEffect
     from simulator.casts import Cast
-    from simulator.fields import Field
     from simulator.world import World
 
 # Yamato cannon --------------------------------------------------------------------------------------------------------
@@ -39,7 +38,7 @@ def _hold_charge(world: World, cast: Cast) -> bool:
     if world.loop < cast.begun + number(cast, "cast_time_loops"):
         return True
     _cool_down(world, cast, cast.ability.cooldown_loops)
-    flight.launch(world, cast, MECHANICS.yamato_speed_n)
+    projectiles.launch(world, cast, MECHANICS.yamato_speed_n)
     return False
 
 
@@ -47,9 +46,9 @@ def _cool_down(world: World, cast: Cast, loops: float) -> None:
     world.timers.setdefault(cast.slot, {})[cast.ability.timer] = world.loop + loops
 
 
-def _impact(world: World, missile: Field, target: int) -> None:
+def _impact(world: World, missile: AreaEffect, target: int) -> None:
     amount = number(world.catalog.ability(missile.ability), "damage")
-    wound(world, source_slot(world, missile), missile.owner, target, amount)
+    apply_damage(world, world.slot_of(missile.source), missile.owner, target, amount)
 
 
 # tactical jump --------------------------------------------------------------------------------------------------------
@@ -61,9 +60,9 @@ AWAY: Final = "HyperjumpTeleport"
 COMING: Final = "HyperjumpTeleportIn"
 
 
-def _may_jump(world: World, cast: Cast) -> Refusal:
+def _may_jump(world: World, cast: Cast) -> ActionResult:
     held = any(buffs.has(world, cast.slot, name) for name in HELD)
-    return Refusal.ERROR if held else Refusal.SUCCESS
+    return ActionResult.ERROR if held else ActionResult.SUCCESS
 
 
 def _begin_jump(world: World, cast: Cast) -> None:
@@ -103,4 +102,4 @@ SKILLS: Final = {
     ),
 }
 
-flight.ARRIVALS["yamato"] = _impact
+projectiles.ARRIVALS["yamato"] = _impact

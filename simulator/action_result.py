@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import Final
 
 
-class Refusal(IntEnum):
+class ActionResult(IntEnum):
     """The results that the rules give; the numbers are the API's."""
 
     SUCCESS = 1
@@ -111,7 +111,7 @@ class Refusal(IntEnum):
     CANT_FIND_CANCEL_ORDER = 214
 
 
-_R = Refusal
+_R = ActionResult
 NOT_REQUIRED: Final = {
     "Air": _R.MUST_TARGET_AIR_UNITS,
     "Ground": _R.MUST_TARGET_GROUND_UNITS,

@@ -1,8 +1,10 @@
-"""Flight: missiles of abilities, which chase a unit or head for a point and do something where they arrive.
+"""Projectiles of abilities: they chase a unit or head for a point and do something where they arrive.
 
-A missile of a weapon lives in ``world.missiles``; one of an ability is a field that moves, because what it does on
-arrival is a rule and not damage. Skills call ``launch`` and put a rule of theirs into ``ARRIVALS``; a missile whose
-target has died or can't be touched any more is lost. Speeds are estimates (see ``data/mechanics.yaml``).
+A missile of a weapon lives in ``world.missiles``; one of an ability is an area effect, because what it does on
+arrival is a rule and not damage. Abilities call ``launch`` for a missile that moves and put a rule of theirs into
+``ARRIVALS``; a missile whose target has died or can't be touched any more is lost. What is thrown (``throw``) is not
+seen on its way: its rule runs once, when it is due. Speeds are estimates (see ``data/mechanics.yaml`` and
+``missile_speed_n`` of the abilities, per normal second).
 """
 
 from __future__ import annotations
@@ -10,40 +12,42 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator.buffs import FOREVER
+from simulator.active_buffs import FOREVER
+from simulator.area_effects import AreaEffect
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
-from simulator.fields import Field
+from simulator.skills.skill import distance, gap, lay, number, place_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from simulator.abilities import Ability
+    from simulator.area_effects import Point
     from simulator.casts import Cast
-    from simulator.fields import Point
-    from simulator.skills.skill import FieldRule
+    from simulator.skills.skill import AreaEffectRule
     from simulator.world import World
 
 NO_TARGET: Final = 0
+SPEED_UNKNOWN: Final = "How fast the missile flies."
 
-ARRIVALS: Final[dict[str, Callable[[World, Field, int], None]]] = {}
-"""What a missile does where it arrives, by the ability's ``does``: a function of the world, the missile (its place is
+ARRIVALS: Final[dict[str, Callable[[World, AreaEffect, int], None]]] = {}
+"""What a missile does where it arrives, by the ability's ``effect``: a function of the world, the missile (its place is
 where it arrived) and the target (a slot, or NOBODY for one that was sent to a point)."""
 
 
-def launch(world: World, cast: Cast, speed_n: float) -> Field:
+def launch(world: World, cast: Cast, speed_n: float) -> AreaEffect:
     """Send a missile on its way from the caster to what the cast is aimed at; it flies from the next loop on."""
     return launch_at(world, cast.ability, cast.slot, cast.target, speed_n, point=cast.point)
 
 
 def launch_at(
     world: World, ability: Ability, source: int, target: int, speed_n: float, *, point: Point | None = None
-) -> Field:
+) -> AreaEffect:
     """Send an ability's missile from a unit to another one, or with no target (NOBODY) to a point."""
     x, y = world.pos[source].tolist()
     homing = target != NOBODY
     goal = point if point is not None and not homing else (x, y)
-    missile = Field(
+    missile = AreaEffect(
         "missile",
         owner=int(world.owner[source]),
         points=[(x, y)],
@@ -56,11 +60,11 @@ def launch_at(
         target=world.tag_of(target) if homing else NO_TARGET,
         memory={"step": speed_n / LOOPS_PER_NORMAL_SECOND, "x": goal[0], "y": goal[1], "from_x": x, "from_y": y},
     )
-    world.fields.append(missile)
+    world.area_effects.append(missile)
     return missile
 
 
-def fly(world: World, missile: Field) -> None:
+def fly(world: World, missile: AreaEffect) -> None:
     """Move a missile by one loop, and let it arrive at its target's edge or at its point."""
     target = world.slot_of(missile.target) if missile.target else NOBODY
     if missile.target and (target == NOBODY or not _touchable(world, target)):
@@ -76,15 +80,15 @@ def fly(world: World, missile: Field) -> None:
     missile.points = [goal]
     end(world, missile)
     ability = world.catalog.ability(missile.ability)
-    ARRIVALS[ability.does](world, missile, target)
+    ARRIVALS[ability.effect](world, missile, target)
 
 
-def end(world: World, missile: Field) -> None:
+def end(world: World, missile: AreaEffect) -> None:
     """Take a missile, or any other field, out of the world at the end of this loop."""
     missile.end = world.loop
 
 
-def flown(missile: Field) -> float:
+def flown(missile: AreaEffect) -> float:
     """How far a missile is from where it was launched."""
     (x, y), memory = missile.at, missile.memory
     return math.hypot(x - memory["from_x"], y - memory["from_y"])
@@ -94,11 +98,30 @@ def _touchable(world: World, target: int) -> bool:
     return bool(world.targetable[target]) and world.carrier[target] == NOBODY
 
 
-def _goal(world: World, missile: Field, target: int) -> Point:
+def _goal(world: World, missile: AreaEffect, target: int) -> Point:
     if target == NOBODY:
         return missile.memory["x"], missile.memory["y"]
     x, y = world.pos[target].tolist()
     return x, y
 
 
-FIELDS: Final[dict[str, FieldRule]] = {"missile": fly}
+# thrown ---------------------------------------------------------------------------------------------------------------
+
+
+def flight_loops(world: World, cast: Cast) -> int:
+    """Loops from the throw until it arrives: at the point, or at the edge of the target where it stands now."""
+    step = number(cast, "missile_speed_n") / LOOPS_PER_NORMAL_SECOND
+    if cast.target == NOBODY:
+        return math.ceil(distance(world, cast.slot, place_of(world, cast)) / step)
+    return math.ceil((gap(world, cast.slot, cast.target) + float(world.radius[cast.slot])) / step)
+
+
+def throw(world: World, cast: Cast, rule: str, *, radius: float = 0.0, delay_loops: float = 0.0) -> AreaEffect:
+    """Send something to where a cast is aimed; its ``rule`` runs once, when it arrives."""
+    due = world.loop + flight_loops(world, cast) + delay_loops
+    item = lay(world, cast, rule, end=due, due=due)
+    item.radius, item.target = radius, world.tag_of(cast.target)
+    return item
+
+
+AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"missile": fly}

@@ -1,28 +1,22 @@
-"""Fields: effects that lie on the ground for a time, such as a storm, a scan or a bile on its way.
+"""Area effects: what lies on the ground for a time, such as a storm, a scan or a bile on its way.
 
-A field is a value in ``world.fields`` until it ends; ``systems.effects`` calls its skill at every period. What the
-API tells of it (``effect``, the places, the radius) is in the value, what it does is the skill's.
+One is a value in ``world.area_effects`` until it ends; ``systems.area_effects`` calls its rule at every period. What
+the API shows of it (``effect``, the places, the radius) is in the value, what it does is the rule's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-from simulator.columns import NOBODY
-
-if TYPE_CHECKING:
-    from simulator.world import World
 
 Point = tuple[float, float]
 
 
 @dataclass(slots=True)
-class Field:
+class AreaEffect:
     """One effect on the ground.
 
     Args:
-        does: Name of the rule that runs it, in ``skills.FIELDS``.
+        rule: Name of the rule that runs it, in ``skills.registry.AREA_EFFECTS``.
         effect: The API's effect id, 0 when clients are not told of it.
         owner: Whose unit made it.
         points: Where it lies, world units; the first is its middle.
@@ -39,7 +33,7 @@ class Field:
         detects: Whether its owner sees what is cloaked there.
     """
 
-    does: str
+    rule: str
     owner: int
     points: list[Point]
     radius: float
@@ -60,8 +54,3 @@ class Field:
     def at(self) -> Point:
         """Its middle."""
         return self.points[0]
-
-
-def source_slot(world: World, item: Field) -> int:
-    """The slot of the unit that made a field, or NOBODY when it is gone."""
-    return world.slot_of(item.source) if item.source else NOBODY

@@ -1,4 +1,4 @@
-"""Room: what stands on the ground makes way for what comes to stand there, such as a depot that rises."""
+"""Push units off the cells that a structure comes to stand on, such as a depot that rises."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 JUST_TOUCHING = 1e-6
 
 
-def make(world: World, slot: int) -> None:
-    """Move everybody off the cells that a structure has just come to stand on, each to the nearest free place."""
+def push_units_off(world: World, slot: int) -> None:
+    """Move the units off the cells that a structure has just come to stand on, each to the nearest free place."""
     cells = world.footprint_cells(slot)
     if not len(cells) or world.unit_type(slot).underfoot:
         return

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, prices
-from simulator.refusal import Refusal
+from simulator import commands, lifecycle, payments, prices
+from simulator.action_result import ActionResult
 from simulator.skills.skill import Skill
 
 if TYPE_CHECKING:
@@ -35,28 +35,28 @@ def _grows(world: World, cast: Cast) -> bool:
     if cast.ability.numbers.get("cocoon"):
         _renewed(world, cast.slot, unit)
     else:
-        world.become(cast.slot, unit)
+        lifecycle.become(world, cast.slot, unit)
     world.alert(int(world.owner[cast.slot]), "MorphComplete")
     return False
 
 
 def _renewed(world: World, slot: int, unit: UnitType) -> None:
     """Become another type with all of its life, as what comes into or out of a cocoon has."""
-    world.become(slot, unit)
+    lifecycle.become(world, slot, unit)
     world.life[slot] = world.life_max[slot]
     world.energy[slot] = min(
         float(world.stats.energy_start[world.owner[slot], unit.row]), float(world.energy_max[slot])
     )
 
 
-def _can_grow(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.CANT_QUEUE_THAT_ORDER if slot in world.jobs or grows(world, slot) else Refusal.SUCCESS
+def _can_grow(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.CANT_QUEUE_THAT_ORDER if slot in world.jobs or grows(world, slot) else ActionResult.SUCCESS
 
 
 def grows(world: World, slot: int) -> bool:
     """Whether a unit is in the midst of such a morph."""
     growing = world.channelling.get(slot)
-    return growing is not None and growing.ability.does == "grow"
+    return growing is not None and growing.ability.effect == "grow"
 
 
 def call_off(world: World, slot: int) -> None:
@@ -65,7 +65,7 @@ def call_off(world: World, slot: int) -> None:
     was = world.catalog.units[growing.was]
     if world.type[slot] != was.row:
         _renewed(world, slot, was)
-    prices.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), prices.CANCELLED)
+    payments.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), payments.CANCELLED)
     commands.begin_next(world, slot)
 
 
@@ -75,8 +75,8 @@ def _call_off_growth(world: World, cast: Cast) -> None:
         call_off(world, cast.slot)
 
 
-def _grows_now(world: World, slot: int, _: Ability) -> Refusal:
-    return Refusal.SUCCESS if grows(world, slot) else Refusal.CANT_FIND_CANCEL_ORDER
+def _grows_now(world: World, slot: int, _: Ability) -> ActionResult:
+    return ActionResult.SUCCESS if grows(world, slot) else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 def _call_off_morph(world: World, cast: Cast) -> None:
@@ -84,9 +84,9 @@ def _call_off_morph(world: World, cast: Cast) -> None:
     commands.begin_next(world, cast.slot)
 
 
-def _morphs_now(world: World, slot: int, _: Ability) -> Refusal:
+def _morphs_now(world: World, slot: int, _: Ability) -> ActionResult:
     under_way = world.casts[slot] and world.bound[slot] and not world.channels[slot]
-    return Refusal.SUCCESS if under_way else Refusal.CANT_FIND_CANCEL_ORDER
+    return ActionResult.SUCCESS if under_way else ActionResult.CANT_FIND_CANCEL_ORDER
 
 
 SKILLS: Final = {

@@ -1,7 +1,8 @@
-"""What the world notes down so that the laws need not look at everybody in every loop.
+"""What the world keeps so that the systems need not look at every unit in every loop.
 
-All of it follows from the state and is written anew when somebody comes, goes or changes; it is no part of the world's
-digest. Whoever keeps something of his own writes beside it for which ``population`` it holds.
+All of it follows from the state and is written again when a unit comes, goes or changes; it is no part of the world's
+digest. A cache says beside it for which ``population`` it holds. What only a layer above understands is an ``object``
+here.
 """
 
 from __future__ import annotations
@@ -13,31 +14,29 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from simulator.census import Census
     from simulator.columns import Bools, Ints
-    from simulator.contacts import Bodies
 
 
-class Remembered:
+class WorldCaches:
     """Notes between changes of the population."""
 
     def __init__(self) -> None:
         self.population = 0  # counts births and deaths, for what is worth remembering between them
         self.looked_at = -1  # the population that ``visible`` was written for
-        self.settled = -1  # the population among which no body touched another when all last stood still
-        self.bodies: Bodies | None = None  # of this population
-        self.census: Census | None = None  # of this population
+        self.resting_version = -1  # the population among which no body touched another when all last stood still
+        self.bodies: object | None = None  # of this population, for ``contacts``
+        self.census: object | None = None  # of this population, for ``census``
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``needs``
         self.tallied = -1  # the loop in which that was counted
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.harvesting = False  # whether anybody harvests
         self.mortal = False  # whether anybody's life is timed
         self.hiding = False  # whether anybody is cloaked or burrowed
-        self.natured: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
-        self.natured_at = -1  # the population that this was written for
+        self.passive_units: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
+        self.passive_units_at = -1  # the population that this was written for
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
         self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
         self.powered_at = -1  # the population for which ``powered`` was written
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
-        self.stirred = True  # somebody walked in the last loop
+        self.anyone_moved = True  # somebody walked in the last loop
         self.orders_changed = True  # somebody got an order, was born or died since orders were last looked over

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator.skills import FIELDS
+from simulator.skills.registry import AREA_EFFECTS
 
 if TYPE_CHECKING:
     from simulator.world import World
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 def run(world: World) -> None:
     """Run the rule of every field that is due, in the order in which they came, and remove those that are over."""
-    if not world.fields:
+    if not world.area_effects:
         return
-    for item in list(world.fields):
+    for item in list(world.area_effects):
         while item.due <= world.loop and item.due <= item.end:
             item.due += item.period
-            rule = FIELDS.get(item.does)
+            rule = AREA_EFFECTS.get(item.rule)
             if rule is not None:
                 rule(world, item)
             item.count += 1
-    world.fields = [item for item in world.fields if item.end > world.loop]
+    world.area_effects = [item for item in world.area_effects if item.end > world.loop]
