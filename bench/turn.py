@@ -53,7 +53,7 @@ from protocol.speech import parse
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig, TaskConfig
     from orchestrator.turn import Answer, Answers
     from protocol.bus import Bus, Sample, Subscription

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bridge.act import Actor, JointAction
     from bridge.game import OneSide, Turn
     from bridge.observe import Observer
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from orchestrator.config import MatchConfig
     from orchestrator.mailbox import Mailbox, Post
     from orchestrator.turn import Answers, Asking
@@ -188,7 +188,7 @@ class Match:
             messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in answers.messages),
             functions=turn.played.functions,
             env_steps=turn.env_steps,
-            score=float(turn.snapshot.response.observation.score.score),
+            score=turn.snapshot.score.total,
             timings=timings,
         )
 

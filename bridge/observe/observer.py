@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bridge.frames import Camera, MapFrame
     from bridge.observe.image.album import Album
     from bridge.observe.text.page import Part, Section
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig, TaskConfig
     from protocol.messages import Landmark, TeamView, View
 
@@ -68,9 +68,9 @@ class Observer:
         The whole is in `sight` when the last agent has been taken.
         """
         episode, told = self._episode, feedback or {}
-        episode.roster.update(snapshot.own, snapshot.response.observation.player_common)
+        episode.roster.update(snapshot.own, snapshot.player)
         scene = Scene(snapshot, self._task.frames, episode.scene)
-        episode.chronicle.note(scene.bodies, scene.upgrades, snapshot.dead)
+        episode.chronicle.note(scene.bodies, snapshot.upgrades, snapshot.dead)
         album = self._album(snapshot, scene.world)
         agents: dict[str, AgentSight] = {}
         conditions: dict[str, str] = {}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import common_pb2
     from s2clientprotocol import sc2api_pb2 as sc
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 MOVED = 0.3
 """World units that a unit has to be off its place to count as moved."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import random
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from bridge.catalog import catalogue
 from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +48,7 @@ def shuffled(snapshot: Snapshot, seed: int) -> Snapshot:
     random.Random(seed).shuffle(units)
     del response.observation.raw_data.units[:]
     response.observation.raw_data.units.extend(units)
-    return Snapshot(response=response, info=snapshot.info, abilities=snapshot.abilities)
+    return read_snapshot(response, snapshot.info, abilities=snapshot.abilities)
 
 
 def answers(snapshot: Snapshot, race: str) -> list[str]:
@@ -94,7 +95,7 @@ def test_asking_changes_neither_the_snapshot_nor_the_next_answer(scenes: dict[st
 @pytest.mark.parametrize("race", GIVEN)
 def test_rules_work_when_the_game_was_not_asked(scenes: dict[str, Game], race: str) -> None:
     snapshot = scenes[race].snapshot
-    unasked = Snapshot(response=snapshot.response, info=snapshot.info)
+    unasked = dataclasses.replace(snapshot, abilities=None)
     asked, blind = answers(snapshot, race), answers(unasked, race)
     same = sum(one == other for one, other in zip(asked, blind, strict=True))
     assert same >= 0.9 * len(asked)  # what only the game knows, as cooldowns, is not refused
