@@ -15,6 +15,7 @@ from bridge.state import (
     Effect,
     EpisodeInfo,
     Order,
+    PictureSizes,
     Player,
     PowerSource,
     Score,
@@ -255,6 +256,6 @@ def test_an_episode_has_its_map_and_the_sizes_of_pictures() -> None:
     assert (found.size, found.playable) == ((96, 60), (0, 23, 96, 52))
     assert found.starts == (WorldPoint(20.5, 30.5),)
     assert (found.placement, found.pathing) == (Grid(8, 1, 1, b"\xff"), NO_GRID)
-    assert found.pictures == ((128, 128), (64, 64), 24, 0)
+    assert found.pictures == PictureSizes((128, 128), (64, 64), 24, 0)
     frame = found.frame(Frames(minimap=48))
     assert (frame.width, frame.height, frame.playable, frame.minimap_size) == (96, 60, (0, 23, 96, 52), 48)
