@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from bridge.functions import functions
 from bridge.knowledge import abilities, knowledge
-from bridge.names import unit_name
 from bridge.state import Alliance
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ def unfit(action: Action, unit: Unit) -> str | None:
     facts = _facts(action.function)
     if facts is None:
         return None
-    known = knowledge().get(unit_name(unit.unit_type))
+    known = knowledge().get(unit.name)
     for word in facts.must:
         if word in _NEEDED and _is(word, unit, known) is False:
             return _NEEDED[word]

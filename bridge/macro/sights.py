@@ -17,8 +17,7 @@ from bridge.macro.side import ability, finished, is_doing, is_worker, of_types, 
 if TYPE_CHECKING:
     from bridge.ground import Land
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 ROUND_LOOPS: Final = 1344
 """A minute: when everything was seen once, the first place to look at changes so often."""
