@@ -112,7 +112,6 @@ def read_snapshot(
         errors=(*errors, *map(_error, response.action_errors)),
         ended=ended,
         outcome=outcome or _outcome(response, player.player_id),
-        response=response,
     )
 
 

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from s2clientprotocol import sc2api_pb2 as sc_pb
-
     from bridge.frames import WorldPoint
     from bridge.state.episode import EpisodeInfo
     from bridge.state.grid import Grid
@@ -112,8 +110,6 @@ class Snapshot:
     """2 where the player sees now, 1 where it once saw, 0 elsewhere."""
     pictures: Pictures = field(repr=False, compare=False)
     """The game's own pictures, decoded when they are asked for."""
-    response: sc_pb.ResponseObservation = field(repr=False, compare=False)
-    """Going away: the message itself, for the modules that still read it."""
     abilities: Mapping[int, frozenset[int]] | None = None
     """By tag of an own unit, the abilities that the game would take from it now, each as itself and in its general
     form; None if the game was not asked."""

@@ -172,7 +172,7 @@ def test_what_is_not_finished_cannot_do_anything(unit: Make, snapshot: Callable[
     seen = snapshot([gateway], player=RICH, abilities={A: frozenset()})
     action = catalogue()["Train_Zealot"]
     assert action.pysc2 is not None
-    obstacle = Validity(seen, Ledger.of(seen)).obstacle(action, action.pysc2, gateway)
+    obstacle = Validity(seen, Ledger.of(seen)).obstacle(action, action.pysc2, seen.units[A])
     assert obstacle is not None
     assert obstacle.text == "Gateway is still under construction (43%)"
 

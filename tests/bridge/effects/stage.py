@@ -156,7 +156,9 @@ class Stage:
         snapshot = read_snapshot(
             response, self.info, abilities=available(answer), functions=frozenset(map(int, functions))
         )
-        return Seen(snapshot, {world.tag_of(slot): frozenset(known) for slot, known in world.autocast.items()})
+        return Seen(
+            snapshot, response, {world.tag_of(slot): frozenset(known) for slot, known in world.autocast.items()}
+        )
 
     def idle(self, loops: int) -> Seen:
         """The same game some loops later, without any order."""

@@ -50,7 +50,7 @@ class Game:
 
     def see(self) -> Snapshot:
         """Looks at the game, and begins a new turn with a new ledger."""
-        response = self.client.observe()
+        self.response = response = self.client.observe()
         blind = read_snapshot(response, self.info)
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = dataclasses.replace(blind, abilities=available(answer))

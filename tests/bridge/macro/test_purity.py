@@ -40,15 +40,15 @@ GIVEN = {
 }
 
 
-def shuffled(snapshot: Snapshot, seed: int) -> Snapshot:
+def shuffled(game: Game, seed: int) -> Snapshot:
     """The same moment, its units told in another order."""
     response = sc.ResponseObservation()
-    response.CopyFrom(snapshot.response)
+    response.CopyFrom(game.response)
     units = list(response.observation.raw_data.units)
     random.Random(seed).shuffle(units)
     del response.observation.raw_data.units[:]
     response.observation.raw_data.units.extend(units)
-    return read_snapshot(response, snapshot.info, abilities=snapshot.abilities)
+    return read_snapshot(response, game.info, abilities=game.snapshot.abilities)
 
 
 def answers(snapshot: Snapshot, race: str) -> list[str]:
@@ -78,18 +78,17 @@ def scenes(make_game: Callable[..., Game]) -> dict[str, Game]:
 
 @pytest.mark.parametrize("race", GIVEN)
 def test_the_order_in_which_units_are_told_changes_nothing(scenes: dict[str, Game], race: str) -> None:
-    snapshot = scenes[race].snapshot
-    expected = answers(snapshot, race)
+    expected = answers(scenes[race].snapshot, race)
     assert any("Order(" in answer for answer in expected)
-    assert all(answers(shuffled(snapshot, seed), race) == expected for seed in range(3))
+    assert all(answers(shuffled(scenes[race], seed), race) == expected for seed in range(3))
 
 
 @pytest.mark.parametrize("race", GIVEN)
 def test_asking_changes_neither_the_snapshot_nor_the_next_answer(scenes: dict[str, Game], race: str) -> None:
     snapshot = scenes[race].snapshot
-    before = snapshot.response.SerializeToString(deterministic=True)
+    before = [dict(units) for units in (snapshot.known, snapshot.units, snapshot.abilities or {})]
     assert answers(snapshot, race) == answers(snapshot, race)
-    assert snapshot.response.SerializeToString(deterministic=True) == before
+    assert [snapshot.known, snapshot.units, snapshot.abilities] == before
 
 
 @pytest.mark.parametrize("race", GIVEN)
