@@ -28,7 +28,7 @@ from bridge.pysc2_game import PySC2Game
 from simulator.install import install
 
 if TYPE_CHECKING:
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 ARMY = (
     "Stalker", "Zealot", "Sentry", "HighTemplar", "Immortal", "Phoenix", "VoidRay", "Oracle", "Marine", "Marauder",

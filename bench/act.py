@@ -27,7 +27,7 @@ from bridge.functions import general
 from bridge.knowledge import knowledge
 from bridge.maps import MapSpec
 from bridge.observe import Observer
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import AgentConfig, TaskConfig
 from protocol.speech import parse
 
@@ -83,7 +83,7 @@ def snapshot() -> Snapshot:
     for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         size.x = size.y = 128
     abilities = {unit.tag: every_form(own[i]) for i, unit in enumerate(units[: len(own)])}
-    return Snapshot(response=response, info=info, abilities=abilities)
+    return read_snapshot(response, read_info(info), abilities=abilities)
 
 
 def every_form(unit_type: str) -> frozenset[int]:

@@ -22,12 +22,12 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.catalog import catalogue
-from bridge.frames import CAMERA_WIDTH, MapFrame
+from bridge.frames import CAMERA_WIDTH
 from bridge.imagespec import ImageSpec
 from bridge.names import unit_name
 from bridge.observe import Observer
 from bridge.observe.image.album import Album
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.messages import Frames
 from simulator.client import Client, command, interface
@@ -49,7 +49,7 @@ def play(map_name: str) -> list[Snapshot]:
     """A game, decision by decision: everybody attacks where the enemies are."""
     client = Client()
     seen = client.play(map_name, interface(), seed=1)
-    info = client.ask(game_info=sc_pb.RequestGameInfo()).game_info
+    info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info)
     snapshots = []
     for _ in range(DECISIONS):
         units = seen.observation.raw_data.units
@@ -59,7 +59,7 @@ def play(map_name: str) -> list[Snapshot]:
             own = [unit.tag for unit in units if unit.alliance == raw_pb2.Self]
             client.act(command(ATTACK, own, point=middle))
         seen = client.step(LOOPS)
-        snapshots.append(Snapshot(response=seen, info=info))
+        snapshots.append(read_snapshot(seen, info))
     return [shown for shown in snapshots if shown.own]
 
 
@@ -80,7 +80,7 @@ def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
         seen = next(iter(observer.observe(shown).agents.values()))
         seen = type(seen)(task.agents[0], seen.view, seen.teams, seen.idle_teams)
         began, worked = time.perf_counter(), time.thread_time()
-        pictures = Album(shown, MapFrame.of(shown.info, Frames())).pictures(seen)
+        pictures = Album(shown, shown.info.frame(Frames())).pictures(seen)
         took_ms.append(1000 * (time.perf_counter() - began))
         worked_ms.append(1000 * (time.thread_time() - worked))
         sizes += [len(picture.data) for picture in pictures]

@@ -11,6 +11,7 @@ processor's time, so that a busy machine does not count. The aim is 1 ms.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import statistics
 import time
@@ -24,7 +25,7 @@ from bridge.catalog import catalogue
 from bridge.ground import land_of
 from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.snapshot import Snapshot
+from bridge.state import EpisodeInfo, Snapshot, read_info, read_snapshot
 from simulator.client import Client, interface
 
 MAPS = ("Simple64", "Simple128")
@@ -45,9 +46,9 @@ def scene(map_name: str) -> Snapshot:
     """The middle of a game, all of it paid for."""
     client = Client()
     client.play(map_name, interface(screen=0), seed=1)
-    info = client.ask(game_info=sc_pb.RequestGameInfo()).game_info
-    start = land_of(Snapshot(response=client.observe(), info=info)).own_halls[0].pos
-    inward = 1 if start.x < info.start_raw.map_size.x / 2 else -1
+    info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info)
+    start = land_of(read_snapshot(client.observe(), info)).own_halls[0].pos
+    inward = 1 if start.x < info.size[0] / 2 else -1
     for cheat in (debug_pb2.all_resources, debug_pb2.food):
         client.debug(debug_pb2.DebugCommand(game_state=cheat))
     for name, dx, dy, count in (*UNITS, *ARMY):
@@ -58,10 +59,10 @@ def scene(map_name: str) -> Snapshot:
     return look(client, info)
 
 
-def look(client: Client, info: sc_pb.ResponseGameInfo) -> Snapshot:
+def look(client: Client, info: EpisodeInfo) -> Snapshot:
     response = client.observe()
-    answer = client.ask(query=question(Snapshot(response=response, info=info))).query
-    return Snapshot(response=response, info=info, abilities=available(answer))
+    answer = client.ask(query=question(read_snapshot(response, info))).query
+    return read_snapshot(response, info, abilities=available(answer))
 
 
 def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
@@ -82,7 +83,7 @@ def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
 def measure(shown: Snapshot, action: str) -> dict[str, Any]:
     new, same, answer = [], [], ""
     for _ in range(TIMES):
-        snapshot = Snapshot(response=shown.response, info=shown.info, abilities=shown.abilities)
+        snapshot = dataclasses.replace(shown)
         new.append(ask(action, snapshot)[0])
         took, answer = ask(action, snapshot)
         same.append(took)

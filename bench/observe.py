@@ -14,6 +14,7 @@ every team sees all of them, and at four places, which is what a fight of many f
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import gc
 import json
 import statistics
@@ -26,9 +27,8 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from bridge.act import Actor
 from bridge.functions import general
 from bridge.knowledge import knowledge
-from bridge.names import unit_name
 from bridge.observe import Observer
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from orchestrator.config import load_task
 from protocol.speech import parse
@@ -83,7 +83,14 @@ def army(units: dict[str, int], alliance: int, first: int, hurt: float) -> list[
     return made
 
 
-def snapshot(own: dict[str, int], foes: dict[str, int], loop: int, size: int = 32) -> Snapshot:
+def snapshot(own: dict[str, int], foes: dict[str, int], loop: int) -> Snapshot:
+    response, info = messages(own, foes, loop)
+    return read_snapshot(response, read_info(info))
+
+
+def messages(
+    own: dict[str, int], foes: dict[str, int], loop: int, size: int = 32
+) -> tuple[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo]:
     response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
     observation = response.observation
     observation.game_loop = loop
@@ -91,7 +98,7 @@ def snapshot(own: dict[str, int], foes: dict[str, int], loop: int, size: int = 3
     observation.raw_data.units.extend(army(own, raw_pb2.Self, 0x400, hurt) + army(foes, raw_pb2.Enemy, 0x800, hurt))
     for corner in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         corner.x = corner.y = size
-    return Snapshot(response=response, info=info)
+    return response, info
 
 
 def full_game() -> TaskConfig:
@@ -117,13 +124,14 @@ def full_game() -> TaskConfig:
 
 def crowd(places: int, loop: int) -> Snapshot:
     """100 units at some places, those of a type spread over all of them, with the abilities that they would have."""
-    made = snapshot(*FULL_GAME, loop, size=128)
-    for index, unit in enumerate(made.response.observation.raw_data.units):
+    response, info = messages(*FULL_GAME, loop, size=128)
+    for index, unit in enumerate(response.observation.raw_data.units):
         place = index % places
         unit.pos.x, unit.pos.y = 24 + 64 * (place % 2) + index % 10, 24 + 64 * (place // 2) + index // 10
-    able = {unit.tag: frozenset(knowledge()[unit_name(unit.unit_type)].ability_ids) for unit in made.own}
+    made = read_snapshot(response, read_info(info))
+    able = {unit.tag: frozenset(knowledge()[unit.name].ability_ids) for unit in made.own}
     generals = {tag: numbers | frozenset(map(general, numbers)) for tag, numbers in able.items()}
-    return Snapshot(response=made.response, info=made.info, abilities=generals)
+    return dataclasses.replace(made, abilities=generals)
 
 
 def measure_full_game(places: int) -> dict[str, Any]:

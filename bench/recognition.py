@@ -29,7 +29,7 @@ from bridge.act import Actor
 from bridge.knowledge import knowledge
 from bridge.maps import MapSpec
 from bridge.observe import Observer
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import AgentConfig, TaskConfig
 from protocol.speech import parse
 
@@ -197,7 +197,7 @@ def _snapshot() -> Snapshot:
     raw.player.upgrade_ids.append(BLINK)
     for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         size.x = size.y = 64
-    return Snapshot(response=response, info=info, dead=frozenset({DEAD}))
+    return read_snapshot(response, read_info(info), dead=frozenset({DEAD}))
 
 
 def main() -> None:

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bridge.observe import SideObservation
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig, TaskConfig
     from orchestrator.turn import Answer, Answers
     from protocol.bus import Bus, Sample, Subscription

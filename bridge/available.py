@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from bridge.functions import Function
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 ATTACK = 3674
 """The general ability to attack."""

@@ -11,14 +11,11 @@ Pure geometry: no unit, no observation. Above it are `bridge.observe` and `bridg
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-    from s2clientprotocol import sc2api_pb2 as sc_pb
-
-    from protocol.messages import Frames
 
 CAMERA_WIDTH = 24.0
 """World units that a screen shows on each axis; PySC2's and the paper's default."""
@@ -54,18 +51,6 @@ class MapFrame:
     playable: tuple[float, float, float, float]
     """x0, y0, x1, y1 in the world frame."""
     minimap_size: float = 64.0
-
-    @classmethod
-    def of(cls, info: sc_pb.ResponseGameInfo, frames: Frames) -> Self:
-        """The frame of the map that a game is played on."""
-        raw = info.start_raw
-        area = raw.playable_area
-        return cls(
-            float(raw.map_size.x),
-            float(raw.map_size.y),
-            (float(area.p0.x), float(area.p0.y), float(area.p1.x), float(area.p1.y)),
-            frames.minimap,
-        )
 
     @property
     def _cells_per_unit(self) -> float:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from bridge.act import Command, Executor
     from bridge.act.plan import Plan, Played
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 T = TypeVar("T")
 

@@ -16,7 +16,6 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from absl import flags
-from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.act.plan import Played, Step
 from bridge.available import available, question
@@ -24,17 +23,18 @@ from bridge.compat import maps, sc2_env
 from bridge.errors import GameError, GameMissing
 from bridge.functions import check_against_pysc2
 from bridge.game import GameConfig, GameInfo, StepResult, check_install
-from bridge.snapshot import Snapshot
+from bridge.state import read_info, read_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from pathlib import Path
 
+    from s2clientprotocol import sc2api_pb2 as sc_pb
+
     from bridge.act.plan import GameAction, Plan
     from bridge.maps import MapSpec
-    from protocol.messages import Outcome
+    from bridge.state import EpisodeInfo, Snapshot
 
-_OUTCOMES: dict[int, Outcome] = {sc_pb.Victory: "win", sc_pb.Defeat: "loss", sc_pb.Tie: "draw"}
 _PLACING_LOOPS = 16
 """Loops that a map's script may take until the first unit stands; the battles need none or one."""
 _environment = threading.Lock()
@@ -55,6 +55,7 @@ class PySC2Game:
         self._asks = config.abilities
         self._episode = 0
         self._ended = True
+        self._maps: tuple[EpisodeInfo, ...] = ()
         check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
@@ -81,6 +82,7 @@ class PySC2Game:
                 self._env._random_seed = self._config.seed + self._episode  # noqa: SLF001
             steps = self._env.reset()
             self._episode += 1
+            self._maps = tuple(map(read_info, self._env.game_info))
             snapshots = self._snapshots(steps)
             for _ in range(_PLACING_LOOPS):
                 if all(snapshot.own or snapshot.ended for snapshot in snapshots):
@@ -121,19 +123,17 @@ class PySC2Game:
 
     def _snapshots(self, steps: Iterable[Any], before: Sequence[Snapshot] = ()) -> tuple[Snapshot, ...]:
         made = []
-        for index, (step, info) in enumerate(zip(steps, self._env.game_info, strict=True)):
+        for index, (step, info) in enumerate(zip(steps, self._maps, strict=True)):
             response: sc_pb.ResponseObservation = step.observation["_response_observation"]()
             earlier = before[index] if before else None
             made.append(
-                Snapshot(
-                    response=response,
-                    info=info,
+                read_snapshot(
+                    response,
+                    info,
                     functions=frozenset(int(number) for number in step.observation["available_actions"]),
-                    dead=(earlier.dead if earlier else frozenset())
-                    | set(response.observation.raw_data.event.dead_units),
-                    errors=(earlier.errors if earlier else ()) + tuple(response.action_errors),
+                    dead=earlier.dead if earlier else frozenset(),
+                    errors=earlier.errors if earlier else (),
                     ended=bool(step.last()),
-                    outcome=_outcome(response),
                 )
             )
         self._ended = made[0].ended
@@ -199,11 +199,6 @@ class _Player:
             self.step = next(self._plan) if snapshot is None else self._plan.send(snapshot)
         except StopIteration as done:
             self.step, self.played = None, done.value
-
-
-def _outcome(response: sc_pb.ResponseObservation) -> Outcome | None:
-    player = response.observation.player_common.player_id
-    return next((_OUTCOMES.get(r.result) for r in response.player_result if r.player_id == player), None)
 
 
 def _map_data(config: GameConfig) -> bytes:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bridge.act import Actor, JointAction
     from bridge.game import OneSide, StepResult
     from bridge.observe import AgentObservation, Observer, SideObservation
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from orchestrator.config import MatchConfig
     from orchestrator.mailbox import Mailbox, Post
     from orchestrator.turn import AgentPool, Answers
@@ -247,7 +247,7 @@ class Match:
             messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in messages),
             functions=result.played.functions,
             env_steps=result.env_steps,
-            score=float(result.snapshot.response.observation.score.score),
+            score=result.snapshot.score.total,
             timings=timings,
         )
 

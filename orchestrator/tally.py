@@ -6,14 +6,11 @@ import statistics
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
+from bridge.state import Alliance
 from protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
 
 if TYPE_CHECKING:
-    from s2clientprotocol import score_pb2
-
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from protocol.messages import Outcome
 
 
@@ -22,8 +19,8 @@ class Tally:
 
     def __init__(self, snapshot: Snapshot) -> None:
         self._first = self._last = snapshot
-        self._alliance: dict[int, int] = {}
-        self._dead: Counter[int] = Counter()
+        self._alliance: dict[int, Alliance] = {}
+        self._dead: Counter[Alliance] = Counter()
         self._usage: dict[str, Usage] = defaultdict(Usage)
         self._statuses: dict[str, Counter[str]] = defaultdict(Counter)
         self._rejections: Counter[str] = Counter()
@@ -56,8 +53,8 @@ class Tally:
         """
         outcome = self._last.outcome or "draw"
         cause = CAUSES[outcome] if self._last.outcome else "step limit"
-        killed = Casualties(units=self._dead[raw_pb2.Enemy], value=self._value("killed"))
-        lost = Casualties(units=self._dead[raw_pb2.Self], value=self._value("lost"))
+        killed = Casualties(units=self._dead[Alliance.ENEMY], value=self._last.score.killed - self._first.score.killed)
+        lost = Casualties(units=self._dead[Alliance.OWN], value=self._last.score.lost - self._first.score.lost)
         return Result(
             run=run,
             episode=episode,
@@ -71,7 +68,7 @@ class Tally:
             killed=killed,
             lost=lost,
             kd=killed.value / lost.value if lost.value else None,
-            score=float(self._last.response.observation.score.score),
+            score=self._last.score.total,
             usage=dict(self._usage),
             statuses={name: dict(count) for name, count in self._statuses.items()},
             rejections=dict(self._rejections),
@@ -85,22 +82,9 @@ class Tally:
         self._alliance.update((unit.tag, unit.alliance) for unit in snapshot.units.values())
         self._last = snapshot
 
-    def _value(self, what: str) -> float:
-        """Minerals + vespene of what was killed or lost since the first snapshot."""
-        return _spent(self._last, what) - _spent(self._first, what)
-
 
 CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
 """What a result of the game means on maps that end by the death of one side or by a clock."""
-
-
-def _spent(snapshot: Snapshot, what: str) -> float:
-    details = snapshot.response.observation.score.score_details
-    return sum(_total(getattr(details, f"{what}_{resource}")) for resource in ("minerals", "vespene"))
-
-
-def _total(category: score_pb2.CategoryScoreDetails) -> float:
-    return category.none + category.army + category.economy + category.technology + category.upgrade
 
 
 def _quantile(values: list[float], share: float) -> float | None:

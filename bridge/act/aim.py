@@ -11,15 +11,13 @@ import functools
 import math
 from typing import TYPE_CHECKING, TypeAlias
 
-from bridge.frames import CAMERA_WIDTH, MapFrame, WorldPoint
+from bridge.frames import CAMERA_WIDTH, WorldPoint
 from protocol.messages import Frames
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from s2clientprotocol import common_pb2, raw_pb2
-
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 Pixel: TypeAlias = tuple[int, int]
 """Column and row, origin at the top left."""
@@ -35,12 +33,10 @@ class RealScreen:
 
     def __init__(self, snapshot: Snapshot) -> None:
         """Reads the camera of the raw data and the sizes of the feature layers."""
-        layers = snapshot.info.options.feature_layer
+        sizes = snapshot.info.pictures
         self._snapshot = snapshot
-        self._size = (layers.resolution.x, layers.resolution.y)
-        self._minimap_size = (layers.minimap_resolution.x, layers.minimap_resolution.y)
-        camera = snapshot.response.observation.raw_data.player.camera
-        self.camera = WorldPoint(camera.x, camera.y)
+        self._size, self._minimap_size = sizes.screen, sizes.minimap
+        self.camera = snapshot.camera
 
     def pixel(self, place: WorldPoint) -> Pixel | None:
         """The pixel of a place of the world; None if the screen does not show it."""
@@ -51,10 +47,10 @@ class RealScreen:
     def minimap(self, place: WorldPoint) -> Pixel:
         """The pixel of the minimap for a place of the world."""
         width, height = self._minimap_size
-        x, y = MapFrame.of(self._snapshot.info, Frames(minimap=float(width))).minimap(place.x, place.y)
+        x, y = self._snapshot.info.frame(Frames(minimap=float(width))).minimap(place.x, place.y)
         return min(max(math.floor(x), 0), width - 1), min(max(math.floor(y), 0), height - 1)
 
-    def hit(self, unit: raw_pb2.Unit) -> Pixel | None:
+    def hit(self, unit: Unit) -> Pixel | None:
         """A pixel at which a click hits this very unit; None if it is off the screen or covered all over.
 
         The middle if that is free, else the nearest pixel of its disc that no other unit covers, else the nearest
@@ -73,7 +69,7 @@ class RealScreen:
         middle = self.pixel(place)
         if middle is None:
             return None
-        near = [u for u in self._snapshot.units.values() if math.dist((u.pos.x, u.pos.y), place) <= u.radius + 1.0]
+        near = [u for u in self._snapshot.units.values() if math.dist(u.pos, place) <= u.radius + 1.0]
         for dx, dy in _around(int(BARE_WITHIN / self._scale)):
             pixel = (middle[0] + dx, middle[1] + dy)
             if self._holds(*pixel) and not any(self._covers(unit, pixel) for unit in near):
@@ -96,7 +92,7 @@ class RealScreen:
             self.camera.y - (py + 0.5 - self._size[1] / 2) * self._scale,
         )
 
-    def _disc(self, unit: raw_pb2.Unit) -> Iterator[Pixel]:
+    def _disc(self, unit: Unit) -> Iterator[Pixel]:
         """The pixels of a unit from its middle outwards; at least the one of its middle."""
         px = math.floor((unit.pos.x - self.camera.x) / self._scale + self._size[0] / 2)
         py = math.floor((self.camera.y - unit.pos.y) / self._scale + self._size[1] / 2)
@@ -105,25 +101,23 @@ class RealScreen:
             if (dx == dy == 0) or self._covers(unit, (px + dx, py + dy), slack=0.0):
                 yield px + dx, py + dy
 
-    def _beside(self, unit: raw_pb2.Unit) -> list[raw_pb2.Unit]:
+    def _beside(self, unit: Unit) -> list[Unit]:
         """The other units that touch it, seen from above."""
         return [
             other
             for other in self._snapshot.units.values()
-            if other.tag != unit.tag
-            and math.dist((other.pos.x, other.pos.y), (unit.pos.x, unit.pos.y))
-            <= other.radius + unit.radius + self._scale
+            if other.tag != unit.tag and math.dist(other.pos, unit.pos) <= other.radius + unit.radius + self._scale
         ]
 
-    def _covers(self, unit: raw_pb2.Unit, pixel: Pixel, slack: float = 0.5) -> bool:
+    def _covers(self, unit: Unit, pixel: Pixel, slack: float = 0.5) -> bool:
         """Whether a unit lies under a pixel; `slack` in pixels."""
         place = self._world(pixel)
-        return math.dist(place, (unit.pos.x, unit.pos.y)) <= unit.radius + slack * self._scale
+        return math.dist(place, unit.pos) <= unit.radius + slack * self._scale
 
-    def _shows(self, unit: raw_pb2.Unit, pixel: Pixel) -> bool:
+    def _shows(self, unit: Unit, pixel: Pixel) -> bool:
         """Whether the feature layers have a unit of its type and owner on top; True if there are no layers."""
-        layers = self._snapshot.response.observation.feature_layer_data.renders
-        seen_type, seen_owner = _value(layers.unit_type, pixel), _value(layers.player_relative, pixel)
+        layers = self._snapshot.pictures
+        seen_type, seen_owner = layers.layer_pixel("unit_type", *pixel), layers.layer_pixel("player_relative", *pixel)
         return seen_type in {None, unit.unit_type} and seen_owner in {None, unit.alliance}
 
 
@@ -132,12 +126,3 @@ def _around(reach: int) -> tuple[Pixel, ...]:
     """Offsets in a square around a pixel, the nearest first."""
     square = ((dx, dy) for dx in range(-reach, reach + 1) for dy in range(-reach, reach + 1))
     return tuple(sorted(square, key=lambda offset: (offset[0] ** 2 + offset[1] ** 2, offset)))
-
-
-def _value(image: common_pb2.ImageData, pixel: Pixel) -> int | None:
-    """The value of a pixel of a feature layer of whole bytes; None if the layer is not there."""
-    width = image.bits_per_pixel // 8
-    if not width or not image.data:
-        return None
-    start = (pixel[1] * image.size.x + pixel[0]) * width
-    return int.from_bytes(image.data[start : start + width], "little")

@@ -9,23 +9,22 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
 from bridge.functions import functions
 from bridge.knowledge import abilities, knowledge
-from bridge.names import unit_name
+from bridge.state import Alliance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bridge.action import Action
     from bridge.knowledge import AbilityFacts, UnitType
+    from bridge.state import Unit
 
-_STATES: dict[str, Callable[[raw_pb2.Unit], bool]] = {
-    "player": lambda unit: unit.alliance == raw_pb2.Self,
-    "ally": lambda unit: unit.alliance == raw_pb2.Ally,
-    "enemy": lambda unit: unit.alliance == raw_pb2.Enemy,
-    "neutral": lambda unit: unit.alliance == raw_pb2.Neutral,
+_STATES: dict[str, Callable[[Unit], bool]] = {
+    "player": lambda unit: unit.alliance == Alliance.OWN,
+    "ally": lambda unit: unit.alliance == Alliance.ALLY,
+    "enemy": lambda unit: unit.alliance == Alliance.ENEMY,
+    "neutral": lambda unit: unit.alliance == Alliance.NEUTRAL,
     "ground": lambda unit: not unit.is_flying,
     "air": lambda unit: unit.is_flying,
     "buried": lambda unit: unit.is_burrowed,
@@ -57,17 +56,17 @@ _BARRED = {
 }
 
 
-def unfit(action: Action, unit: raw_pb2.Unit) -> str | None:
+def unfit(action: Action, unit: Unit) -> str | None:
     """What the target of an action has to be and this unit is not: `an enemy unit`; None if it will do."""
-    enemy = unit.alliance == raw_pb2.Enemy
+    enemy = unit.alliance == Alliance.ENEMY
     if action.target == "enemy" and not enemy:
         return "an enemy unit"
-    if action.target == "own" and (enemy or unit.alliance == raw_pb2.Neutral):
+    if action.target == "own" and (enemy or unit.alliance == Alliance.NEUTRAL):
         return "an own unit"
     facts = _facts(action.function)
     if facts is None:
         return None
-    known = knowledge().get(unit_name(unit.unit_type))
+    known = knowledge().get(unit.name)
     for word in facts.must:
         if word in _NEEDED and _is(word, unit, known) is False:
             return _NEEDED[word]
@@ -83,7 +82,7 @@ def needs_sight(action: Action) -> bool:
     return facts is not None and facts.target != "unit" and "visible" in facts.must
 
 
-def _is(word: str, unit: raw_pb2.Unit, known: UnitType | None) -> bool | None:
+def _is(word: str, unit: Unit, known: UnitType | None) -> bool | None:
     """Whether a word of the filters holds for a unit; None if nothing is known of its type."""
     if word in _STATES:
         return _STATES[word](unit)

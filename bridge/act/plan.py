@@ -11,11 +11,9 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
-from s2clientprotocol import error_pb2
-
 from bridge.act.recognise import Refused, reject
 from bridge.names import order_name
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -90,10 +88,9 @@ def _order(command: Command) -> str:
     return order_name(command.function.ability_id)
 
 
-def words(result: int) -> str:
+def words(result: str) -> str:
     """A result of the game's action errors in words, `CantTargetAirUnits` → `cant target air units`."""
-    name = error_pb2.ActionResult.Name(error_pb2.ActionResult.ValueType(result))
-    return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in name).strip()
+    return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in result).strip()
 
 
 def written(name: str, *arguments: object) -> str:

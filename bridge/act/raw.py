@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import common_pb2
-from s2clientprotocol import sc2api_pb2 as sc_pb
-
 from bridge.act.plan import Plan, Played, Step, listed, refused_by_game, written
+from bridge.requests import autocast_switch, unit_order
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bridge.act.plan import GameAction
     from bridge.act.translate import Command
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 
 class RawExecutor:
@@ -28,26 +27,16 @@ class RawExecutor:
 
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:  # noqa: ARG002  # the other executor looks at it
         """One step with all commands, and `loops` game loops."""
-        after = yield Step(tuple(unit_command(command) for command in commands), loops)
+        after = yield Step(tuple(_action(command) for command in commands), loops)
         return Played(tuple(_words(command) for command in commands), refused_by_game(commands, after))
 
 
-def unit_command(command: Command) -> sc_pb.Action:
-    """A command in the words of the SC2 API: an order to units, or a switch of what they do by themselves."""
-    action = sc_pb.Action()
+def _action(command: Command) -> GameAction:
+    """What a command is in the words of the SC2 API."""
+    ability_id = command.function.ability_id
     if command.function.kind == "autocast":
-        action.action_raw.toggle_autocast.ability_id = command.function.ability_id
-        action.action_raw.toggle_autocast.unit_tags.extend(command.units)
-        return action
-    order = action.action_raw.unit_command
-    order.ability_id = command.function.ability_id
-    order.unit_tags.extend(command.units)
-    order.queue_command = command.queued
-    if isinstance(command.target, int):
-        order.target_unit_tag = command.target
-    elif command.target is not None:
-        order.target_world_space_pos.CopyFrom(common_pb2.Point2D(x=command.target.x, y=command.target.y))
-    return action
+        return autocast_switch(ability_id, command.units)
+    return unit_order(ability_id, command.units, command.target, queued=command.queued)
 
 
 def _words(command: Command) -> str:

@@ -16,17 +16,14 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from bridge.available import ATTACK, is_attack
 from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
-from bridge.names import unit_name, upgrade_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from s2clientprotocol import raw_pb2
-
     from bridge.functions import Function
     from bridge.knowledge import AbilityFacts
     from bridge.macro import Ledger
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 SCAN_MOVE = 19
 """What units without a weapon do when they are told to attack: they walk there."""
@@ -56,12 +53,12 @@ class Means:
     @functools.cached_property
     def upgrades(self) -> frozenset[str]:
         """Names of the upgrades that the player has."""
-        return frozenset(map(upgrade_name, self._snapshot.response.observation.raw_data.player.upgrade_ids))
+        return frozenset(self._snapshot.upgrades)
 
     @functools.cached_property
     def standing(self) -> frozenset[str]:
         """Types of the player's finished units and structures."""
-        return frozenset(unit_name(unit.unit_type) for unit in self._snapshot.own if unit.build_progress >= FINISHED)
+        return frozenset(unit.name for unit in self._snapshot.own if unit.build_progress >= FINISHED)
 
     def has(self, requirement: str) -> bool:
         """Whether the side has a structure or an upgrade, or what may stand in for it."""
@@ -69,24 +66,24 @@ class Means:
             return not self.standing.isdisjoint(stand_ins(requirement))
         return requirement in self.upgrades
 
-    def addon(self, unit: raw_pb2.Unit) -> str:
+    def addon(self, unit: Unit) -> str:
         """Type of what is attached to a unit; empty for nothing."""
         found = self._snapshot.units.get(unit.add_on_tag)
-        return unit_name(found.unit_type) if found is not None else ""
+        return found.name if found is not None else ""
 
 
-Reason: TypeAlias = "Callable[[Means, AbilityFacts, raw_pb2.Unit, str], str | None]"
+Reason: TypeAlias = "Callable[[Means, AbilityFacts, Unit, str], str | None]"
 """From means, ability, unit and the name of its type to the end of a sentence."""
 
 
-def under_construction(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def under_construction(_: Means, __: AbilityFacts, unit: Unit, name: str) -> str | None:
     """It is not there yet."""
     if unit.build_progress >= FINISHED:
         return None
     return f"{name} is still under construction ({unit.build_progress:.0%})"
 
 
-def tech(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def tech(means: Means, facts: AbilityFacts, unit: Unit, name: str) -> str | None:
     """A structure, an addon or an upgrade is missing, or the research is done."""
     missing = [need for need in facts.requires if not means.has(need)]
     if structures := [need for need in missing if need in knowledge()]:
@@ -100,13 +97,13 @@ def tech(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> st
     return None
 
 
-def energy(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def energy(means: Means, facts: AbilityFacts, unit: Unit, name: str) -> str | None:
     """It has too little energy, after what earlier calls of the turn took."""
     left = unit.energy - means.ledger.energy[unit.tag]
     return None if facts.energy <= left else f"{name} has {int(left)} energy and it takes {facts.energy:g}"
 
 
-def price(means: Means, facts: AbilityFacts, _: raw_pb2.Unit, name: str) -> str | None:
+def price(means: Means, facts: AbilityFacts, _: Unit, name: str) -> str | None:
     """Minerals, vespene or supply do not suffice, after what earlier calls of the turn took."""
     cost = cost_of(facts.id, name)
     return None if cost is None else too_dear(means.ledger, cost)
@@ -127,25 +124,25 @@ def too_dear(ledger: Ledger, cost: Cost) -> str | None:
     return None
 
 
-def queue(means: Means, facts: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def queue(means: Means, facts: AbilityFacts, unit: Unit, name: str) -> str | None:
     """Its queue of production is full."""
     places = WITH_REACTOR if means.addon(unit).endswith("Reactor") else QUEUE_LENGTH
     full = facts.does in ("train", "research") and len(unit.orders) >= places
     return f"the queue of {name} is full" if full else None
 
 
-def power(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def power(_: Means, __: AbilityFacts, unit: Unit, name: str) -> str | None:
     """No Pylon powers it."""
     known = knowledge().get(name)
     return f"{name} has no power" if known and known.needs_power and not unit.is_powered else None
 
 
-def cooldown(_: Means, facts: AbilityFacts, __: raw_pb2.Unit, name: str) -> str | None:
+def cooldown(_: Means, facts: AbilityFacts, __: Unit, name: str) -> str | None:
     """It was used a short while ago."""
     return f"{name} cannot again so soon, it takes {facts.cooldown_s:g} s after each use" if facts.cooldown_s else None
 
 
-def otherwise(_: Means, __: AbilityFacts, unit: raw_pb2.Unit, name: str) -> str | None:
+def otherwise(_: Means, __: AbilityFacts, unit: Unit, name: str) -> str | None:
     """Nothing that is known speaks against it, but the game does."""
     doing = f" while it has {len(unit.orders)} orders" if len(unit.orders) > 1 else ""
     return f"the game does not let {name} do it now{doing}"

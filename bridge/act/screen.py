@@ -24,25 +24,21 @@ import math
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import common_pb2
-from s2clientprotocol import sc2api_pb2 as sc_pb
-
 from bridge.act.aim import RealScreen
 from bridge.act.plan import Plan, Played, Refusal, Step, refuse, refused_by_game, written
 from bridge.act.select import Hand, Missed
 from bridge.compat import actions as pysc2
 from bridge.frames import WorldPoint
 from bridge.functions import raw_forms
+from bridge.requests import camera_move
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
-    from s2clientprotocol import raw_pb2
-
     from bridge.act.aim import Pixel
     from bridge.act.plan import GameAction
     from bridge.act.translate import Command
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 SAME_PLACE = 0.25
 """World units within which the camera is where it should be; it snaps to a grid in the game."""
@@ -106,10 +102,8 @@ class _Tour:
         if self._wanted is not None and math.dist(place, self._wanted) < SAME_PLACE:
             return
         self._wanted = place
-        action = sc_pb.Action()
-        action.action_raw.camera_move.center_world_space.CopyFrom(common_pb2.Point(x=place.x, y=place.y, z=0))
         self.functions.append(written("camera_move", f"[{place.x:.1f}, {place.y:.1f}]"))
-        yield from self.step(action)
+        yield from self.step(camera_move(place))
 
     def function(self, name: str, *arguments: object) -> Generator[Step, Snapshot, None]:
         """Calls a function of PySC2."""
@@ -155,16 +149,12 @@ class _Tour:
         assert command.target is not None  # the catalogue gives functions with a target to actions with a target
         if not isinstance(command.target, int):
             return command.target
-        unit = self._unit(command.target)
-        return WorldPoint(unit.pos.x, unit.pos.y)
+        return self._unit(command.target).pos
 
-    def _unit(self, tag: int) -> raw_pb2.Unit:
+    def _unit(self, tag: int) -> Unit:
         """A target that is a unit, even one that is only remembered, as a geyser under the fog of war."""
-        if unit := self.now.units.get(tag):
+        if unit := self.now.known.get(tag):
             return unit
-        for known in self.now.response.observation.raw_data.units:
-            if known.tag == tag:
-                return known
         raise Missed("the target is gone")
 
     def _pixel(self, command: Command) -> Generator[Step, Snapshot, Pixel]:

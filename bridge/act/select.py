@@ -10,18 +10,15 @@ from collections import Counter
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from bridge.act.aim import RealScreen
-from bridge.frames import WorldPoint
-from bridge.names import unit_name
 from bridge.observe.teams import WORKERS
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
-    from s2clientprotocol import raw_pb2
-
     from bridge.act.plan import Step
     from bridge.act.translate import Command
-    from bridge.snapshot import Snapshot
+    from bridge.frames import WorldPoint
+    from bridge.state import Snapshot
 
     Way: TypeAlias = Generator[Step, Snapshot, None]
 
@@ -99,12 +96,12 @@ class Hand:
         return team.control_group if whole else None
 
     def _types(self, command: Command) -> set[str]:
-        return {unit_name(self._tour.now.units[tag].unit_type) for tag in self._alive(command)}
+        return {self._tour.now.units[tag].name for tag in self._alive(command)}
 
     def _is_right(self, command: Command) -> bool:
         wanted, selected = self._alive(command), self._selected
         if self._one_will_do(command):
-            same = {unit_name(self._tour.now.units[tag].unit_type) for tag in selected}
+            same = {self._tour.now.units[tag].name for tag in selected}
             return wanted <= selected and same == self._types(command)
         return wanted == selected
 
@@ -119,7 +116,7 @@ class Hand:
     def _short_ways(self, command: Command) -> Iterator[Way]:
         """Ways that take one or two functions, where they may lead to the right selection."""
         tour, wanted = self._tour, self._alive(command)
-        player = tour.now.response.observation.player_common
+        player = tour.now.player
         group = self._group(command)
         if group is not None and wanted <= self._groups.get(group, frozenset()):
             yield tour.function("select_control_group", "recall", group)
@@ -137,7 +134,7 @@ class Hand:
     def _larvae(self, command: Command) -> Way:
         """The hatchery at which a Larva lies, and then its Larvae."""
         larva = self._tour.now.units[min(self._alive(command))]
-        homes = [u for u in self._tour.now.own if unit_name(u.unit_type) in HATCHERIES]
+        homes = [u for u in self._tour.now.own if u.name in HATCHERIES]
         if not homes:
             return
         nearest = min(homes, key=lambda u: ((u.pos.x - larva.pos.x) ** 2 + (u.pos.y - larva.pos.y) ** 2, u.tag))
@@ -157,7 +154,7 @@ class Hand:
             if not missing and not strange:
                 return
             screen = RealScreen(self._tour.now)
-            tag = min(missing or strange, key=lambda t: screen.pixel(_place(self._tour.now.units[t])) is None)
+            tag = min(missing or strange, key=lambda t: screen.pixel(self._tour.now.units[t].pos) is None)
             anew = fresh or not selected
             same = self._of_a_kind(tag, screen)
             at_once = tag in missing and same <= wanted and len(same & set(missing)) > 1 and not tries[tag]
@@ -170,18 +167,14 @@ class Hand:
     def _of_a_kind(self, tag: int, screen: RealScreen) -> frozenset[int]:
         """The own units of the same type that are on the screen."""
         kind = self._tour.now.units[tag].unit_type
-        return frozenset(u.tag for u in self._tour.now.own if u.unit_type == kind and screen.pixel(_place(u)))
+        return frozenset(u.tag for u in self._tour.now.own if u.unit_type == kind and screen.pixel(u.pos))
 
     def _click(self, tag: int, how: str) -> Way:
         """A click on a unit, with the camera moved to it if it is not on the screen; none if it is covered."""
         unit = self._tour.now.units.get(tag)
-        if unit is not None and RealScreen(self._tour.now).pixel(_place(unit)) is None:
-            yield from self._tour.look_at(_place(unit))
+        if unit is not None and RealScreen(self._tour.now).pixel(unit.pos) is None:
+            yield from self._tour.look_at(unit.pos)
             unit = self._tour.now.units.get(tag)
         pixel = None if unit is None else RealScreen(self._tour.now).hit(unit)
         if pixel is not None:
             yield from self._tour.function("select_point", how, pixel)
-
-
-def _place(unit: raw_pb2.Unit) -> WorldPoint:
-    return WorldPoint(unit.pos.x, unit.pos.y)

@@ -11,14 +11,12 @@ import functools
 import operator
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
 from bridge.act.filters import needs_sight, unfit
 from bridge.act.refused import Refused
 from bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
 from bridge.ground import land_of
 from bridge.ground.land import SEEN_NOW
-from bridge.names import unit_name
+from bridge.state import Alliance
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,9 +24,15 @@ if TYPE_CHECKING:
     from bridge.act.recognise import Recognised
     from bridge.frames import Camera
     from bridge.observe.observation import SideObservation
+    from bridge.state import Unit
 
-_SIDES = {raw_pb2.Self: "own", raw_pb2.Ally: "ally", raw_pb2.Enemy: "enemy", raw_pb2.Neutral: "neutral"}
-_WHOSE = {raw_pb2.Self: "your own", raw_pb2.Ally: "your ally's", raw_pb2.Enemy: "an enemy", raw_pb2.Neutral: "nobody's"}
+_SIDES = {Alliance.OWN: "own", Alliance.ALLY: "ally", Alliance.ENEMY: "enemy", Alliance.NEUTRAL: "neutral"}
+_WHOSE = {
+    Alliance.OWN: "your own",
+    Alliance.ALLY: "your ally's",
+    Alliance.ENEMY: "an enemy",
+    Alliance.NEUTRAL: "nobody's",
+}
 MOST_SLIPS = 2
 """Wrong digits up to which a tag may be a slip of another one."""
 SHORTEST = 6
@@ -57,7 +61,7 @@ class Targets:
             raise Refused("wrong_arguments", what)
         return tags
 
-    def unit(self, said: Recognised) -> raw_pb2.Unit:
+    def unit(self, said: Recognised) -> Unit:
         """The unit that the last tag names.
 
         Raises:
@@ -70,7 +74,7 @@ class Targets:
         if not (anywhere or tag in said.team.team.tags or _shows(said.team.camera, unit)):
             raise self._out_of_sight(said, unit)
         if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
-            what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit_name(unit.unit_type)}"
+            what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
             raise Refused("invalid_target", f"{what}; {said.action.name} needs {reason}.")
         return unit
 
@@ -98,7 +102,7 @@ class Targets:
 
     def _is_seen(self, point: WorldPoint) -> bool:
         """Whether the player sees a place now; not doubted where the game showed no map."""
-        if not self._sight.snapshot.response.observation.raw_data.map_state.visibility.data:
+        if not self._sight.snapshot.visibility.data:
             return True
         cells = land_of(self._sight.snapshot).sight  # (w, h)
         x, y = min(int(point.x), cells.shape[0] - 1), min(int(point.y), cells.shape[1] - 1)
@@ -143,9 +147,9 @@ class Targets:
     # --- tags that are wrong ----------------------------------------------------------------------------------
 
     @functools.cached_property
-    def _remembered(self) -> dict[int, raw_pb2.Unit]:
+    def _remembered(self) -> dict[int, Unit]:
         """What is there under the fog as far as the side knows: resources and structures that it saw once."""
-        return {unit.tag: unit for unit in self._sight.snapshot.response.observation.raw_data.units}
+        return self._sight.snapshot.known
 
     def _nowhere(self, said: Recognised, tag: int) -> Refused:
         if tag in self._sight.snapshot.dead:
@@ -155,10 +159,10 @@ class Targets:
         hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
         return Refused("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
 
-    def _may_be_meant(self, said: Recognised, unit: raw_pb2.Unit, wanted: str | None) -> bool:
+    def _may_be_meant(self, said: Recognised, unit: Unit, wanted: str | None) -> bool:
         if said.team.camera is not None and not _shows(said.team.camera, unit):
             return False
-        return wanted is None or (unit.alliance == raw_pb2.Enemy) == (wanted == "enemy")
+        return wanted is None or unit.is_enemy == (wanted == "enemy")
 
     def _not_of_team(self, said: Recognised, tag: int) -> Refused:
         name, own = said.team.view.name, said.team.team.tags
@@ -169,7 +173,7 @@ class Targets:
         if unit is None:
             hint = self._near_miss(tag, own) or f"{units}."
             return Refused("unknown_target", f"There is no unit {hex(tag)}; {hint}")
-        what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit_name(unit.unit_type)}"
+        what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
         if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
             right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
             return Refused("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
@@ -188,11 +192,11 @@ class Targets:
         _slip, meant = min(((slip, known) for slip, known in slips if slip is not None), default=(0, None))
         if meant is None:
             return None
-        return f"did you mean {hex(meant)} ({unit_name(self._units[meant].unit_type)})?"
+        return f"did you mean {hex(meant)} ({self._units[meant].name})?"
 
-    def _out_of_sight(self, said: Recognised, unit: raw_pb2.Unit) -> Refused:
+    def _out_of_sight(self, said: Recognised, unit: Unit) -> Refused:
         x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
-        what = f"{_SIDES[unit.alliance]} {unit_name(unit.unit_type)} {hex(unit.tag)}"
+        what = f"{_SIDES[unit.alliance]} {unit.name} {hex(unit.tag)}"
         away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
         return Refused("unknown_target", f"The {what} {away}; move there first.")
 
@@ -212,7 +216,7 @@ def _slips(wanted: str, known: str) -> int | None:
     return 1 if len(longer) == len(shorter) + 1 and shorter in dropped else None
 
 
-def _shows(camera: Camera | None, unit: raw_pb2.Unit) -> bool:
+def _shows(camera: Camera | None, unit: Unit) -> bool:
     """Whether a unit stands on a camera's screen."""
     if camera is None:
         return False

@@ -32,11 +32,10 @@ from bridge.names import buff_name, unit_name
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from s2clientprotocol import raw_pb2
-
     from bridge.act.recognise import Recognised
     from bridge.functions import Function
     from bridge.observe.observation import SideObservation
+    from bridge.state import Unit
     from protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
@@ -159,7 +158,7 @@ class Translator:
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
         """Those of some units that may be told to do it, as the task says."""
         listed = self._sight.agents[said.team.team.agent].agent.actions
-        types = {tag: unit_name(self._snapshot.units[tag].unit_type) for tag in tags}
+        types = {tag: self._snapshot.units[tag].name for tag in tags}
         found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
         if not found:
             raise self._cannot(said, [f"{name} has no such action" for name in dict.fromkeys(types.values())])
@@ -195,7 +194,7 @@ class Translator:
         if is_attack(function):
             aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
             where = "in the air" if _is_aloft(unit) else "on the ground"
-            what = f"{hex(unit.tag)} is a {unit_name(unit.unit_type)} {where}"
+            what = f"{hex(unit.tag)} is a {unit.name} {where}"
             if not aiming:
                 raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
         if not aiming:
@@ -205,12 +204,12 @@ class Translator:
         return Order(function, aiming, unit.tag)
 
     @staticmethod
-    def _hits(unit: raw_pb2.Unit, target: raw_pb2.Unit) -> bool:
+    def _hits(unit: Unit, target: Unit) -> bool:
         """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
-        return _reaches(unit_name(unit.unit_type), unit_name(target.unit_type), _is_aloft(target))
+        return _reaches(unit.name, target.name, _is_aloft(target))
 
 
-def _is_aloft(unit: raw_pb2.Unit) -> bool:
+def _is_aloft(unit: Unit) -> bool:
     """Whether a unit is hit in the air: what flies, and what a Phoenix holds up with its beam."""
     return unit.is_flying or any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)
 

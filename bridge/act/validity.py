@@ -25,17 +25,14 @@ from bridge.act.reasons import (
 )
 from bridge.available import is_attack, unmet
 from bridge.knowledge import is_armed
-from bridge.names import unit_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from s2clientprotocol import raw_pb2
-
     from bridge.action import Action
     from bridge.functions import Function
     from bridge.macro import Ledger
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 
 class Obstacle(NamedTuple):
@@ -57,9 +54,9 @@ class Validity:
         self._abilities = snapshot.abilities
         self._means = Means(snapshot, ledger)
 
-    def obstacle(self, action: Action, function: Function, unit: raw_pb2.Unit) -> Obstacle | None:
+    def obstacle(self, action: Action, function: Function, unit: Unit) -> Obstacle | None:
         """What stands in the way of a unit's doing an action with this function now; None if nothing does."""
-        name = unit_name(unit.unit_type)
+        name = unit.name
         able = None if self._abilities is None else self._abilities.get(unit.tag)
         if able is not None and function.ability_id in able:
             if is_attack(function) and action.target_kind == "tag" and not can_shoot(name, able):
@@ -74,12 +71,12 @@ class Validity:
         found = ((rank, reason(self._means, facts, unit, name)) for rank, reason in enumerate(REASONS, start=1))
         return next(Obstacle(rank, unit.energy, text) for rank, text in found if text is not None)
 
-    def affordable(self, function: Function, units: Sequence[raw_pb2.Unit]) -> tuple[int, ...]:
+    def affordable(self, function: Function, units: Sequence[Unit]) -> tuple[int, ...]:
         """Tags of those of some units, the first ones, for which the accounts suffice if each pays for itself."""
         purse = self._means.ledger.minerals, self._means.ledger.vespene, self._means.ledger.supply
         found = []
         for unit in units:
-            cost = cost_of(function.ability_id, unit_name(unit.unit_type)) if self._abilities is not None else None
+            cost = cost_of(function.ability_id, unit.name) if self._abilities is not None else None
             if cost is not None:
                 purse = purse[0] - cost.minerals, purse[1] - cost.vespene, purse[2] - cost.supply
                 if any(left < 0 < price for left, price in zip(purse, cost, strict=True)):
@@ -87,19 +84,19 @@ class Validity:
             found.append(unit.tag)
         return tuple(found)
 
-    def pay(self, function: Function, units: Sequence[raw_pb2.Unit]) -> None:
+    def pay(self, function: Function, units: Sequence[Unit]) -> None:
         """Takes what the use of a function by some units costs from the accounts of the turn.
 
         Energy only of a single unit: of a group that casts at one target, the game chooses who does it.
         """
         for unit in units:
-            name = unit_name(unit.unit_type)
+            name = unit.name
             if cost := cost_of(function.ability_id, name):
                 self._means.ledger.pay(*cost)
             if len(units) == 1 and (facts := facts_of(function.ability_id, name)) and facts.energy:
                 self._means.ledger.energy[unit.tag] += int(facts.energy)
 
-    def _spent(self, function: Function, unit: raw_pb2.Unit, name: str) -> Obstacle | None:
+    def _spent(self, function: Function, unit: Unit, name: str) -> Obstacle | None:
         """What earlier calls of the turn took away of what the game would still allow."""
         cost, facts = cost_of(function.ability_id, name), facts_of(function.ability_id, name)
         if cost and (dear := too_dear(self._means.ledger, cost)):

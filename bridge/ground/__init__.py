@@ -7,6 +7,6 @@ shows the ground to an agent.
 from bridge.ground.footprints import Footprint, Site, footprint_of, footprints, sites
 from bridge.ground.land import Land, land_of
 from bridge.ground.resources import Base
-from bridge.ground.terrain import Ground, grid
+from bridge.ground.terrain import Ground
 
-__all__ = ["Base", "Footprint", "Ground", "Land", "Site", "footprint_of", "footprints", "grid", "land_of", "sites"]
+__all__ = ["Base", "Footprint", "Ground", "Land", "Site", "footprint_of", "footprints", "land_of", "sites"]

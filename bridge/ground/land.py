@@ -11,14 +11,12 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from s2clientprotocol import raw_pb2
 
 from bridge.frames import WorldPoint
 from bridge.functions import functions_of
 from bridge.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, sites, stands_on
 from bridge.ground.resources import base_places, coordinates, mark
-from bridge.ground.terrain import Ground, grid
-from bridge.names import unit_name
+from bridge.ground.terrain import Ground
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     from bridge.ground.footprints import Footprint
     from bridge.ground.resources import Base, Places
     from bridge.ground.terrain import Bools, Bytes
-    from bridge.snapshot import Snapshot
+    from bridge.state import PowerSource, Snapshot, Unit
 
 POWER_RISE = 0.5
 """Ground that lies so much higher than a Pylon is not powered by it: it does not reach up a cliff."""
@@ -50,39 +48,32 @@ class Land:
 
     def __init__(self, snapshot: Snapshot) -> None:
         self.ground = Ground.of(snapshot.info)
-        self._raw = snapshot.response.observation.raw_data
-        self._own = snapshot.own
+        self._snapshot = snapshot
 
     @functools.cached_property
-    def _standing(self) -> list[tuple[str, Footprint, raw_pb2.Unit]]:
-        """What takes ground, with its footprint; what is only ordered is known by the order of its builder."""
-        found = ((stands_on(unit.unit_type), unit) for unit in self._raw.units)
-        shown = ((kind, unit) for kind, unit in found if kind and unit.display_type != raw_pb2.Placeholder)
-        return [(name, footprint, unit) for (name, footprint), unit in shown]
+    def _standing(self) -> list[tuple[str, Footprint, Unit]]:
+        """What takes ground, with its footprint, by ascending tags; what is only ordered is in `plans`."""
+        found = ((stands_on(unit.unit_type), unit) for unit in self._snapshot.known.values())
+        return [(*kind, unit) for kind, unit in found if kind]
 
     @functools.cached_property
-    def _bodies(self) -> list[raw_pb2.Unit]:
+    def _bodies(self) -> list[Unit]:
         """Units of others that are on the ground and in the way of who builds."""
-        others = (unit for unit in self._raw.units if unit.alliance != raw_pb2.Self and not unit.is_flying)
+        others = (unit for unit in self._snapshot.known.values() if not unit.is_own and not unit.is_flying)
         return [unit for unit in others if stands_on(unit.unit_type) is None]
 
-    def unit(self, tag: int) -> raw_pb2.Unit | None:
+    def unit(self, tag: int) -> Unit | None:
         """A unit that is seen or remembered, by its tag."""
-        return self._by_tag.get(tag)
+        return self._snapshot.known.get(tag)
 
-    @functools.cached_property
-    def _by_tag(self) -> dict[int, raw_pb2.Unit]:
-        return {unit.tag: unit for unit in self._raw.units}
-
-    def standing(self, footprint: str) -> list[raw_pb2.Unit]:
+    def standing(self, footprint: str) -> list[Unit]:
         """What is known to stand on footprints of one name, by ascending tags."""
-        return sorted((u for name, _, u in self._standing if name == footprint), key=lambda unit: unit.tag)
+        return [unit for name, _, unit in self._standing if name == footprint]
 
-    def standing_on(self, cells: Iterable[tuple[int, int]]) -> raw_pb2.Unit | None:
+    def standing_on(self, cells: Iterable[tuple[int, int]]) -> Unit | None:
         """What stands on any of some cells; the one with the least tag."""
         wanted = set(cells)
-        found = (u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u)))
-        return min(found, key=lambda unit: unit.tag, default=None)
+        return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
 
     # --- what stands there ------------------------------------------------------------------------------------
 
@@ -110,9 +101,9 @@ class Land:
 
         The game takes the price when it is begun, so that these are not paid for.
         """
-        return tuple(plan for unit in self._own for plan in self._plans_of(unit))
+        return tuple(plan for unit in self._snapshot.own for plan in self._plans_of(unit))
 
-    def _plans_of(self, unit: raw_pb2.Unit) -> Iterator[tuple[str, WorldPoint]]:
+    def _plans_of(self, unit: Unit) -> Iterator[tuple[str, WorldPoint]]:
         for order in unit.orders:
             structure = built_by(order.ability_id)
             footprint = footprint_of(structure) if structure is not None else None
@@ -120,9 +111,9 @@ class Land:
                 continue
             target = self.unit(order.target_unit_tag)
             if target is not None:
-                middle, begun = WorldPoint(target.pos.x, target.pos.y), target.alliance == raw_pb2.Self
+                middle, begun = target.pos, target.is_own
             else:
-                point = order.target_world_space_pos
+                point = order.target_world_space_pos or WorldPoint(0.0, 0.0)
                 cell = footprint.cell(point.x, point.y)
                 middle, begun = footprint.middle(cell), self._is_begun(footprint, cell)
             if not begun:
@@ -130,7 +121,7 @@ class Land:
 
     def _is_begun(self, footprint: Footprint, cell: tuple[int, int]) -> bool:
         return self.ground.holds(*cell) and any(
-            unit.alliance == raw_pb2.Self and other.cell(unit.pos.x, unit.pos.y) == cell
+            unit.is_own and other.cell(unit.pos.x, unit.pos.y) == cell
             for _, other, unit in self._standing
             if other.size == footprint.size
         )
@@ -173,25 +164,25 @@ class Land:
     @functools.cached_property
     def creep(self) -> Bools:
         """(w, h) where creep is."""
-        return self._state(grid(self._raw.map_state.creep)) > 0
+        return self._state(self._snapshot.creep.cells()) > 0
 
     @functools.cached_property
     def sight(self) -> Bytes:
         """(w, h) 2 where the player sees, 1 where it once saw, 0 elsewhere."""
-        return self._state(grid(self._raw.map_state.visibility))
+        return self._state(self._snapshot.visibility.cells())
 
     @functools.cached_property
-    def power_sources(self) -> tuple[raw_pb2.PowerSource, ...]:
+    def power_sources(self) -> tuple[PowerSource, ...]:
         """The fields that power structures and take warped in units, by ascending tags.
 
         The game may also tell of those that only hasten warping in, as a Nexus does.
         """
-        found = (s for s in self._raw.player.power_sources if self._name(s.tag) in GIVE_POWER)
+        found = (s for s in self._snapshot.power_sources if self._name(s.tag) in GIVE_POWER)
         return tuple(sorted(found, key=lambda source: source.tag))
 
     def _name(self, tag: int) -> str:
         unit = self.unit(tag)
-        return "" if unit is None else unit_name(unit.unit_type)
+        return "" if unit is None else unit.name
 
     def powered(self, *, corner: bool, by: int | None = None) -> Bools:
         """(w, h) in which cells a middle would be in a power field.
@@ -219,7 +210,8 @@ class Land:
 
     @functools.cached_property
     def _flying(self) -> frozenset[int]:
-        return frozenset(u.tag for u in self._raw.units if u.is_flying or unit_name(u.unit_type) == "WarpPrismPhasing")
+        units = self._snapshot.known.values()
+        return frozenset(unit.tag for unit in units if unit.is_flying or unit.name == "WarpPrismPhasing")
 
     def _state(self, found: Bytes | None) -> Bytes:
         return found if found is not None else np.zeros(self.ground.size, np.uint8)
@@ -239,15 +231,14 @@ class Land:
         return tuple(sorted(found))
 
     @functools.cached_property
-    def halls(self) -> tuple[raw_pb2.Unit, ...]:
+    def halls(self) -> tuple[Unit, ...]:
         """Every town hall that is known of, whoever's and also those under construction, by ascending tags."""
-        found = (u for name, _, u in self._standing if name == "town_hall")
-        return tuple(sorted(found, key=lambda unit: unit.tag))
+        return tuple(self.standing("town_hall"))
 
     @functools.cached_property
-    def own_halls(self) -> tuple[raw_pb2.Unit, ...]:
+    def own_halls(self) -> tuple[Unit, ...]:
         """The player's own town halls, finished or not, by ascending tags."""
-        return tuple(unit for unit in self.halls if unit.alliance == raw_pb2.Self)
+        return tuple(unit for unit in self.halls if unit.is_own)
 
     # --- what has to stay free --------------------------------------------------------------------------------
 
@@ -256,13 +247,13 @@ class Land:
         """(w, h) where nothing should be built unasked: ways of workers, places of town halls, room for add-ons."""
         kept = _lines(self.ground, self.bases, tuple((u.pos.x, u.pos.y) for u in self.own_halls)).copy()
         for _, footprint, unit in self._standing:
-            site = sites().get(unit_name(unit.unit_type)) if unit.alliance == raw_pb2.Self else None
+            site = sites().get(unit.name) if unit.is_own else None
             if site is not None and site.addon and not unit.add_on_tag:
                 mark(kept, ADDON, [footprint.cell(unit.pos.x, unit.pos.y)], value=True)
         return kept
 
 
-def _covered(footprint: Footprint, unit: raw_pb2.Unit) -> list[tuple[int, int]]:
+def _covered(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
     x, y = footprint.cell(unit.pos.x, unit.pos.y)
     return [(x + dx, y + dy) for dx, dy in footprint.cells]
 

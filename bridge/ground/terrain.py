@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from bridge.frames import WorldPoint
-
 if TYPE_CHECKING:
-    from s2clientprotocol import common_pb2
-    from s2clientprotocol import sc2api_pb2 as sc_pb
+    from bridge.frames import WorldPoint
+    from bridge.state import EpisodeInfo, Grid
 
 Bools: TypeAlias = NDArray[np.bool_]
 Bytes: TypeAlias = NDArray[np.uint8]
@@ -43,18 +41,9 @@ class Ground:
     """Where other players may have begun."""
 
     @classmethod
-    def of(cls, info: sc_pb.ResponseGameInfo) -> Ground:
+    def of(cls, info: EpisodeInfo) -> Ground:
         """The ground of the map that a game is played on; remembered by the map's own grids."""
-        raw = info.start_raw
-        area = raw.playable_area
-        return _ground(
-            (raw.map_size.x, raw.map_size.y),
-            (area.p0.x, area.p0.y, area.p1.x, area.p1.y),
-            _Image.of(raw.placement_grid),
-            _Image.of(raw.pathing_grid),
-            _Image.of(raw.terrain_height),
-            tuple(WorldPoint(round(p.x, 3), round(p.y, 3)) for p in raw.start_locations),
-        )
+        return _ground(info.size, info.playable, info.placement, info.pathing, info.height, info.starts)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -80,52 +69,20 @@ class Ground:
         return _ways(self, (int(point.x), int(point.y)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Image:
-    """An image of the API as a value."""
-
-    bits: int
-    width: int
-    height: int
-    data: bytes
-
-    @classmethod
-    def of(cls, image: common_pb2.ImageData) -> _Image:
-        return cls(image.bits_per_pixel, image.size.x, image.size.y, image.data)
-
-
-def grid(image: common_pb2.ImageData) -> Bytes | None:
-    """(w, h) a raw image of the API with 1 or 8 bits a cell, as numbers; None for one that was not sent.
-
-    Raw images begin at the bottom left, and the first of eight cells is the highest bit.
-    """
-    return _decoded(_Image.of(image))
-
-
-def _decoded(image: _Image) -> Bytes | None:
-    count = image.width * image.height
-    if not image.data or not count:
-        return None
-    values = np.frombuffer(image.data, np.uint8)
-    if image.bits == 1:
-        values = np.unpackbits(values)
-    return np.ascontiguousarray(values[:count].reshape(image.height, image.width).T)
-
-
 @functools.lru_cache(maxsize=8)
 def _ground(
     size: tuple[int, int],
     playable: tuple[int, int, int, int],
-    placement: _Image,
-    pathing: _Image,
-    height: _Image,
+    placement: Grid,
+    pathing: Grid,
+    height: Grid,
     starts: tuple[WorldPoint, ...],
 ) -> Ground:
     empty = np.zeros(size, np.uint8)
     inside = np.zeros(size, np.bool_)
     x0, y0, x1, y1 = playable
     inside[x0:x1, y0:y1] = True
-    built, walked, raised = (_decoded(image) for image in (placement, pathing, height))
+    built, walked, raised = (grid.cells() for grid in (placement, pathing, height))
     buildable = (empty if built is None else built).astype(np.bool_) & inside
     # what stood there when the game began is not walkable in the game's grid, but the ground under it is
     walkable = ((empty if walked is None else walked).astype(np.bool_) & inside) | buildable

@@ -25,7 +25,7 @@ from bridge.macro.sights import unseen_places
 
 if TYPE_CHECKING:
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 NEAR_ARMY: Final = 24.0
 """Enemies so near to the middle of the army are fought first; the paper's figure."""

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from s2clientprotocol import raw_pb2
 
 from bridge.frames import WorldPoint
 from bridge.functions import functions
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from bridge.ground import Base, Land
     from bridge.knowledge import AbilityFacts
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 NEAR = 10.0
 """What is built near a unit stands at most so far from it, in world units."""
@@ -261,7 +260,7 @@ def _spot(unit: Unit) -> tuple[int, int]:
 
 def _has_gas(unit: Unit) -> bool:
     """Whether a geyser holds anything; of one that is only remembered it is not known, and hoped."""
-    return unit.display_type == raw_pb2.Snapshot or unit.vespene_contents > 0
+    return unit.is_remembered or unit.vespene_contents > 0
 
 
 # names ----------------------------------------------------------------------------------------------------------------

@@ -13,8 +13,7 @@ from bridge.macro.side import ability, bears_resources, finished, is_doing, name
 if TYPE_CHECKING:
     from bridge.frames import WorldPoint
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 
 def builder(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
 from bridge.ground import land_of
 from bridge.macro.price import require
 from bridge.macro.rule import Impossible, Order, never
@@ -15,7 +13,7 @@ from bridge.macro.side import finished, is_structure, name, of_types, place
 if TYPE_CHECKING:
     from bridge.frames import WorldPoint
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 
 def cast(ask: Ask) -> list[Order]:
@@ -66,7 +64,7 @@ def cancel_building(ask: Ask) -> list[Order]:
         Impossible: it is no structure in the making, or the game does not take it.
     """
     unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
-    if unit is None or unit.alliance != raw_pb2.Self or not is_structure(unit):
+    if unit is None or not unit.is_own or not is_structure(unit):
         raise Impossible(
             "invalid_target", f"{hex(ask.tag or 0)} is no structure of yours; name one that is being built."
         )

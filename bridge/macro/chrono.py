@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bridge.knowledge import AbilityFacts
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 BOOSTED: Final = 281
 """The game's number of the buff of Chrono Boost."""

@@ -16,7 +16,7 @@ from bridge.knowledge import knowledge
 
 if TYPE_CHECKING:
     from bridge.frames import WorldPoint
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class Ledger:
     @classmethod
     def of(cls, snapshot: Snapshot) -> Self:
         """The accounts at the beginning of a joint action."""
-        common = snapshot.response.observation.player_common
+        common = snapshot.player
         minerals, vespene = _planned(snapshot)
         return cls(
             max(common.minerals - minerals, 0.0),

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from s2clientprotocol import raw_pb2
 
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from bridge.ground.terrain import Floats
     from bridge.macro.ledger import Ledger
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 OWN_GAS: Final = 10.0
 """A geyser so near to a town hall belongs to it; farther ones are not worth the way."""
@@ -57,7 +56,7 @@ def _anchors(land: Land) -> list[WorldPoint]:
 
 
 def _own(units: list[Unit]) -> list[Unit]:
-    return [unit for unit in units if unit.alliance == raw_pb2.Self]
+    return [unit for unit in units if unit.is_own]
 
 
 def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Floats:

@@ -18,7 +18,7 @@ from bridge.macro.side import finished, has_upgrade, is_structure, kind, name, o
 if TYPE_CHECKING:
     from bridge.knowledge import AbilityFacts
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 QUEUE, REACTOR_QUEUE = 5, 8
 """Orders that a structure holds, without and with a Reactor."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bridge.functions import Function
     from bridge.knowledge import AbilityFacts
     from bridge.macro.ledger import Ledger
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from protocol.messages import RejectionReason
 
 

@@ -8,20 +8,17 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
 from bridge.frames import WorldPoint
 from bridge.functions import functions, general
 from bridge.knowledge import knowledge, stand_ins
-from bridge.names import buff_name, unit_name, upgrade_name
+from bridge.names import buff_name, unit_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bridge.knowledge import UnitType
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
-Unit = raw_pb2.Unit
 NO_ARMY = frozenset({"Queen", "QueenBurrowed"})
 """Armed, and yet at home: they heal, spread creep and make larvae."""
 
@@ -42,7 +39,7 @@ def _kind(unit_type: int) -> UnitType | None:
 
 def name(unit: Unit) -> str:
     """Name of the type of a unit."""
-    return unit_name(unit.unit_type)
+    return unit.name
 
 
 def place(unit: Unit) -> WorldPoint:
@@ -96,7 +93,7 @@ def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
 
     A Zealot hits no Overlord: what flies over an army on the ground is no aim. Neither are Larvae and eggs.
     """
-    enemies = [u for u in snapshot.units.values() if u.alliance == raw_pb2.Enemy and name(u) not in UNBORN]
+    enemies = [u for u in snapshot.units.values() if u.is_enemy and name(u) not in UNBORN]
     ours = tuple(sorted({unit.unit_type for unit in of}))
     return [unit for unit in enemies if _hit(ours, unit.unit_type, flying=unit.is_flying)]
 
@@ -120,7 +117,7 @@ def is_armed(unit: Unit) -> bool:
 
 def enemy_structures(snapshot: Snapshot) -> list[Unit]:
     """Enemy structures that are known, those remembered under the fog too, by ascending tags."""
-    found = (u for u in snapshot.response.observation.raw_data.units if u.alliance == raw_pb2.Enemy and is_structure(u))
+    found = (u for u in snapshot.known.values() if u.is_enemy and is_structure(u))
     return sorted(found, key=lambda unit: unit.tag)
 
 
@@ -156,4 +153,4 @@ def stands(snapshot: Snapshot, structure: str) -> bool:
 
 def has_upgrade(snapshot: Snapshot, upgrade: str) -> bool:
     """Whether the player has researched an upgrade, by PySC2's name."""
-    return upgrade in {upgrade_name(n) for n in snapshot.response.observation.raw_data.player.upgrade_ids}
+    return upgrade in snapshot.upgrades

@@ -17,8 +17,7 @@ from bridge.macro.side import ability, finished, is_doing, is_worker, of_types, 
 if TYPE_CHECKING:
     from bridge.ground import Land
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
 ROUND_LOOPS: Final = 1344
 """A minute: when everything was seen once, the first place to look at changes so often."""
@@ -58,12 +57,9 @@ def _look(ask: Ask, unit: Unit, to: WorldPoint) -> list[Order]:
 
 def _goal(unit: Unit) -> WorldPoint | None:
     """The point that a unit walks to; nobody who builds there or gathers has one."""
-    if not is_doing(unit, ability("Move_screen"), ability("Attack_screen")) or not unit.orders[0].HasField(
-        "target_world_space_pos"
-    ):
+    if not is_doing(unit, ability("Move_screen"), ability("Attack_screen")):
         return None
-    point = unit.orders[0].target_world_space_pos
-    return WorldPoint(point.x, point.y)
+    return unit.orders[0].target_world_space_pos
 
 
 def _seen_by(places: list[WorldPoint], goal: WorldPoint | None) -> int | None:

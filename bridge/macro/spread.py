@@ -18,7 +18,7 @@ from bridge.macro.sites import best, near, promised
 if TYPE_CHECKING:
     from bridge.ground import Land
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
+    from bridge.state import Unit
 
 INJECTED: Final = 11
 """The game's number of the buff of a hatchery that is to give more larvae."""

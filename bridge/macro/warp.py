@@ -17,13 +17,10 @@ from bridge.macro.side import finished, is_structure, kind, name, of_types, plac
 from bridge.macro.sites import best, near, promised
 
 if TYPE_CHECKING:
-    from s2clientprotocol import raw_pb2
-
     from bridge.ground import Land
     from bridge.ground.terrain import Bools
     from bridge.macro.rule import Ask
-    from bridge.macro.side import Unit
-    from bridge.snapshot import Snapshot
+    from bridge.state import PowerSource, Snapshot, Unit
 
 BODY: Final = 0.625
 """Radius of the widest unit that is warped in, a Stalker, in world units."""
@@ -129,14 +126,14 @@ def _gate(ask: Ask) -> Unit:
 # where ----------------------------------------------------------------------------------------------------------------
 
 
-def _crowded(ask: Ask, source: raw_pb2.PowerSource) -> tuple[bool, int, int]:
+def _crowded(ask: Ask, source: PowerSource) -> tuple[bool, int, int]:
     """The less, the better a field is for the next unit."""
     middle = (source.pos.x, source.pos.y)
     units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]
     return not _is_fast(ask.snapshot, source), len(units) + len(ask.ledger.sites), source.tag
 
 
-def _is_fast(snapshot: Snapshot, source: raw_pb2.PowerSource) -> bool:
+def _is_fast(snapshot: Snapshot, source: PowerSource) -> bool:
     unit = snapshot.units.get(source.tag)
     if unit is not None and name(unit) == "WarpPrismPhasing":
         return True
@@ -145,7 +142,7 @@ def _is_fast(snapshot: Snapshot, source: raw_pb2.PowerSource) -> bool:
     return any(math.dist(place(other), middle) <= FAST[name(other)] for other in near_by)
 
 
-def _room(snapshot: Snapshot, ledger: Ledger, source: raw_pb2.PowerSource) -> tuple[int, int] | None:
+def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int, int] | None:
     """The cell nearest to a source where a unit touches nobody; one with free cells beside it before others."""
     land = land_of(snapshot)
     ground = land.open & ~promised(land, ledger)
@@ -155,7 +152,7 @@ def _room(snapshot: Snapshot, ledger: Ledger, source: raw_pb2.PowerSource) -> tu
     return best(airy & ~land.kept, away) or best(airy, away) or best(free, away)
 
 
-def _bodies(snapshot: Snapshot, land: Land, source: raw_pb2.PowerSource) -> Bools:
+def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:
     """(w, h) the cells in whose middle a unit would touch another one, around a power source."""
     result = np.zeros(land.ground.size, np.bool_)
     reach = source.radius + 2

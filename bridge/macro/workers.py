@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
     from bridge.frames import WorldPoint
     from bridge.macro.ledger import Ledger
-    from bridge.macro.side import Unit
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
     from bridge.task import AutoConfig
 
 PER_FIELD: Final = 2

@@ -1,7 +1,7 @@
 """A unit as every team of a side sees it: the part of its view that does not depend on who looks.
 
 Numbers of the game become names and rounded values here, once per unit and snapshot. Where a unit stands on whose
-screen is the business of `bridge.observe.scene`, which is above; below are names, frames and the raw unit.
+screen is the business of `bridge.observe.scene`, which is above; below are frames and the unit of the state.
 """
 
 from __future__ import annotations
@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from s2clientprotocol import raw_pb2
-
-from bridge.knowledge import is_armed, knowledge
-from bridge.names import buff_name, order_name, unit_name
+from bridge.knowledge import is_armed
+from bridge.state import Alliance
 from protocol.messages import LOOPS_PER_S, OrderView, UnitDetails, UnitView
 
 if TYPE_CHECKING:
     from bridge.frames import MapFrame
+    from bridge.state import Order, Unit
     from protocol.messages import Point
 
-_CLOAKED = (raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied)
 _BLANK = UnitView(
     tag="", type="", alliance="neutral", screen=(0.0, 0.0), minimap=(0.0, 0.0), health=0.0, health_max=0.0
 )  # copied with `but`, which takes a tenth of the time of a checked one
@@ -33,19 +31,19 @@ class Body:
     x: float
     y: float
     name: str
-    alliance: int
+    alliance: Alliance
     view: UnitView
 
     @property
     def is_own(self) -> bool:
         """Whether it belongs to the player."""
-        return self.alliance == raw_pb2.Self
+        return self.alliance is Alliance.OWN
 
 
-def body(unit: raw_pb2.Unit, world: MapFrame) -> Body:
+def body(unit: Unit, world: MapFrame) -> Body:
     """The body of a unit; orders, passengers and weapons are told of the player's own ones only."""
-    name, x, y = unit_name(unit.unit_type), unit.pos.x, unit.pos.y
-    more = _own(unit, name, world) if unit.alliance == raw_pb2.Self else {}
+    name, (x, y) = unit.name, unit.pos
+    more = _own(unit, world) if unit.is_own else {}
     view = _BLANK.but(
         tag=hex(unit.tag),
         type=name,
@@ -58,36 +56,36 @@ def body(unit: raw_pb2.Unit, world: MapFrame) -> Body:
         energy_max=unit.energy_max,
         build_progress=round(unit.build_progress, 2),
         flying=unit.is_flying,
-        cloaked=unit.cloak in _CLOAKED,
+        cloaked=unit.is_cloaked,
         hallucination=unit.is_hallucination,
-        buffs=tuple(map(buff_name, unit.buff_ids)),
-        details=_details(unit, name),
+        buffs=unit.buffs if unit.buff_ids else (),
+        details=_details(unit),
         **more,
     )
     return Body(unit.tag, x, y, name, unit.alliance, view)
 
 
-def _own(unit: raw_pb2.Unit, name: str, world: MapFrame) -> dict[str, object]:
+def _own(unit: Unit, world: MapFrame) -> dict[str, object]:
     """What is told of a player's own units besides."""
     orders = tuple([_order(order, world) for order in unit.orders])
-    cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed(name) else None
+    cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed(unit.name) else None
     return {"orders": orders, "order": orders[0].name if orders else None, "weapon_cooldown_s": cooldown_s}
 
 
-def _details(unit: raw_pb2.Unit, name: str) -> UnitDetails | None:
+def _details(unit: Unit) -> UnitDetails | None:
     """What only some units have."""
     found: dict[str, Any] = {}
     if unit.is_burrowed:
         found["burrowed"] = True
     if contents := unit.mineral_contents or unit.vespene_contents:
         found["contents"] = contents
-    if unit.alliance == raw_pb2.Self:
+    if unit.is_own:
         if unit.cargo_space_max:
             found["cargo_max"] = unit.cargo_space_max
-            found["passengers"] = tuple(sorted(unit_name(passenger.unit_type) for passenger in unit.passengers))
+            found["passengers"] = tuple(sorted(unit.passengers))
         if unit.ideal_harvesters:
             found["harvesters"] = (unit.assigned_harvesters, unit.ideal_harvesters)
-        if not unit.is_powered and unit.build_progress >= 1 and name in knowledge() and knowledge()[name].needs_power:
+        if not unit.is_powered and unit.build_progress >= 1 and unit.facts and unit.facts.needs_power:
             found["unpowered"] = True
     return UnitDetails(**found) if found else None
 
@@ -95,13 +93,11 @@ def _details(unit: raw_pb2.Unit, name: str) -> UnitDetails | None:
 _NO_ORDER = OrderView(name="")
 
 
-def _order(order: raw_pb2.UnitOrder, world: MapFrame) -> OrderView:
-    found: dict[str, object] = {"name": order_name(order.ability_id)}
-    target = order.WhichOneof("target")
-    if target == "target_unit_tag":
+def _order(order: Order, world: MapFrame) -> OrderView:
+    found: dict[str, object] = {"name": order.name}
+    if order.target_unit_tag:
         found["target"] = hex(order.target_unit_tag)
-    elif target == "target_world_space_pos":
-        place = order.target_world_space_pos
+    elif (place := order.target_world_space_pos) is not None:
         found["minimap"] = rounded(world.minimap(place.x, place.y), world.minimap_size)
     if order.progress > 0:
         found["progress"] = round(order.progress, 2)

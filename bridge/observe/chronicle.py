@@ -11,10 +11,9 @@ import functools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import raw_pb2
-
 from bridge.knowledge import knowledge
 from bridge.observe.events import event
+from bridge.state import Alliance
 from protocol.messages import EnemyCount, Event
 
 if TYPE_CHECKING:
@@ -97,7 +96,7 @@ class Chronicle:
         """Events for the enemies that were never seen before; all that are in sight are remembered."""
         new = []
         for tag, body in bodies.items():
-            if body.alliance != raw_pb2.Enemy or body.name in PASSING or body.view.hallucination:
+            if body.alliance is not Alliance.ENEMY or body.name in PASSING or body.view.hallucination:
                 continue
             if tag not in self._enemies:
                 new.append(event("appeared", body.view, "enemy"))

@@ -42,7 +42,7 @@ ON_TOP = 1.0
 
 def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
     """What one can warp in at and build by, in the order of tags; with its place on the screen of a camera."""
-    sources = scene.snapshot.response.observation.raw_data.player.power_sources
+    sources = scene.snapshot.power_sources
     radius = {source.tag: source.radius for source in sources}
     for field in scene.power:
         body = scene.bodies.get(field.tag)
@@ -55,8 +55,8 @@ def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
 def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
     """Free places for a base, the nearest to the own bases first, then the geysers of own bases that nobody uses."""
     land = land_of(scene.snapshot)
-    halls = [(unit.pos.x, unit.pos.y) for unit in land.halls]
-    own = [(unit.pos.x, unit.pos.y) for unit in land.own_halls]
+    halls = [unit.pos for unit in land.halls]
+    own = [unit.pos for unit in land.own_halls]
     free = [base.place for base in land.bases if _nearest(base.place, halls) > BASE_TAKEN]
     fields = [body for body in scene.resources if "Mineral" in body.name]
     for place in sorted(free, key=lambda place: (_nearest(place, own), place))[:MAX_PLACES]:
@@ -81,7 +81,7 @@ def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landma
         if "Geyser" not in body.name or _nearest((body.x, body.y), built) < ON_TOP:
             continue
         for hall in land.own_halls:
-            if math.dist((body.x, body.y), (hall.pos.x, hall.pos.y)) <= GAS_OF_BASE:
+            if math.dist((body.x, body.y), hall.pos) <= GAS_OF_BASE:
                 yield _landmark("geyser", body, camera, f"by your {scene.bodies[hall.tag].name} {hex(hall.tag)}")
                 break
 

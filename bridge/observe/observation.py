@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bridge.frames import Camera, MapFrame
     from bridge.observe.image.picture import Picture
     from bridge.observe.teams import Team
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig
     from protocol.messages import TeamView, View
 

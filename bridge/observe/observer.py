@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bridge.frames import Camera, MapFrame
     from bridge.observe.image.album import Album
     from bridge.observe.text.page import Part, Section
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig, TaskConfig
     from protocol.messages import Landmark, TeamView, View
 
@@ -65,9 +65,9 @@ class Observer:
         """
         episode = self._episode
         earlier = episode.complete()
-        episode.roster.update(snapshot.own, snapshot.response.observation.player_common)
+        episode.roster.update(snapshot.own, snapshot.player)
         scene = Scene(snapshot, self._task.frames, episode.scene)
-        episode.chronicle.note(scene.bodies, scene.upgrades, snapshot.dead)
+        episode.chronicle.note(scene.bodies, snapshot.upgrades, snapshot.dead)
         moment = _Moment(episode, scene, earlier, feedback or {}, self._album(snapshot, scene.world))
         agents = _WhenAsked(self._task.agents, partial(self._agent, moment))
         episode.scene, episode.last = scene, SideObservation(snapshot, scene.world, agents)

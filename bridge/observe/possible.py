@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bridge.action import Action
     from bridge.knowledge import AbilityFacts
     from bridge.observe.body import Body
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig
     from protocol.messages import ActionSpec, OrderView
 
@@ -40,7 +40,7 @@ class Possible:
     """The means of a side at one moment, and what they allow."""
 
     def __init__(self, snapshot: Snapshot, bodies: Mapping[int, Body], upgrades: Sequence[str]) -> None:
-        common = snapshot.response.observation.player_common
+        common = snapshot.player
         self._abilities = snapshot.abilities
         self._upgrades = frozenset(upgrades)
         self.promised = _promised(snapshot, bodies)

@@ -18,17 +18,15 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from s2clientprotocol import raw_pb2
 
-from bridge.frames import CAMERA_WIDTH, Camera, MapFrame
+from bridge.frames import CAMERA_WIDTH, Camera
 from bridge.ground import land_of
-from bridge.knowledge import knowledge
 from bridge.macro.warp import fields
-from bridge.names import upgrade_name
 from bridge.observe.body import body, rounded
 from bridge.observe.events import Events, Witnessed
 from bridge.observe.observation import TeamObservation
 from bridge.observe.possible import Possible
+from bridge.state import Alliance
 from protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
@@ -41,9 +39,10 @@ if TYPE_CHECKING:
     from bridge.observe.body import Body
     from bridge.observe.possible import Choice
     from bridge.observe.teams import Team
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import AgentConfig
-    from protocol.messages import Alliance, Frames, Point, UnitView
+    from protocol.messages import Alliance as Whose
+    from protocol.messages import Frames, Point, UnitView
 
     Floats: TypeAlias = NDArray[np.float64]
 
@@ -58,9 +57,9 @@ class Scene:
     def __init__(self, snapshot: Snapshot, frames: Frames, before: Scene | None = None) -> None:
         """Takes a snapshot, the frames that its views are given in, and the scene before, which it does not keep."""
         self.snapshot = snapshot
-        self.world = MapFrame.of(snapshot.info, frames)
+        self.world = snapshot.info.frame(frames)
         self._screen_size = frames.screen
-        units = [unit for unit in snapshot.units.values() if unit.alliance != raw_pb2.Neutral]
+        units = [unit for unit in snapshot.units.values() if not unit.is_neutral]
         self.bodies: dict[int, Body] = {unit.tag: body(unit, self.world) for unit in units}
         """Every unit in sight but the neutral ones, in ascending order of tags."""
         self.fallen = {tag: before.bodies[tag] for tag in snapshot.dead if before and tag in before.bodies}
@@ -69,9 +68,7 @@ class Scene:
         self.totals = {tag: view.health + view.shield for tag, view in views.items()}
         """Health and shield by tag."""
         self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
-        observation = snapshot.response.observation
-        self.upgrades = tuple(upgrade_name(number) for number in sorted(observation.raw_data.player.upgrade_ids))
-        self.possible = Possible(snapshot, self.bodies, self.upgrades)
+        self.possible = Possible(snapshot, self.bodies, snapshot.upgrades)
         self._arrange()
 
     def _arrange(self) -> None:
@@ -82,16 +79,15 @@ class Scene:
         self._places = np.array([(b.x, b.y) for b in order], dtype=float).reshape(-1, 2)  # world
         ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
         self._rank = np.array([ranks[b.name] for b in order], dtype=int)  # of the type, by name
-        foe = [b.alliance == raw_pb2.Enemy and b.name not in UNSEEN_TYPES for b in order]
+        foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
         self._foe = np.array(foe, dtype=bool)
-        self._friend = np.array([b.alliance != raw_pb2.Enemy for b in order], dtype=bool)
+        self._friend = np.array([b.alliance is not Alliance.ENEMY for b in order], dtype=bool)
 
     @functools.cached_property
     def resources(self) -> tuple[Body, ...]:
         """Minerals and geysers as they are now or were seen last, in ascending order of tags."""
-        neutral = (u for u in self.snapshot.response.observation.raw_data.units if u.alliance == raw_pb2.Neutral)
-        found = (body(unit, self.world) for unit in sorted(neutral, key=lambda unit: unit.tag))
-        return tuple(b for b in found if b.name in knowledge() and knowledge()[b.name].resource)
+        neutral = (unit for unit in self.snapshot.known.values() if unit.is_neutral)
+        return tuple(body(unit, self.world) for unit in neutral if unit.facts is not None and unit.facts.resource)
 
     @functools.cached_property
     def power(self) -> tuple[PowerField, ...]:
@@ -108,17 +104,17 @@ class Scene:
     @functools.cached_property
     def view(self) -> View:
         """What every agent is told alike."""
-        common = self.snapshot.response.observation.player_common
+        player = self.snapshot.player
         return View(
             time_s=round(self.snapshot.game_loop / LOOPS_PER_S, 3),
             resources=Resources(
-                minerals=common.minerals,
-                vespene=common.vespene,
-                supply_used=common.food_used,
-                supply_cap=common.food_cap,
+                minerals=player.minerals,
+                vespene=player.vespene,
+                supply_used=player.food_used,
+                supply_cap=player.food_cap,
                 promised=self.possible.promised,
             ),
-            upgrades=self.upgrades,
+            upgrades=self.snapshot.upgrades,
         )
 
     def team(
@@ -158,7 +154,7 @@ class Scene:
     def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
         return tuple([self._tags[row] for row in rows.tolist()])
 
-    def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Alliance) -> tuple[UnitView, ...]:
+    def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Whose) -> tuple[UnitView, ...]:
         points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)
         distances = looked.distance[rows].tolist() if alliance == "enemy" else [None] * len(rows)
         units = []

@@ -11,8 +11,6 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from s2clientprotocol import sc2api_pb2 as sc_pb
-
 from bridge.knowledge import abilities, knowledge
 from bridge.observe.body import rounded
 from bridge.observe.chronicle import COUNTED_ANYWAY, PASSING, is_structure
@@ -30,14 +28,7 @@ if TYPE_CHECKING:
 
 SAME_PLACE = 10.0
 """World units within which losses are one alert; about half a screen."""
-WARNINGS = frozenset(
-    {
-        sc_pb.NuclearLaunchDetected,
-        sc_pb.NydusWormDetected,
-        sc_pb.MineralsExhausted,
-        sc_pb.VespeneExhausted,
-    }
-)
+WARNINGS = frozenset({"NuclearLaunchDetected", "NydusWormDetected", "MineralsExhausted", "VespeneExhausted"})
 """What the game's own alerts say that is to be seen nowhere else."""
 
 
@@ -123,8 +114,7 @@ def _alert(scene: Scene, bodies: Sequence[Body]) -> Alert:
 
 def warnings(scene: Scene) -> tuple[str, ...]:
     """What the game itself warns of, each once."""
-    told = dict.fromkeys(a for a in scene.snapshot.response.observation.alerts if a in WARNINGS)
-    return tuple(sc_pb.Alert.Name(alert) for alert in told)
+    return tuple(dict.fromkeys(alert for alert in scene.snapshot.alerts if alert in WARNINGS))
 
 
 def others(scene: Scene, roster: Roster, task: TaskConfig, agent: str) -> tuple[TeamReport, ...]:

@@ -41,9 +41,7 @@ from bridge.names import unit_name
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from s2clientprotocol import raw_pb2
-    from s2clientprotocol import sc2api_pb2 as sc_pb
-
+    from bridge.state import Player, Unit
     from bridge.task import AgentConfig, TeamConfig, TeamKind
 
 WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
@@ -82,16 +80,16 @@ class Roster:
         self._grouped: set[int] = set()
         self._takers: dict[int, list[list[_Group]]] = {}  # by unit type; [] for a type that no team lists
 
-    def update(self, own: Sequence[raw_pb2.Unit], player: sc_pb.PlayerCommon) -> None:
+    def update(self, own: Sequence[Unit], player: Player) -> None:
         """Drops the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
         units = {unit.tag: unit for unit in own}
         self._keep(units)
-        transports: list[raw_pb2.Unit] | None = None
+        transports: list[Unit] | None = None
         for tag, unit in units.items():
             if tag in self._grouped or not self._taken_by(unit.unit_type) or unit.build_progress < 1.0:
                 continue
             if transports is None:
-                transports = [u for u in own if unit_name(u.unit_type) in TRANSPORTS]
+                transports = [u for u in own if u.name in TRANSPORTS]
             self._place(_Arrival(unit, units, transports, player))
 
     def teams(self, agent: str) -> tuple[Team, ...]:
@@ -106,7 +104,7 @@ class Roster:
     def _all_groups(self) -> Iterator[_Group]:
         return (group for groups in self._groups for group in groups)
 
-    def _keep(self, units: Mapping[int, raw_pb2.Unit]) -> None:
+    def _keep(self, units: Mapping[int, Unit]) -> None:
         """Leaves in the teams those who are still there, as what they were; moves out those who became another."""
         for tag in self._grouped & units.keys():
             home, unit_type = self._homes[tag], units[tag].unit_type
@@ -181,10 +179,10 @@ class _Home:
 class _Arrival:
     """A unit that has no team, and what there is around it."""
 
-    unit: raw_pb2.Unit
-    units: Mapping[int, raw_pb2.Unit]
-    transports: Sequence[raw_pb2.Unit]
-    player: sc_pb.PlayerCommon
+    unit: Unit
+    units: Mapping[int, Unit]
+    transports: Sequence[Unit]
+    player: Player
 
 
 def _lists(takers: Iterable[Sequence[_Group]], group: _Group) -> bool:
@@ -205,7 +203,7 @@ def _admits(groups: Sequence[_Group], arrival: _Arrival) -> bool:
     has = sum(len(group.tags) for group in groups)
     match groups[0].agent.admits:
         case "combat":
-            return has == 0 or unit_name(unit.unit_type) not in WORKERS
+            return has == 0 or unit.name not in WORKERS
         case "builder":
             return has < player.food_workers / WORKERS_PER_BUILDER
         case "defender":
@@ -229,5 +227,5 @@ def _choose(groups: Sequence[_Group], arrival: _Arrival) -> _Group:
     return nearest if smallest.tags else smallest
 
 
-def _distance(a: raw_pb2.Unit, b: raw_pb2.Unit) -> float:
-    return math.hypot(a.pos.x - b.pos.x, a.pos.y - b.pos.y)
+def _distance(a: Unit, b: Unit) -> float:
+    return math.dist(a.pos, b.pos)

@@ -12,13 +12,15 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.knowledge import knowledge
 from bridge.maps import known_maps
-from bridge.snapshot import Snapshot
 from bridge.standard import standard_task
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import TaskConfig
 from protocol.configfile import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+
+    Change = Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]
 
 GOLDEN = Path(__file__).parent / "golden"
 TASKS = Path(__file__).resolve().parents[2] / "configs" / "tasks"
@@ -60,9 +62,11 @@ def make_snapshot(
     camera: tuple[float, float] = (16, 16),
     upgrades: Iterable[int] = (),
     player: dict[str, int] | None = None,
+    errors: Iterable[sc_pb.ActionError] = (),
+    change: Change | None = None,
     **fields: Any,
 ) -> Snapshot:
-    """What a player sees: these units on a map of this size."""
+    """What a player sees: these units on a map of this size; `change` may add to the messages before they are read."""
     response = sc_pb.ResponseObservation()
     observation = response.observation
     observation.game_loop = loop
@@ -79,7 +83,10 @@ def make_snapshot(
     layers.width = 24
     layers.resolution.x = layers.resolution.y = 128
     layers.minimap_resolution.x = layers.minimap_resolution.y = 64
-    return Snapshot(response=response, info=info, **fields)
+    response.action_errors.extend(errors)
+    if change is not None:
+        change(response, info)
+    return read_snapshot(response, read_info(info), **fields)
 
 
 @pytest.fixture

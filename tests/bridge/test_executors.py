@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
 
     from bridge.act import Command, Executor, Played, Step
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
@@ -398,11 +398,11 @@ def test_an_order_to_a_place_is_clicked_on_the_ground_beside_who_stands_there(ta
 
 @pytest.mark.parametrize(("seen", "clicked"), [("Stalker", True), ("Overlord", False)])
 def test_what_covers_a_target_is_seen_on_the_feature_layers(seen: str, clicked: bool, table: Any, joint: Any) -> None:
-    game = table()
+    kind, owner = (74, 4) if seen == "Stalker" else (106, 1)
+    game = table(change=_layers(kind, owner))
     wanted = joint(game, "<Attack_Unit(0x100180001)>", control_group=None)
     game.put(0x100500001, "Overlord", 15.0, 10.0, radius=1.0)
-    kind, owner = (74, 4) if seen == "Stalker" else (106, 1)
-    plan = ScreenExecutor().plan(wanted.commands, _with_layers(game.now(), kind, owner), 8)
+    plan = ScreenExecutor().plan(wanted.commands, game.now(), 8)
     step = next(plan)
     called: list[str] = []
     played = None
@@ -411,7 +411,7 @@ def test_what_covers_a_target_is_seen_on_the_feature_layers(seen: str, clicked: 
             game._carry_out(action)
             called += [] if isinstance(action, sc_pb.Action) else [pysc2.FUNCTIONS[action.function].name]
         try:
-            step = plan.send(_with_layers(game.now(), kind, owner))
+            step = plan.send(game.now())
         except StopIteration as done:
             played = done.value
     assert ("Attack_screen" in called) == clicked
@@ -420,15 +420,17 @@ def test_what_covers_a_target_is_seen_on_the_feature_layers(seen: str, clicked: 
     assert said == ([] if clicked else [covered])
 
 
-def _with_layers(now: Snapshot, unit_type: int, owner: int) -> Snapshot:
+def _layers(unit_type: int, owner: int) -> Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]:
     """Feature layers that show this type of unit everywhere."""
-    renders = now.response.observation.feature_layer_data.renders
     size = common_pb2.Size2DI(x=128, y=128)
-    renders.unit_type.CopyFrom(
-        common_pb2.ImageData(bits_per_pixel=32, size=size, data=unit_type.to_bytes(4, "little") * 128 * 128)
-    )
-    renders.player_relative.CopyFrom(common_pb2.ImageData(bits_per_pixel=8, size=size, data=bytes([owner]) * 128 * 128))
-    return now
+
+    def change(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        renders = response.observation.feature_layer_data.renders
+        types, owners = unit_type.to_bytes(4, "little") * 128 * 128, bytes([owner]) * 128 * 128
+        renders.unit_type.CopyFrom(common_pb2.ImageData(bits_per_pixel=32, size=size, data=types))
+        renders.player_relative.CopyFrom(common_pb2.ImageData(bits_per_pixel=8, size=size, data=owners))
+
+    return change
 
 
 def test_a_tour_ends_where_the_episode_ends_and_says_what_it_played(table: Any, joint: Any) -> None:

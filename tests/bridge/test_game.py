@@ -17,6 +17,7 @@ from bridge.errors import GameError, GameHangs, GameMissing
 from bridge.game import GameConfig, GameInfo, GameThread, OneSide, StepResult, find_sc2
 from bridge.maps import known_maps
 from bridge.pysc2_game import PySC2Game
+from bridge.state import EpisodeInfo
 from protocol.errors import KhalaError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bridge.act import Plan
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 
 class FakeGame:
@@ -115,7 +116,6 @@ class StubEnv:
     """An `SC2Env` of two players that counts loops and notes what enters."""
 
     def __init__(self, last_loop: int) -> None:
-        self.game_info = [sc_pb.ResponseGameInfo()] * 2
         self.entered: list[tuple[list[list[str]], int]] = []
         self._last_loop = last_loop
 
@@ -149,6 +149,7 @@ def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[StepRe
     game = object.__new__(PySC2Game)
     env = StubEnv(last_loop)
     game._env, game._ended, game._asks = env, False, False
+    game._maps = (EpisodeInfo(), EpisodeInfo())
     return env, game.act([plan(steps) for steps in plans])
 
 

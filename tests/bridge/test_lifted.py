@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 GRAVITON_BEAM = 5
 

@@ -13,7 +13,7 @@ from protocol.messages import Frames, Resources
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import TaskConfig
     from protocol.messages import UnitView
 

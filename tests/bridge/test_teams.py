@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from s2clientprotocol import raw_pb2
-from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bridge.compat import units as pysc2_units
 from bridge.forms import FORMS, form_of, forms_of
 from bridge.observe.teams import Roster
+from bridge.state import Player, Unit, read_unit
 from bridge.task import AgentConfig, TaskConfig
 
 if TYPE_CHECKING:
@@ -32,9 +32,13 @@ def team(name: str, *types: str, kind: str = "group") -> dict[str, Any]:
     return {"name": name, "unit_types": types, "kind": kind}
 
 
+def _read(units: Iterable[raw_pb2.Unit]) -> list[Unit]:
+    return [read for read in map(read_unit, units) if read is not None]
+
+
 def grouped(agents: Iterable[AgentConfig], units: Iterable[raw_pb2.Unit], **player: int) -> dict[str, list[int]]:
     roster = Roster(agents)
-    roster.update(sorted(units, key=lambda unit: unit.tag), sc_pb.PlayerCommon(**player))
+    roster.update(_read(sorted(units, key=lambda unit: unit.tag)), Player(**player))
     return {t.name: list(t.tags) for a in agents for t in roster.teams(a.name)}
 
 
@@ -64,7 +68,7 @@ def test_of_a_select_team_every_unit_is_a_team_with_a_number_of_its_own(unit: Ca
     agents = [agent("A", team("Obs", "Observer", kind="select"))]
     roster = Roster(agents)
     for tags in ([1, 2], [2], [2, 3]):
-        roster.update([unit(tag, "Observer", 9, 9) for tag in tags], sc_pb.PlayerCommon())
+        roster.update(_read([unit(tag, "Observer", 9, 9) for tag in tags]), Player())
     assert [(t.name, t.tags) for t in roster.teams("A")] == [("Obs-2", (2,)), ("Obs-3", (3,))]
 
 
@@ -112,7 +116,7 @@ def test_the_head_is_the_oldest_unit_and_stays_it(unit: Callable[..., raw_pb2.Un
     roster = Roster([agent("A", team("Z", "Zealot"))])
     heads = []
     for tags in ([5, 7], [3, 5, 7], [3, 7], [3, 5, 7]):
-        roster.update([unit(tag, "Zealot", 5, 5) for tag in tags], sc_pb.PlayerCommon())
+        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), Player())
         (z,) = roster.teams("A")
         heads.append((z.head, z.tags))
     assert heads == [(5, (5, 7)), (5, (5, 7, 3)), (7, (7, 3)), (7, (7, 3, 5))]
@@ -121,13 +125,13 @@ def test_the_head_is_the_oldest_unit_and_stays_it(unit: Callable[..., raw_pb2.Un
 def test_a_unit_that_comes_back_returns_to_its_team(unit: Callable[..., raw_pb2.Unit]) -> None:
     roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
     for tags in ([1, 2], [1], [1, 2]):
-        roster.update([unit(tag, "Zealot", 5, 5) for tag in tags], sc_pb.PlayerCommon())
+        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), Player())
     assert [t.tags for t in roster.teams("A")] == [(1,), (2,)]
 
 
 def test_a_team_without_units_is_named_as_idle(unit: Callable[..., raw_pb2.Unit]) -> None:
     roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
-    roster.update([unit(1, "Zealot", 5, 5)], sc_pb.PlayerCommon())
+    roster.update(_read([unit(1, "Zealot", 5, 5)]), Player())
     assert roster.idle_teams("A") == ("Z-2",)
 
 
@@ -145,7 +149,7 @@ def test_the_army_of_2s3z_is_grouped_as_in_the_paper(
 def test_a_side_team_has_no_units_and_is_always_there() -> None:
     side = {"name": "Base", "kind": "side", "actions": ["All_Units_Attack"]}
     roster = Roster([agent("D", side, team("Z", "Zealot"))])
-    roster.update([], sc_pb.PlayerCommon())
+    roster.update([], Player())
     assert [(t.name, t.kind, t.tags) for t in roster.teams("D")] == [("Base", "side", ())]
     assert roster.idle_teams("D") == ("Z",)
 
@@ -168,7 +172,7 @@ def followed(
         own = [raw_pb2.Unit(tag=tag, unit_type=NUMBERS[name], build_progress=1) for tag, name in sorted(moment.items())]
         for unit in own:
             unit.pos.x = (at or {}).get(unit.tag, 10.0)
-        roster.update(own, sc_pb.PlayerCommon(food_workers=12))
+        roster.update(_read(own), Player(food_workers=12))
         found.append({tag: f"{t.agent} {t.name}" for a in agents for t in roster.teams(a.name) for tag in t.tags})
     return found
 
@@ -258,8 +262,8 @@ def test_forms_of_forms_are_forms() -> None:
 def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
     agents = [agent("B", team("Builder", "Probe"), admits="builder"), agent("C", team("Z", "Zealot", "Stalker"))]
     names = ["Probe"] * 70 + ["Zealot"] * 60 + ["Stalker"] * 50 + ["Nexus"] * 20
-    own = [raw_pb2.Unit(tag=n, unit_type=NUMBERS[name], build_progress=1) for n, name in enumerate(names, 1)]
-    roster, player, took_s = Roster(agents), sc_pb.PlayerCommon(food_workers=70), []
+    own = _read(raw_pb2.Unit(tag=n, unit_type=NUMBERS[name], build_progress=1) for n, name in enumerate(names, 1))
+    roster, player, took_s = Roster(agents), Player(food_workers=70), []
     for _ in range(20):
         began = time.perf_counter()
         roster.update(own, player)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
@@ -171,7 +172,7 @@ def test_what_is_not_finished_cannot_do_anything(unit: Make, snapshot: Callable[
     seen = snapshot([gateway], player=RICH, abilities={A: frozenset()})
     action = catalogue()["Train_Zealot"]
     assert action.pysc2 is not None
-    obstacle = Validity(seen, Ledger.of(seen)).obstacle(action, action.pysc2, gateway)
+    obstacle = Validity(seen, Ledger.of(seen)).obstacle(action, action.pysc2, seen.units[A])
     assert obstacle is not None
     assert obstacle.text == "Gateway is still under construction (43%)"
 
@@ -226,10 +227,13 @@ def test_a_place_has_to_be_in_sight_where_the_game_wants_it(
         }
     )
     config = task("2s3z", agents=(agent,))
-    now = snapshot([unit(A, "Reaper", 10, 10)])
-    visibility = now.response.observation.raw_data.map_state.visibility
-    visibility.bits_per_pixel, visibility.size.x, visibility.size.y = 8, 32, 32
-    visibility.data = bytes([seen]) * (32 * 32)
+
+    def look(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        visibility = response.observation.raw_data.map_state.visibility
+        visibility.bits_per_pixel, visibility.size.x, visibility.size.y = 8, 32, 32
+        visibility.data = bytes([seen]) * (32 * 32)
+
+    now = snapshot([unit(A, "Reaper", 10, 10)], change=look)
     joint = Actor(config).joint(Observer(config).observe(now), {"A": parse(call)})
     assert [rejection.reason for rejection in joint.rejections["A"]] == refused
     words = "[12, 12] is out of your sight; Effect_KD8Charge_Screen needs a place in sight."

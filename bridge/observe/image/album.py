@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bridge.observe.image.lettering import Image
     from bridge.observe.image.picture import Picture
     from bridge.observe.observation import AgentObservation
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 cv2.setNumThreads(1)  # a picture is too small to share, and agents of other processes want the rest
 

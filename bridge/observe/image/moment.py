@@ -12,30 +12,30 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from s2clientprotocol import raw_pb2
 
 from bridge.compat import features
-from bridge.ground import grid, land_of
+from bridge.ground import land_of
 from bridge.knowledge import knowledge
-from bridge.names import order_name, unit_name
+from bridge.names import unit_name
 from bridge.observe.image.codes import code_of
 from bridge.observe.image.painting import Painting, Veil, upright
+from bridge.state import Alliance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bridge.frames import WorldPoint
     from bridge.ground import Land
     from bridge.observe.image.bodies import Shape
     from bridge.observe.image.palette import Side
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot, Unit
 
-_SIDES: dict[int, Side] = {
-    raw_pb2.Self: "own",
-    raw_pb2.Ally: "ally",
-    raw_pb2.Enemy: "enemy",
-    raw_pb2.Neutral: "neutral",
+_SIDES: dict[Alliance, Side] = {
+    Alliance.OWN: "own",
+    Alliance.ALLY: "ally",
+    Alliance.ENEMY: "enemy",
+    Alliance.NEUTRAL: "neutral",
 }
-_CLOAKED = (raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied)
 _EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
 _STRUCTURE_RADIUS = 1.0
 """A type that nobody knows is taken for a structure if it is this large and does not fly."""
@@ -94,7 +94,6 @@ class Moment:
     def __init__(self, snapshot: Snapshot) -> None:
         """Takes a snapshot; what is not asked for is not made."""
         self.snapshot = snapshot
-        self._raw = snapshot.response.observation.raw_data
 
     @cached_property
     def painting(self) -> Painting:
@@ -109,14 +108,14 @@ class Moment:
     @cached_property
     def veil(self) -> Veil:
         """Creep and fog."""
-        creep, sight = grid(self._raw.map_state.creep), grid(self._raw.map_state.visibility)
+        creep, sight = self.snapshot.creep.cells(), self.snapshot.visibility.cells()
         return Veil(None if creep is None else upright(creep), None if sight is None else upright(sight))
 
     @cached_property
     def subjects(self) -> tuple[Subject, ...]:
         """Every unit that is shown or remembered, in the order of drawing."""
-        units = {unit.tag: unit for unit in self._raw.units}
-        found = (_subject(unit, units) for unit in self._raw.units if unit.display_type != raw_pb2.Placeholder)
+        units = self.snapshot.known
+        found = (_subject(unit, units) for unit in units.values())
         drawn = [one for one in found if one.name not in UNDRAWN]
         return tuple(sorted(drawn, key=lambda one: (one.level, -one.radius, one.tag)))
 
@@ -136,41 +135,37 @@ class Moment:
         return tuple(
             Patch(
                 _EFFECTS.get(effect.effect_id, f"Effect{effect.effect_id}"),
-                _SIDES.get(effect.alliance, "neutral"),
+                _SIDES[effect.alliance],
                 effect.radius or 0.5,
-                tuple((point.x, point.y) for point in effect.pos),
+                effect.places,
             )
-            for effect in self._raw.effects
+            for effect in self.snapshot.effects
         )
 
     @cached_property
     def power(self) -> tuple[Patch, ...]:
         """The player's sources of power."""
-        return tuple(
-            Patch("Power", "own", source.radius, ((source.pos.x, source.pos.y),))
-            for source in self._raw.player.power_sources
-        )
+        return tuple(Patch("Power", "own", source.radius, (source.pos,)) for source in self.snapshot.power_sources)
 
 
-def _subject(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> Subject:
-    side = _SIDES.get(unit.alliance, "neutral")
+def _subject(unit: Unit, units: dict[int, Unit]) -> Subject:
+    side = _SIDES[unit.alliance]
     name, code, shape = _kind(unit.unit_type, side, unit.is_flying, unit.radius >= _STRUCTURE_RADIUS)
     order, target = _order(unit, units) if side == "own" else ("", None)
-    is_remembered = unit.display_type == raw_pb2.Snapshot
-    pos = unit.pos
+    is_remembered = unit.is_remembered
     return Subject(
         tag=unit.tag,
         type_id=unit.unit_type,
         owner=unit.owner,
-        x=pos.x,
-        y=pos.y,
+        x=unit.pos.x,
+        y=unit.pos.y,
         radius=unit.radius or 0.5,
         facing=unit.facing,
         name=name,
         code=code,
         side=side,
         shape=shape,
-        ghost=is_remembered or unit.cloak in _CLOAKED or unit.is_hallucination or unit.is_burrowed,
+        ghost=is_remembered or unit.is_cloaked or unit.is_hallucination or unit.is_burrowed,
         built=1.0 if is_remembered else unit.build_progress,
         health=_share(unit.health, unit.health_max),
         shield=_share(unit.shield, unit.shield_max),
@@ -210,16 +205,13 @@ def _share(value: float, full: float) -> float:
     return 1.0 if value >= full else value / full
 
 
-def _order(unit: raw_pb2.Unit, units: dict[int, raw_pb2.Unit]) -> tuple[str, tuple[float, float] | None]:
+def _order(unit: Unit, units: dict[int, Unit]) -> tuple[str, WorldPoint | None]:
     """What an own unit does, and where that leads; whom it fires at comes first."""
     enemy = units.get(unit.engaged_target_tag)
     if enemy is not None:
-        return "Attack", (enemy.pos.x, enemy.pos.y)
+        return "Attack", enemy.pos
     if not unit.orders:
         return "", None
     order = unit.orders[0]
-    name = order_name(order.ability_id)
-    if order.HasField("target_world_space_pos"):
-        return name, (order.target_world_space_pos.x, order.target_world_space_pos.y)
     target = units.get(order.target_unit_tag)
-    return name, None if target is None else (target.pos.x, target.pos.y)
+    return order.name, order.target_world_space_pos if target is None else target.pos

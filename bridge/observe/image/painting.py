@@ -23,10 +23,10 @@ from bridge.observe.image import palette
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from bridge.frames import Camera
     from bridge.observe.image.lettering import Image, Mask
+    from bridge.state import EpisodeInfo
 
 T = TypeVar("T", bound=np.generic)
 
@@ -65,10 +65,9 @@ class Painting:
     """The whole map, `FINE` pixels a world unit."""
 
     @classmethod
-    def of(cls, info: sc_pb.ResponseGameInfo) -> Painting:
+    def of(cls, info: EpisodeInfo) -> Painting:
         """The ground of the map that a game is played on."""
-        area = info.start_raw.playable_area
-        return _painting(Ground.of(info), (area.p0.x, area.p0.y, area.p1.x, area.p1.y))
+        return _painting(Ground.of(info), info.playable)
 
     def seen(self, camera: Camera, size_px: int, veil: Veil) -> Image:
         """What a camera shows of it, (size_px, size_px, 3); at most half of its own pixels beside the truth."""

@@ -6,12 +6,11 @@ import functools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from s2clientprotocol import raw_pb2
-
 from bridge.catalog import catalogue
 from bridge.frames import WorldPoint
 from bridge.knowledge import knowledge
 from bridge.names import order_name
+from bridge.state import Alliance
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from simulator.api.abilities import Command, judge
 from simulator.casting import is_modelled
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
     from bridge.action import Action
     from bridge.observe.observation import SideObservation, TeamObservation
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from simulator.abilities import Ability
 
     from .preparations import Preparation
@@ -149,9 +148,7 @@ def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObs
 def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
     """Units around the one that is told: first those at which the simulator lets it aim, then the others."""
     here = snapshot.units[stage.caster].pos
-    whose = {"enemy": (raw_pb2.Enemy,), "own": (raw_pb2.Self,)}.get(
-        action.target or "", tuple(raw_pb2.Alliance.values())
-    )
+    whose = {"enemy": (Alliance.ENEMY,), "own": (Alliance.OWN,)}.get(action.target or "", tuple(Alliance))
     near = [
         unit
         for unit in snapshot.units.values()

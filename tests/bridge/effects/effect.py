@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import common_pb2
     from s2clientprotocol import sc2api_pb2 as sc
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 MOVED = 0.3
 """World units that a unit has to be off its place to count as moved."""
@@ -53,6 +53,8 @@ class Seen(NamedTuple):
     """A moment of a game."""
 
     snapshot: Snapshot
+    response: sc.ResponseObservation
+    """What the snapshot was read from; it tells more of a unit than anybody else wants to know."""
     autocast: Mapping[int, frozenset[int]]
     """By tag of a unit, what it does without being told; the API does not show it, the simulator's world does."""
 
@@ -64,7 +66,7 @@ def changes(idle: Seen, told: Seen) -> frozenset[str]:
     found = {word for tag in both for word in _of_unit(before[tag], after[tag])}
     found |= {word for tag in both for word in _of_card(_name(after[tag]), tag, idle, told)}
     found |= {f"gone {name}" for name in _more(before, after)} | {f"new {name}" for name in _more(after, before)}
-    found |= set(_of_player(idle.snapshot.response, told.snapshot.response))
+    found |= set(_of_player(idle.response, told.response))
     return frozenset(found)
 
 
@@ -74,7 +76,7 @@ def kinds(words: frozenset[str]) -> frozenset[str]:
 
 
 def _units(seen: Seen) -> dict[int, raw_pb2.Unit]:
-    shown = seen.snapshot.response.observation.raw_data.units
+    shown = seen.response.observation.raw_data.units
     return {unit.tag: unit for unit in shown if unit.display_type in _SHOWN}
 
 

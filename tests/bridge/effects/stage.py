@@ -16,7 +16,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from bridge.available import available, question
 from bridge.compat import features, point
 from bridge.knowledge import knowledge
-from bridge.snapshot import Snapshot
+from bridge.state import read_info, read_snapshot
 from simulator import lifecycle
 from simulator.api import bookmark
 from simulator.client import Client, interface
@@ -88,7 +88,7 @@ class Stage:
             prepare(self.world, self.world.slot_of(self.caster))
         self.client.step(1)
         self._kept = self._keep()
-        self.info = self.client.ask(game_info=sc.RequestGameInfo()).game_info
+        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info)
         self._eyes = _eyes() if layers else None
         self._idle: dict[int, Seen] = {}
         self._first = self.look()
@@ -153,16 +153,14 @@ class Stage:
     def look(self, response: sc.ResponseObservation | None = None) -> Seen:
         """What the player sees now, and what his units can do and do by themselves."""
         response, world = response or self.client.observe(), self.world
-        answer = self.client.ask(query=question(Snapshot(response, self.info))).query
+        answer = self.client.ask(query=question(read_snapshot(response, self.info))).query
         functions = self._eyes.available_actions(response.observation) if self._eyes else ()
-        snapshot = Snapshot(
-            response,
-            self.info,
-            abilities=available(answer),
-            functions=frozenset(map(int, functions)),
-            errors=tuple(response.action_errors),
+        snapshot = read_snapshot(
+            response, self.info, abilities=available(answer), functions=frozenset(map(int, functions))
         )
-        return Seen(snapshot, {world.tag_of(slot): frozenset(known) for slot, known in world.autocast.items()})
+        return Seen(
+            snapshot, response, {world.tag_of(slot): frozenset(known) for slot, known in world.autocast.items()}
+        )
 
     def idle(self, loops: int) -> Seen:
         """The same game some loops later, without any order."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bridge.act import Executor
     from bridge.act.plan import Plan
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
 pytestmark = pytest.mark.game
 
@@ -172,9 +172,9 @@ def _set_up(game: PySC2Game, play: Play) -> Snapshot:
     """A new episode with some units more than it begins with, and money."""
     (now,) = game.reset()
     base = next(unit for unit in now.own if unit_name(unit.unit_type) == "Nexus").pos
-    area = now.info.start_raw.playable_area
-    toward_x = 1 if base.x < (area.p0.x + area.p1.x) / 2 else -1
-    toward_y = 1 if base.y < (area.p0.y + area.p1.y) / 2 else -1
+    x0, y0, x1, y1 = now.info.playable
+    toward_x = 1 if base.x < (x0 + x1) / 2 else -1
+    toward_y = 1 if base.y < (y0 + y1) / 2 else -1
     commands = [debug_pb2.DebugCommand(game_state=debug_pb2.all_resources)]
     for kind, owner, x, y in play.units:
         order = debug_pb2.DebugCreateUnit(unit_type=knowledge()[kind].id, owner=owner, quantity=1)

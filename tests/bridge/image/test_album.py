@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from bridge.observe.image.picture import Picture
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from bridge.task import TaskConfig
 
     Snap = Callable[..., Snapshot]
@@ -113,16 +114,12 @@ def test_without_marks_there_are_neither_letters_nor_digits(show: Show) -> None:
     assert "mark" not in plain.title
 
 
-def render(snapshot: Snapshot, camera: tuple[float, float]) -> Snapshot:
+def render(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
     """Gives a snapshot pictures of the game's own, all of one colour."""
-    snapshot.response.observation.raw_data.player.camera.x, snapshot.response.observation.raw_data.player.camera.y = (
-        camera
-    )
-    for image in (snapshot.response.observation.render_data.map, snapshot.response.observation.render_data.minimap):
+    for image in (response.observation.render_data.map, response.observation.render_data.minimap):
         image.size.x = image.size.y = 64
         image.bits_per_pixel = 24
         image.data = bytes([10, 200, 30]) * 64 * 64
-    return snapshot
 
 
 def greenness(picture: Picture) -> float:
@@ -151,7 +148,7 @@ def test_the_games_own_pixels_are_taken_where_they_are_wanted_and_there(
     count: int,
     is_green: bool,
 ) -> None:
-    shown = render(snapshot(battle), camera)
+    shown = snapshot(battle, camera=camera, change=render)
     pictures = show({"what": "screen", "source": source, "max_teams": 1}, shown=shown)
     assert len(pictures) == count
     assert [greenness(picture) > 0.5 for picture in pictures] == [is_green] * count

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
+    Change = Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]
     Unit = Callable[..., raw_pb2.Unit]
 
 SIZE = 240  # ten pixels a world unit
@@ -34,11 +36,15 @@ def values(layer: str, shown: Snapshot, camera: Camera) -> np.ndarray:
     return draw(Moment(shown), camera, SIZE)
 
 
-def grids(snapshot: Snapshot, name: str, cells: np.ndarray, bits: int = 1) -> None:
+def grid_of(name: str, cells: np.ndarray, bits: int = 1) -> Change:
     """Gives a map a grid, `[y, x]` from the bottom left."""
-    image = getattr(snapshot.info.start_raw, name)
-    image.size.x, image.size.y, image.bits_per_pixel = cells.shape[1], cells.shape[0], bits
-    image.data = np.packbits(cells).tobytes() if bits == 1 else cells.astype(np.uint8).tobytes()
+
+    def change(_: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
+        image = getattr(info.start_raw, name)
+        image.size.x, image.size.y, image.bits_per_pixel = cells.shape[1], cells.shape[0], bits
+        image.data = np.packbits(cells).tobytes() if bits == 1 else cells.astype(np.uint8).tobytes()
+
+    return change
 
 
 def test_every_layer_that_may_be_asked_for_is_there_and_no_other() -> None:
@@ -55,9 +61,9 @@ def test_they_are_those_of_the_game() -> None:
 
 @pytest.mark.parametrize(("layer", "grid"), [("buildable", "placement_grid"), ("pathable", "pathing_grid")])
 def test_a_grid_of_the_map_is_seen_through_the_camera(snapshot: Snap, layer: str, grid: str) -> None:
-    shown, cells = snapshot([]), np.zeros((32, 32), np.uint8)
+    cells = np.zeros((32, 32), np.uint8)
     cells[20, 10] = 1  # world cell x 10 to 11, y 20 to 21
-    grids(shown, grid, cells)
+    shown = snapshot([], change=grid_of(grid, cells))
     seen = values(layer, shown, Camera(12.5, 16.0))
     rows, columns = np.nonzero(seen)
     # on the screen x 9.5 to 10.5, y 7 to 8
@@ -65,8 +71,8 @@ def test_a_grid_of_the_map_is_seen_through_the_camera(snapshot: Snap, layer: str
 
 
 def test_heights_are_those_of_the_game(snapshot: Snap) -> None:
-    shown = snapshot([])
-    grids(shown, "terrain_height", np.repeat(np.arange(32)[:, None] * 8, 32, axis=1), bits=8)
+    heights = np.repeat(np.arange(32)[:, None] * 8, 32, axis=1)
+    shown = snapshot([], change=grid_of("terrain_height", heights, bits=8))
     seen = values("height_map", shown, Camera(16, 16))
     assert [int(seen[row, 100]) for row in (5, 125, 235)] == pytest.approx([27 * 8, 15 * 8, 4 * 8], abs=1)
 
@@ -110,12 +116,17 @@ def test_the_legend_is_written_into_the_picture() -> None:
 # --- the game's own -----------------------------------------------------------------------------------------
 
 
-def real_layer(snapshot: Snapshot, name: str, pixels: np.ndarray, bits: int = 8) -> None:
-    image = getattr(snapshot.response.observation.feature_layer_data.renders, name)
-    image.size.x = image.size.y = len(pixels)
-    image.bits_per_pixel = bits
-    kinds = {1: None, 8: np.uint8, 32: "<i4"}
-    image.data = np.packbits(pixels).tobytes() if bits == 1 else pixels.astype(kinds[bits]).tobytes()
+def real_layer(name: str, pixels: np.ndarray, bits: int = 8) -> Change:
+    """Gives a snapshot a feature layer of the game's own."""
+
+    def change(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        image = getattr(response.observation.feature_layer_data.renders, name)
+        image.size.x = image.size.y = len(pixels)
+        image.bits_per_pixel = bits
+        kinds = {1: None, 8: np.uint8, 32: "<i4"}
+        image.data = np.packbits(pixels).tobytes() if bits == 1 else pixels.astype(kinds[bits]).tobytes()
+
+    return change
 
 
 @pytest.mark.parametrize("bits", [8, 32])
@@ -123,9 +134,9 @@ def real_layer(snapshot: Snapshot, name: str, pixels: np.ndarray, bits: int = 8)
 def test_the_games_own_layer_is_moved_to_where_the_team_is(
     snapshot: Snap, bits: int, shift_x: float, shift_y: float
 ) -> None:
-    shown, pixels = snapshot([], camera=(16, 16)), np.zeros((48, 48), np.int64)
+    pixels = np.zeros((48, 48), np.int64)
     pixels[10, 20] = 77  # screen x 10 to 10.5, y 5 to 5.5 of the game's camera
-    real_layer(shown, "unit_type", pixels, bits)
+    shown = snapshot([], camera=(16, 16), change=real_layer("unit_type", pixels, bits))
     seen = own.layer(shown, "unit_type", Camera(16 + shift_x, 16 + shift_y), SIZE)
     assert seen is not None
     rows, columns = np.nonzero(seen == 77)
@@ -134,9 +145,9 @@ def test_the_games_own_layer_is_moved_to_where_the_team_is(
 
 
 def test_one_bit_layers_are_unpacked(snapshot: Snap) -> None:
-    shown, pixels = snapshot([], camera=(16, 16)), np.zeros((24, 24), np.uint8)
+    pixels = np.zeros((24, 24), np.uint8)
     pixels[3, 4] = 1
-    real_layer(shown, "creep", pixels, 1)
+    shown = snapshot([], camera=(16, 16), change=real_layer("creep", pixels, 1))
     seen = own.layer(shown, "creep", Camera(16, 16), 24)
     assert seen is not None
     assert np.argwhere(seen).tolist() == [[3, 4]]
@@ -144,8 +155,7 @@ def test_one_bit_layers_are_unpacked(snapshot: Snap) -> None:
 
 @pytest.mark.parametrize(("x", "y", "is_there"), [(16, 16, True), (19, 13, True), (19.1, 16, False), (16, 12.9, False)])
 def test_a_camera_elsewhere_has_no_pixels_of_the_game(snapshot: Snap, x: float, y: float, is_there: bool) -> None:
-    shown = snapshot([], camera=(16, 16))
-    real_layer(shown, "creep", np.zeros((24, 24), np.uint8))
+    shown = snapshot([], camera=(16, 16), change=real_layer("creep", np.zeros((24, 24), np.uint8)))
     assert (own.layer(shown, "creep", Camera(x, y), SIZE) is not None) == is_there
 
 
@@ -158,11 +168,13 @@ def test_what_was_not_sent_is_not_there(snapshot: Snap) -> None:
 
 
 def test_rendered_images_keep_their_colours(snapshot: Snap) -> None:
-    shown = snapshot([], camera=(16, 16))
-    for image in (shown.response.observation.render_data.map, shown.response.observation.render_data.minimap):
-        image.size.x = image.size.y = 24
-        image.bits_per_pixel = 24
-        image.data = np.tile(np.array([200, 100, 50], np.uint8), 24 * 24).tobytes()  # red, green, blue
+    def render(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        for image in (response.observation.render_data.map, response.observation.render_data.minimap):
+            image.size.x = image.size.y = 24
+            image.bits_per_pixel = 24
+            image.data = np.tile(np.array([200, 100, 50], np.uint8), 24 * 24).tobytes()  # red, green, blue
+
+    shown = snapshot([], camera=(16, 16), change=render)
     for seen in (own.screen(shown, Camera(16, 16), SIZE), own.minimap(shown, SIZE)):
         assert seen is not None
         assert (seen[8:-8, 8:-8] == np.array([50, 100, 200])).all()  # towards its edge it fades into black

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bridge.frames import Camera, MapFrame
+from bridge.frames import Camera
 from bridge.observe.image import minimap
 from bridge.observe.image.canvas import margin_of
 from bridge.observe.image.minimap import Site
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
 
     from bridge.observe.image.palette import Colour
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
     Unit = Callable[..., raw_pb2.Unit]
@@ -36,7 +36,7 @@ def draw(
     own: frozenset[int] = frozenset(),
     alerts: tuple[tuple[float, float], ...] = (),
 ) -> NDArray[np.uint8]:
-    world = MapFrame.of(snapshot.info, Frames())
+    world = snapshot.info.frame(Frames())
     return minimap.draw(Moment(snapshot), world, teams, own, alerts, SIZE, grid=False)[0]
 
 
@@ -59,7 +59,7 @@ def test_a_unit_is_where_its_minimap_coordinate_says(
 ) -> None:
     shown = snapshot([unit(1, name, x, y, alliance=alliance, radius=2.75 if name == "Nexus" else 0.6)], size=size)
     colour = LIVERIES["enemy" if alliance == "enemy" else "own"].body
-    point = MapFrame.of(shown.info, Frames()).minimap(x, y)
+    point = shown.info.frame(Frames()).minimap(x, y)
     assert middle_of(draw(shown), colour) == pytest.approx(pixel_of(*point), abs=1)
 
 
@@ -98,7 +98,7 @@ def test_teams_beyond_six_get_no_frame_but_all_get_a_name(snapshot: Snap) -> Non
 
 def test_a_commander_sees_where_the_teams_of_others_are(snapshot: Snap) -> None:
     shown = snapshot([], size=(64, 64))
-    world = MapFrame.of(shown.info, Frames())
+    world = shown.info.frame(Frames())
     bare, named = (
         minimap.draw(Moment(shown), world, (), frozenset(), (), SIZE, others=others)[0]
         for others in ((), (("Zealot-1", (40.0, 12.0)),))

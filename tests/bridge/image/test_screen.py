@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from bridge.observe.image.palette import Colour
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
     Unit = Callable[..., raw_pb2.Unit]
@@ -129,9 +130,11 @@ def test_grid_lines_stand_every_three_units_and_can_be_left_out(snapshot: Snap) 
 
 
 def test_an_effect_lies_at_its_place_with_its_radius(snapshot: Snap) -> None:
-    shown = snapshot([])
-    effect = shown.response.observation.raw_data.effects.add(effect_id=6, radius=3.0, alliance=raw_pb2.Self)
-    effect.pos.add(x=14.0, y=19.0)
+    def storm(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        effect = response.observation.raw_data.effects.add(effect_id=6, radius=3.0, alliance=raw_pb2.Self)
+        effect.pos.add(x=14.0, y=19.0)
+
+    shown = snapshot([], change=storm)
     image, _ = screen.draw(Moment(shown), Camera(16, 16), frozenset(), SIZE, grid=False)
     bare, _ = screen.draw(Moment(snapshot([])), Camera(16, 16), frozenset(), SIZE, grid=False)
     changed = np.argwhere((image != bare).any(axis=2))
@@ -165,16 +168,18 @@ def test_a_camera_beyond_the_map_shows_void(snapshot: Snap) -> None:
 
 
 def test_creep_and_fog_lie_where_the_game_says(snapshot: Snap) -> None:
-    plain = snapshot([])
-    shown = snapshot([])
-    state = shown.response.observation.raw_data.map_state
-    for image in (state.creep, state.visibility):
-        image.size.x = image.size.y = 32
-    state.creep.bits_per_pixel, state.visibility.bits_per_pixel = 1, 8
     creep, sight = np.zeros((32, 32), np.uint8), np.full((32, 32), 2, np.uint8)
     creep[20:, :] = 1  # y from 20 up, as raw grids begin at the bottom
     sight[:, :8] = 0
-    state.creep.data, state.visibility.data = np.packbits(creep).tobytes(), sight.tobytes()
+
+    def cover(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
+        state = response.observation.raw_data.map_state
+        for image in (state.creep, state.visibility):
+            image.size.x = image.size.y = 32
+        state.creep.bits_per_pixel, state.visibility.bits_per_pixel = 1, 8
+        state.creep.data, state.visibility.data = np.packbits(creep).tobytes(), sight.tobytes()
+
+    plain, shown = snapshot([]), snapshot([], change=cover)
     images = [screen.draw(Moment(s), Camera(16, 16), frozenset(), SIZE, grid=False)[0] for s in (plain, shown)]
     for (x, y), is_dark, is_creep in (((12, 18), False, False), ((12, 3), False, True), ((1, 18), True, False)):
         column, row = (round(value) for value in pixel_of(x, y, SIZE))

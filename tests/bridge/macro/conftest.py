@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2, raw_pb2
+from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from bridge.available import available, question
@@ -14,7 +15,7 @@ from bridge.functions import functions
 from bridge.knowledge import knowledge
 from bridge.macro import RULES, Ask, Impossible, Ledger
 from bridge.names import unit_name
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, Unit, read_info, read_snapshot
 from simulator.client import Client, command, interface
 
 if TYPE_CHECKING:
@@ -44,15 +45,15 @@ class Game:
             )
         )
         self.client.ask(join_game=sc.RequestJoinGame(race=RACES[race], options=interface(screen=0)))
-        self.info = self.client.ask(game_info=sc.RequestGameInfo()).game_info
+        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info)
         self.see()
 
     def see(self) -> Snapshot:
         """Looks at the game, and begins a new turn with a new ledger."""
-        response = self.client.observe()
-        blind = Snapshot(response=response, info=self.info)
+        self.response = response = self.client.observe()
+        blind = read_snapshot(response, self.info)
         answer = self.client.ask(query=question(blind)).query
-        self.snapshot = Snapshot(response=response, info=self.info, abilities=available(answer))
+        self.snapshot = dataclasses.replace(blind, abilities=available(answer))
         self.ledger = Ledger.of(self.snapshot)
         if self.fed:  # the game's cheat does not show in the supply that it tells
             self.ledger.supply = 100.0
@@ -88,11 +89,11 @@ class Game:
             self.client.debug(debug_pb2.DebugCommand(unit_value=value))
         return self.play(1)
 
-    def units(self, name: str) -> list[raw_pb2.Unit]:
+    def units(self, name: str) -> list[Unit]:
         """Units of a type that are there, everybody's."""
         return [unit for unit in self.snapshot.units.values() if unit_name(unit.unit_type) == name]
 
-    def own(self, name: str) -> list[raw_pb2.Unit]:
+    def own(self, name: str) -> list[Unit]:
         """Own units of a type."""
         return [unit for unit in self.snapshot.own if unit_name(unit.unit_type) == name]
 

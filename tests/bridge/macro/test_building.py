@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
-from s2clientprotocol import debug_pb2, raw_pb2
+from s2clientprotocol import debug_pb2
 
 from bridge.frames import WorldPoint
 from bridge.ground import footprint_of, land_of, sites
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bridge.macro import Order
+    from bridge.state import Unit
     from tests.bridge.macro.conftest import Game
 
 MAPS = ("Simple64", "Flat48", "Flat64", "Simple96")
@@ -108,7 +109,7 @@ def test_a_whole_base_can_be_built_and_nobody_is_walled_in(
         assert not any(taken[x + dx, y + dy] for dx in (2, 3) for dy in (-1, 0))
 
 
-def standing(game: Game, structure: str) -> list[raw_pb2.Unit]:
+def standing(game: Game, structure: str) -> list[Unit]:
     """Finished own structures of a type; a Gateway may be a WarpGate by now."""
     found = game.own(structure) + (game.own("WarpGate") if structure == "Gateway" else [])
     return [unit for unit in found if unit.build_progress >= 1]
@@ -302,9 +303,9 @@ def test_near_a_unit_is_as_near_as_there_is_room(rich: Callable[..., Game]) -> N
 def test_a_nexus_near_a_resource_stands_on_the_base_place(make_game: Callable[..., Game], resource: str) -> None:
     game = make_game()
     game.cheat(debug_pb2.all_resources)
-    remembered = [u for u in game.snapshot.response.observation.raw_data.units if unit_name(u.unit_type) == resource]
+    remembered = [u for u in game.snapshot.known.values() if u.name == resource]
     unit = max(remembered, key=lambda u: u.pos.x)  # of a base that was not seen yet
-    assert unit.display_type == raw_pb2.Snapshot
+    assert unit.is_remembered
     probe = (game.own("Probe")[0].tag,)
     base = min(land_of(game.snapshot).bases, key=lambda b: math.dist(b.place, (unit.pos.x, unit.pos.y))).place
     assert built(game.say("Build_Nexus_Near", units=probe, tag=unit.tag)) == base

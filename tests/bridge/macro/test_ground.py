@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from s2clientprotocol import common_pb2, debug_pb2
+from s2clientprotocol import debug_pb2
 
 from bridge.frames import WorldPoint
-from bridge.ground import Ground, footprint_of, grid, land_of, sites
+from bridge.ground import Ground, footprint_of, land_of, sites
 from bridge.ground.land import built_by
 from bridge.ground.resources import base_places
 from bridge.ground.terrain import SEED_REACH
@@ -21,7 +21,7 @@ from simulator.maps import find_map, load_map
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from simulator.records import UnitType
     from tests.bridge.macro.conftest import Game
 
@@ -35,27 +35,6 @@ GROUND_OF = {  # what the game's catalogue calls it, and what it is called in si
 
 
 # grids ----------------------------------------------------------------------------------------------------------------
-
-
-def test_a_bit_image_is_read_from_the_bottom_left_with_the_highest_bit_first() -> None:
-    image = common_pb2.ImageData(
-        bits_per_pixel=1, size=common_pb2.Size2DI(x=4, y=4), data=bytes([0b10000100, 0b00010001])
-    )
-    found = grid(image)
-    assert found is not None
-    assert [tuple(cell) for cell in np.argwhere(found).tolist()] == [(0, 0), (1, 1), (3, 2), (3, 3)]
-
-
-def test_a_byte_image_is_indexed_by_x_and_then_y() -> None:
-    image = common_pb2.ImageData(bits_per_pixel=8, size=common_pb2.Size2DI(x=3, y=2), data=bytes([0, 1, 2, 10, 11, 12]))
-    found = grid(image)
-    assert found is not None
-    assert found.shape == (3, 2)
-    assert found[2, 1] == 12
-
-
-def test_an_image_that_was_not_sent_is_none() -> None:
-    assert grid(common_pb2.ImageData()) is None
 
 
 @pytest.mark.parametrize("name", ["Simple64", "Flat64"])

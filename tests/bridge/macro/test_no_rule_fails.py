@@ -13,7 +13,7 @@ from bridge.catalog import catalogue
 from bridge.frames import WorldPoint
 from bridge.macro import RULES, Ask, Impossible, Ledger
 from bridge.macro.workers import automatic
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import AutoConfig
 from simulator.client import Client, interface
 
@@ -34,15 +34,15 @@ def scene(name: str) -> Snapshot:
         client.ask(create_game=alone)
     client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0)))
     response = client.step(40)
-    info = client.ask(game_info=sc.RequestGameInfo()).game_info
-    answer = client.ask(query=question(Snapshot(response=response, info=info))).query
-    return Snapshot(response=response, info=info, abilities=available(answer))
+    info = read_info(client.ask(game_info=sc.RequestGameInfo()).game_info)
+    answer = client.ask(query=question(read_snapshot(response, info))).query
+    return read_snapshot(response, info, abilities=available(answer))
 
 
 @pytest.mark.parametrize("name", MAPS)
 def test_no_rule_fails(name: str) -> None:
     snapshot, chance = scene(name), random.Random(name)
-    width, height = snapshot.info.start_raw.map_size.x, snapshot.info.start_raw.map_size.y
+    width, height = snapshot.info.size
     own, everybody = [unit.tag for unit in snapshot.own], [*snapshot.units, 0x123]
     answered, said = 0, set[str]()
     for action in ACTIONS:

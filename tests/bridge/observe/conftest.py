@@ -12,11 +12,12 @@ from bridge.observe import Feedback, Observer
 from bridge.task import TaskConfig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from s2clientprotocol import raw_pb2
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
     Make = Callable[..., raw_pb2.Unit]
     Snap = Callable[..., Snapshot]
@@ -177,22 +178,27 @@ def _resources(unit: Make) -> Iterable[raw_pb2.Unit]:
 def look(snapshot: Snap) -> Callable[..., Snapshot]:
     """A snapshot of units on plain ground, with power and abilities."""
 
-    def make(units: list[raw_pb2.Unit], *, loop: int = 4480, **fields: Any) -> Snapshot:
+    def make(
+        units: list[raw_pb2.Unit], *, loop: int = 4480, alerts: Sequence[sc_pb.Alert.ValueType] = (), **fields: Any
+    ) -> Snapshot:
         player = {"minerals": 150, "vespene": 75, "food_used": 21, "food_cap": 23, "food_workers": 14}
         given: dict[str, Any] = {"abilities": ABILITIES, "player": player, **fields}
-        made = snapshot(units, loop=loop, size=(SIDE, SIDE), **given)
-        ground = made.info.start_raw
-        for grid, bits, value in (
-            (ground.placement_grid, 1, b"\xff"),
-            (ground.pathing_grid, 1, b"\xff"),
-            (ground.terrain_height, 8, b"\x80"),
-        ):
-            grid.CopyFrom(_plain(bits, value))
-        for unit in units:
-            if unit.tag == PYLON:
-                source = made.response.observation.raw_data.player.power_sources.add(tag=PYLON, radius=6.5)
-                source.pos.CopyFrom(unit.pos)
-        return made
+
+        def change(response: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
+            ground = info.start_raw
+            for grid, bits, value in (
+                (ground.placement_grid, 1, b"\xff"),
+                (ground.pathing_grid, 1, b"\xff"),
+                (ground.terrain_height, 8, b"\x80"),
+            ):
+                grid.CopyFrom(_plain(bits, value))
+            for unit in units:
+                if unit.tag == PYLON:
+                    source = response.observation.raw_data.player.power_sources.add(tag=PYLON, radius=6.5)
+                    source.pos.CopyFrom(unit.pos)
+            response.observation.alerts.extend(alerts)
+
+        return snapshot(units, loop=loop, size=(SIDE, SIDE), change=change, **given)
 
     return make
 

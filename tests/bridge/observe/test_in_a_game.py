@@ -15,7 +15,7 @@ from bridge.knowledge import knowledge
 from bridge.names import unit_name
 from bridge.observe import Observer
 from bridge.observe.text import SECTIONS_OF, tokens
-from bridge.snapshot import Snapshot
+from bridge.state import Snapshot, read_info, read_snapshot
 from bridge.task import TaskConfig
 from simulator.client import Client, command, interface
 
@@ -62,9 +62,10 @@ def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservati
     info = client.ask(game_info=sc_pb.RequestGameInfo()).game_info
     observer, sights = Observer(task), []
     for _ in range(2):
-        blind = Snapshot(response=client.observe(), info=info)
+        response = client.observe()
+        blind = read_snapshot(response, read_info(info))
         answer = client.ask(query=question(blind)).query
-        snapshot = Snapshot(response=blind.response, info=info, abilities=available(answer))
+        snapshot = read_snapshot(response, blind.info, abilities=available(answer))
         sights.append(observer.observe(snapshot))
         _train_a_worker(client, snapshot)
         client.step(LOOPS)

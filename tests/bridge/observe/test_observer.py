@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from bridge.observe import AgentObservation
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
 
     Make = Callable[..., Any]
     Snap = Callable[..., Snapshot]

@@ -14,7 +14,7 @@ from protocol.messages import Alert, EnemyCount, Production, TypeCount
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.snapshot import Snapshot
+    from bridge.state import Snapshot
     from protocol.messages import View
 
 
@@ -136,9 +136,8 @@ def test_who_recovers_raises_no_alert(unit: Any, look: Any, views: Any) -> None:
 
 
 def test_the_games_own_warnings_are_passed_on(unit: Any, look: Any, base_task: Any) -> None:
-    snapshot = look([unit(1, "Zealot", 10, 10)])
     alerts = (sc_pb.NuclearLaunchDetected, sc_pb.TrainUnitComplete, sc_pb.NuclearLaunchDetected)
-    snapshot.response.observation.alerts.extend(alerts)
+    snapshot = look([unit(1, "Zealot", 10, 10)], alerts=alerts)
     text = Observer(base_task).observe(snapshot).agents["Commander"].text
     assert "\nAlerts\n    NuclearLaunchDetected\n\n" in text
 
