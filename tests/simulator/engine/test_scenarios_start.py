@@ -159,12 +159,13 @@ def test_every_map_plays_300_loops_without_orders(name: str) -> None:
     assert np.isfinite(world.life[world.live]).all()
 
 
-@pytest.mark.parametrize("name", map_names())
-def test_nobody_begins_inside_a_wall(name: str) -> None:
-    world = begun(name)
-    ground = [s for s in world.live.tolist() if not world.walled[s] and world.layer[s] == Layer.WALK]
-    cells = world.pos[ground].astype(np.int64)
-    assert world.map.terrain.walk[cells[:, 1], cells[:, 0]].all()
+def test_nobody_begins_inside_a_wall(subtests: pytest.Subtests) -> None:
+    for name in map_names():
+        with subtests.test(name):
+            world = begun(name)
+            ground = [s for s in world.live.tolist() if not world.walled[s] and world.layer[s] == Layer.WALK]
+            cells = world.pos[ground].astype(np.int64)
+            assert world.map.terrain.walk[cells[:, 1], cells[:, 0]].all()
 
 
 def test_energies_and_facings_are_those_of_the_map() -> None:
