@@ -572,7 +572,7 @@ def seconds(text: str) -> float:
     return time.process_time() - begin
 
 
-@pytest.mark.parametrize("prefix", ["", "<MessageTo(A, '"])
+@pytest.mark.parametrize("prefix", ["", pytest.param("<MessageTo(A, '", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("piece", HARD)
 def test_time_grows_with_the_length_and_no_faster(piece: str, prefix: str) -> None:
     short = min(seconds(prefix + piece * (5_000 // len(piece))) for _ in range(3))

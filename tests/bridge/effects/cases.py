@@ -6,6 +6,7 @@ import functools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import pytest
 from s2clientprotocol import raw_pb2
 
 from bridge.catalog import catalogue
@@ -20,7 +21,9 @@ from simulator.catalog import load_catalog
 from .preparations import BY_RULE, prepare_for
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from _pytest.mark import ParameterSet
 
     from bridge.action import Action
     from bridge.observe.sight import Sight, TeamSight
@@ -71,6 +74,26 @@ def cases() -> dict[str, Case]:
     return {case.action.name: case for case in found}
 
 
+def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> list[ParameterSet]:
+    """Cases in lists by who is told, for tests with subtests: the first of each kind now, all others in the long tests.
+
+    Args:
+        chosen: whether the action of this name may stand for others.
+        first: what is its kind.
+    """
+    now: dict[str, list[Case]] = {}
+    later: dict[str, list[Case]] = {}
+    shown: set[object] = set()
+    for name, case in cases().items():
+        stands = chosen(name) and first(name) not in shown
+        shown |= {first(name)} if stands else set()
+        (now if stands else later).setdefault(case.caster, []).append(case)
+    others = [
+        pytest.param(group, id=f"{caster}, the others", marks=pytest.mark.slow) for caster, group in later.items()
+    ]
+    return [*(pytest.param(group, id=caster) for caster, group in now.items()), *others]
+
+
 def case_of(action: Action) -> Case:
     """Who is told it: the first of its types that has the ability on the simulator."""
     race = action.race or "protoss"
@@ -81,13 +104,13 @@ def case_of(action: Action) -> Case:
     if usual and (usual in units or not action.units):
         units = (usual,)
     for unit in units:
-        if ability := _ability(action, unit):
+        if ability := ability_of(action, unit):
             prepare = BY_RULE.get(action.rule or "") or prepare_for(unit, ability)
             return Case(action, unit, prepare, race, place)
     return Case(action, units[0], BY_RULE.get(action.rule or ""), race, place)
 
 
-def _ability(action: Action, unit: str) -> Ability | None:
+def ability_of(action: Action, unit: str) -> Ability | None:
     """The ability of a type of unit that an action ends in, if the simulator has a rule for it."""
     catalog = load_catalog()
     known = knowledge()[unit].id
