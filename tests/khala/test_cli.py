@@ -142,6 +142,7 @@ class Refusing(BaseHTTPRequestHandler):
 
 
 @pytest.mark.game
+@pytest.mark.slow
 def test_a_key_that_the_endpoint_refuses_ends_the_match_before_it_begins(tmp_path: Path) -> None:
     with ThreadingHTTPServer(("127.0.0.1", 0), Refusing) as server:
         Thread(target=server.serve_forever, daemon=True).start()

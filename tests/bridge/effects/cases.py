@@ -104,13 +104,13 @@ def case_of(action: Action) -> Case:
     if usual and (usual in units or not action.units):
         units = (usual,)
     for unit in units:
-        if ability := ability_of(action, unit):
+        if ability := _ability(action, unit):
             prepare = BY_RULE.get(action.rule or "") or prepare_for(unit, ability)
             return Case(action, unit, prepare, race, place)
     return Case(action, units[0], BY_RULE.get(action.rule or ""), race, place)
 
 
-def ability_of(action: Action, unit: str) -> Ability | None:
+def _ability(action: Action, unit: str) -> Ability | None:
     """The ability of a type of unit that an action ends in, if the simulator has a rule for it."""
     catalog = load_catalog()
     known = knowledge()[unit].id

@@ -11,7 +11,7 @@ from bridge.catalog import catalogue
 from bridge.functions import functions
 from bridge.generated import without_words
 
-from .cases import ability_of, by_caster, cases
+from .cases import by_caster, cases
 from .performance import perform
 from .without_effect import BY_RAW, SINGLE, reason
 
@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """One of each kind of function, subject, rule and target, and of each rule of the game, stands for the others."""
-    case = cases()[name]
-    action, ability = case.action, ability_of(case.action, case.caster)
-    of_words = action.pysc2.kind if action.pysc2 else None, action.subject, action.rule, action.target_kind
-    return of_words, ability.does if ability else None
+    """One of each kind of function, of subject, of rule and of target stands for the others."""
+    action = cases()[name].action
+    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule, action.target_kind
 
 
 def stands_for_others(name: str) -> bool:

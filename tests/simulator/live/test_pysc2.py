@@ -75,6 +75,7 @@ def fingerprints(make_env: MakeEnv, seed: int) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_observations_in_another_process(make_env: MakeEnv) -> None:
     first, again, other = (fingerprints(make_env, seed) for seed in (5, 5, 6))
     assert first == again

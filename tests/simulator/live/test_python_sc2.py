@@ -41,6 +41,7 @@ def test_a_bot_settles_on_a_melee_map(tmp_path: Path) -> None:
     assert 15 < walked < 45  # 60 steps of 4 loops at 2.8 a second
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_a_bot_fights_a_battle_to_its_end(tmp_path: Path) -> None:
     seen = play("combat", tmp_path)
