@@ -7,8 +7,13 @@ PYTHONS ?= 3.11 3.12 3.13
 # uv from PATH when it is there, else one of our own in .uv
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
+# pytest on every core; PARALLEL= on one
+PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
+# per cent that `make cover` wants of some packages; 0 only prints
+COVERED ?= 0
+COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install check format types test pysc2 slow test-all demo bench scenarios docs golden picture clean
+.PHONY: help install check format types test pysc2 slow cover test-all demo bench scenarios docs golden picture clean
 
 help: ## What can be made
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -28,14 +33,25 @@ install: .venv/.ready ## Install everything into .venv
 demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
 	$(RUN)khala run 2s3z_pair
 
-test: install check ## Lint, types, contracts and every test that is not long
-	$(RUN)pytest
+test: install ## Lint, types and contracts beside every test that is not long
+	@said=$$(mktemp) && trap 'rm -f $$said' EXIT; \
+	$(MAKE) --no-print-directory check >$$said 2>&1 & checks=$$!; \
+	$(RUN)pytest $(PARALLEL); tests=$$?; \
+	wait $$checks; checks=$$?; cat $$said; \
+	[ $$tests = 0 ] || echo "make test: tests failed, see above the checks"; \
+	[ $$checks = 0 ] || echo "make test: a check failed, it is the last one above"; \
+	[ $$tests = 0 ] && [ $$checks = 0 ]
 
 pysc2: install ## Those of PySC2's own game tests that take long; `make test` runs the others
-	$(RUN)pytest -m slow tests/simulator/live/test_pysc2_own_tests.py
+	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
 
-slow: install ## All tests that take long: those of PySC2, random agents, long games, the other version's tables
-	$(RUN)pytest -m slow
+slow: install ## All long tests: whole tables, those of PySC2, random agents, long games, every scenario
+	$(RUN)pytest $(PARALLEL) -m slow
+
+cover: install ## Branch coverage per package by the tests of `make test`; COVERED=90 sets a threshold
+	rm -f .coverage .coverage.*
+	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
+	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
 check: install ## Lint, format, types and import contracts
 	$(RUN)ruff check .
@@ -54,7 +70,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
 	  echo "== Python $$version"; \
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
-	  $(UV) sync --quiet --frozen --python $$python && .venv-$$version/bin/pytest -q || exit 1; \
+	  $(UV) sync --quiet --frozen --python $$python && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
 bench: install ## Measure what the README claims
@@ -75,4 +91,4 @@ picture: install ## Play a battle and draw docs/images/2s3z.webp from its record
 	$(RUN)python -m docs.picture
 
 clean: ## Remove what make made
-	rm -rf .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist
+	rm -rf .coverage .coverage.* .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist

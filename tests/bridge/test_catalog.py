@@ -89,12 +89,13 @@ def test_every_rule_that_an_action_names_is_there() -> None:
     assert {action.rule for action in catalogue().values() if action.rule} <= set(macro.RULES)
 
 
-@pytest.mark.parametrize("action", curated().values(), ids=list(curated()))
-def test_what_is_written_of_an_action_can_be_shown_to_a_model(action: Action) -> None:
-    assert action.about[0].isupper()
-    assert action.about.endswith(".")
-    assert len(action.about) <= 200
-    assert "{" not in action.about
+def test_what_is_written_of_an_action_can_be_shown_to_a_model(subtests: pytest.Subtests) -> None:
+    for action in curated().values():
+        with subtests.test(action.name):
+            assert action.about[0].isupper()
+            assert action.about.endswith(".")
+            assert len(action.about) <= 200
+            assert "{" not in action.about
 
 
 def test_an_action_of_one_race_is_for_units_of_that_race() -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-
-import pytest
+from typing import TYPE_CHECKING
 
 from bridge import data
 from bridge.catalog import catalogue, catalogue_sha256
@@ -16,17 +15,20 @@ from bridge.maps import known_maps
 from bridge.names import unit_name
 from bridge.standard import standard_task
 
+if TYPE_CHECKING:
+    import pytest
+
 
 def test_the_table_of_functions_is_that_of_pysc2() -> None:
     check_against_pysc2()
 
 
-@pytest.mark.parametrize("name", list(catalogue()))
-def test_an_action_speaks_of_things_that_exist(name: str) -> None:
-    action = catalogue()[name]
-    assert action.name == name
-    assert set(action.units) <= set(knowledge())
-    assert action.about.endswith(".")
+def test_an_action_speaks_of_things_that_exist(subtests: pytest.Subtests) -> None:
+    for name, action in catalogue().items():
+        with subtests.test(name):
+            assert action.name == name
+            assert set(action.units) <= set(knowledge())
+            assert action.about.endswith(".")
 
 
 def test_the_hash_of_the_catalogue_is_a_sha256() -> None:
@@ -40,20 +42,20 @@ def test_the_maps_of_every_family_are_known() -> None:
     assert all(file.endswith(f"/{name}.SC2Map") for name, file in names)
 
 
-@pytest.mark.parametrize("name", list(known_maps()))
-def test_a_task_can_be_made_for_every_map(name: str) -> None:
-    spec = known_maps()[name]
-    task = standard_task(spec)
-    (agent,) = task.agents
-    assert (task.name, task.map, task.task) == (name, name, spec.goal)
-    assert [team.unit_types for team in agent.teams if team.kind != "side"] == [(unit,) for unit in spec.units]
-    builds = any(knowledge()[unit].worker for unit in spec.units)
-    assert [team.name for team in agent.teams if team.kind == "side"] == (["Base"] if builds else [])
-    assert all("Move_Screen" in listed for listed in agent.actions.values())
-    assert all(upgrade in upgrades.Upgrades.__members__ for upgrade in spec.upgrades)
-    blinks = "Ability_Blink_Screen" in agent.actions.get("Stalker", ())
-    researches = any(knowledge()[unit].worker for unit in spec.units)
-    assert blinks == ("Stalker" in spec.units and (researches or "Blink" in spec.upgrades))
+def test_a_task_can_be_made_for_every_map(subtests: pytest.Subtests) -> None:
+    for name, spec in known_maps().items():
+        with subtests.test(name):
+            task = standard_task(spec)
+            (agent,) = task.agents
+            assert (task.name, task.map, task.task) == (name, name, spec.goal)
+            assert [team.unit_types for team in agent.teams if team.kind != "side"] == [(unit,) for unit in spec.units]
+            builds = any(knowledge()[unit].worker for unit in spec.units)
+            assert [team.name for team in agent.teams if team.kind == "side"] == (["Base"] if builds else [])
+            assert all("Move_Screen" in listed for listed in agent.actions.values())
+            assert all(upgrade in upgrades.Upgrades.__members__ for upgrade in spec.upgrades)
+            blinks = "Ability_Blink_Screen" in agent.actions.get("Stalker", ())
+            researches = any(knowledge()[unit].worker for unit in spec.units)
+            assert blinks == ("Stalker" in spec.units and (researches or "Blink" in spec.upgrades))
 
 
 def test_copies_on_smacs_maps_have_the_names_of_what_they_copy() -> None:

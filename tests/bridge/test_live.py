@@ -92,7 +92,13 @@ def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
         game.close()
 
 
-@pytest.mark.parametrize("name", [n for n, spec in known_maps().items() if spec.file.startswith("llm_smac/")])
+BATTLES = [name for name, spec in known_maps().items() if spec.file.startswith("llm_smac/")]
+SEVERAL_TEAMS = "1c3s5z"  # of three types, one of them three times
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n != SEVERAL_TEAMS else []) for n in BATTLES]
+)
 def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
     name: str, start: Play, paper_teams: dict[str, dict[str, int]]
 ) -> None:
@@ -106,9 +112,9 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
 @pytest.mark.parametrize(
     ("name", "units"),
     [
-        ("MoveToBeacon", {"Marine": 1}),
+        pytest.param("MoveToBeacon", {"Marine": 1}, marks=pytest.mark.slow),
         ("smac_MMM", {"Marine": 7, "Marauder": 2, "Medivac": 1}),
-        ("pvz_task4_level1", {"Stalker": 12}),
+        pytest.param("pvz_task4_level1", {"Stalker": 12}, marks=pytest.mark.slow),
         ("Simple64", {"Probe": 12, "Base": 0}),
     ],
 )

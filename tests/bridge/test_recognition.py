@@ -4,28 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pytest
-
 from bench.recognition import Score, corpus, read, scores
 
 if TYPE_CHECKING:
-    from bench.recognition import Entry
+    import pytest
 
-ENTRIES = [
-    pytest.param(entry, id=f"{name}: {entry.title}".replace("[", "(").replace("]", ")"))
-    for name, entries in corpus().items()
-    for entry in entries
-]
 WANTED_SHARE = 0.995
 
 
-@pytest.mark.parametrize("entry", ENTRIES)
-def test_a_reply_is_read_as_a_person_would_read_it(entry: Entry) -> None:
-    found = read(entry)
-    assert found.calls == list(entry.calls)
-    assert found.messages == list(entry.messages)
-    assert found.listens == list(entry.listens)
-    assert found.rejections == list(entry.rejections)
+def test_a_reply_is_read_as_a_person_would_read_it(subtests: pytest.Subtests) -> None:
+    for name, entries in corpus().items():
+        for entry in entries:
+            with subtests.test(name, title=entry.title):
+                found = read(entry)
+                assert found.calls == list(entry.calls)
+                assert found.messages == list(entry.messages)
+                assert found.listens == list(entry.listens)
+                assert found.rejections == list(entry.rejections)
 
 
 def test_the_corpus_holds_hundreds_of_replies_and_each_of_them_once() -> None:

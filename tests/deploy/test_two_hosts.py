@@ -163,6 +163,7 @@ async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, M
     assert (first.directory / "runs" / RUN / "recording.mcap").stat().st_size > 0
 
 
+@pytest.mark.slow
 async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tuple[Machine, Machine]) -> None:
     first, second = machines
     agents = await _router_and_agents(first, second, latency_s=0.2)  # so that the match is young when it happens

@@ -55,7 +55,7 @@ BAD = [
     ("run 2s3z --game nowhere", "there is no StarCraft II in nowhere"),
     ("run 2s3z --game starcraft2", "there is no StarCraft II in nowhere (SC2PATH)"),
     ("run 2s3z --out file/below", "cannot be made: Not a directory; --out names another place"),
-    ("host 2s3z --connect tcp/127.0.0.1:{closed}", "nothing listens there"),
+    pytest.param("host 2s3z --connect tcp/127.0.0.1:{closed}", "nothing listens there", marks=pytest.mark.slow),
     ("host 2s3z --listen tcp/127.0.0.1:{taken}", "another process uses it"),
     ("host 2s3z --listen tcp/0.0.0.0:7499", "would let every machine that reaches it join without TLS"),
     ("host 2s3z --connect x --listen y", "give --connect or --listen, not both"),
@@ -90,7 +90,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.mark.parametrize(("command", "words"), BAD, ids=[command for command, _ in BAD])
+@pytest.mark.parametrize(("command", "words"), BAD)
 def test_what_the_user_can_mend_is_one_sentence_and_no_traceback(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str, words: str
 ) -> None:
@@ -142,6 +142,7 @@ class Refusing(BaseHTTPRequestHandler):
 
 
 @pytest.mark.game
+@pytest.mark.slow
 def test_a_key_that_the_endpoint_refuses_ends_the_match_before_it_begins(tmp_path: Path) -> None:
     with ThreadingHTTPServer(("127.0.0.1", 0), Refusing) as server:
         Thread(target=server.serve_forever, daemon=True).start()
@@ -238,6 +239,7 @@ def test_a_key_in_the_environment_is_in_nothing_that_a_run_leaves_behind(tmp_pat
     assert KEY.encode() not in recording.read_bytes()
 
 
+@pytest.mark.slow
 def test_an_error_of_a_real_process_is_one_sentence_as_well(tmp_path: Path) -> None:
     done = khala("run", "nosuch", cwd=tmp_path)
     assert done.returncode == 1

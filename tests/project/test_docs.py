@@ -152,8 +152,8 @@ def double(fixture: str) -> Callable[..., Any]:
 # --- commands -----------------------------------------------------------------------------------------
 
 
-def commands() -> list[ParameterSet]:
-    """Every line that a reader may type; of a session on the console, what stands behind the prompt."""
+def commands() -> list[tuple[str, str]]:
+    """Every line that a reader may type, and where it is; of a session on the console, what is behind the prompt."""
     found = []
     for block in BLOCKS:
         prompt = {"bash": "", "console": "$ "}.get(block.info)
@@ -162,7 +162,7 @@ def commands() -> list[ParameterSet]:
         for number, line in enumerate(block.text.splitlines(), start=block.line + 1):
             if line.startswith(prompt) and line.strip() and not line.startswith("#"):
                 place = f"{block.page.relative_to(ROOT).as_posix()}:{number}"
-                found.append(pytest.param(line.removeprefix(prompt), id=place))
+                found.append((place, line.removeprefix(prompt)))
     return found
 
 
@@ -181,26 +181,30 @@ def parse(words: list[str]) -> None:
     command.make_context("khala", words)
 
 
-@pytest.mark.parametrize("line", commands())
-def test_a_command_can_be_given(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_can_be_given(subtests: pytest.Subtests, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in os.environ if name.startswith("KHALA_")]:
         monkeypatch.delenv(name)
-    for part in re.sub(r"\$\([^)]*\)", "", line).split(" && "):
-        program, *words = itertools.dropwhile(lambda word: "=" in word, shlex.split(part, comments=True))
-        if program == "khala":
-            parse(words)
-        elif program == "make":
-            assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"make {words[0]}"
-        else:
-            assert program in OTHER_PROGRAMS
+    for place, line in commands():
+        with subtests.test(place):
+            for part in re.sub(r"\$\([^)]*\)", "", line).split(" && "):
+                program, *words = itertools.dropwhile(lambda word: "=" in word, shlex.split(part, comments=True))
+                if program == "khala":
+                    parse(words)
+                elif program == "make":
+                    assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), (
+                        f"make {words[0]}"
+                    )
+                else:
+                    assert program in OTHER_PROGRAMS
 
 
-@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_commands_in_sentences_exist_with_their_options(page: Path) -> None:
-    for said in re.findall(r"`khala ([^`]+)`", prose(page)):
-        command, words = find(said.split())
-        options = {option for parameter in command.params for option in parameter.opts} | {"--help"}
-        assert {word for word in words if word.startswith("-")} <= options, said
+def test_commands_in_sentences_exist_with_their_options(subtests: pytest.Subtests) -> None:
+    for page in DOCUMENTS:
+        with subtests.test(page.relative_to(ROOT).as_posix()):
+            for said in re.findall(r"`khala ([^`]+)`", prose(page)):
+                command, words = find(said.split())
+                options = {option for parameter in command.params for option in parameter.opts} | {"--help"}
+                assert {word for word in words if word.startswith("-")} <= options, said
 
 
 @pytest.mark.parametrize(("words", "fault"), [("run", "task"), ("run 2s3z --sead 1", "--sead"), ("rum 2s3z", "rum")])
@@ -273,18 +277,19 @@ def anchors(page: Path) -> set[str]:
     return {anchor(title) for title in re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)}
 
 
-@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_links_lead_somewhere(page: Path) -> None:
-    targets = {found["target"] for found in LINK.finditer(prose(page))}
-    broken = []
-    for target in targets:
-        path, _, title = target.partition("#")
-        file = (page.parent / path).resolve() if path else page
-        if "://" in target:
-            continue
-        if not file.exists() or not file.is_relative_to(ROOT) or (title and f"#{title}" not in anchors(file)):
-            broken.append(target)
-    assert not broken
+def test_links_lead_somewhere(subtests: pytest.Subtests) -> None:
+    for page in DOCUMENTS:
+        with subtests.test(page.relative_to(ROOT).as_posix()):
+            targets = {found["target"] for found in LINK.finditer(prose(page))}
+            broken = []
+            for target in targets:
+                path, _, title = target.partition("#")
+                file = (page.parent / path).resolve() if path else page
+                if "://" in target:
+                    continue
+                if not file.exists() or not file.is_relative_to(ROOT) or (title and f"#{title}" not in anchors(file)):
+                    broken.append(target)
+            assert not broken
 
 
 def test_every_page_can_be_found_from_the_map_of_the_documentation() -> None:

@@ -123,11 +123,12 @@ ARGUMENTS = [
 ]
 
 
-@pytest.mark.parametrize(("rule", "inside", "arguments"), ARGUMENTS)
-def test_the_form_of_an_argument_says_what_it_is(rule: str, inside: str, arguments: list[object]) -> None:
-    speech = parse(f"<Act({inside})>")
-    assert [list(call.args) for call in speech.calls] == [arguments]
-    assert not speech.faults
+def test_the_form_of_an_argument_says_what_it_is(subtests: pytest.Subtests) -> None:
+    for rule, inside, arguments in ARGUMENTS:
+        with subtests.test(rule, inside=inside):
+            speech = parse(f"<Act({inside})>")
+            assert [list(call.args) for call in speech.calls] == [arguments]
+            assert not speech.faults
 
 
 HEADINGS = [
@@ -374,9 +375,10 @@ RULES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("rule", "text", "lines"), HEADINGS + RULES)
-def test_a_reply_is_read_as_it_was_meant(rule: str, text: str, lines: list[str]) -> None:
-    assert outline(parse(text)) == lines
+def test_a_reply_is_read_as_it_was_meant(subtests: pytest.Subtests) -> None:
+    for rule, text, lines in HEADINGS + RULES:
+        with subtests.test(rule, text=text):
+            assert outline(parse(text)) == lines
 
 
 def test_every_rule_of_the_documentation_has_a_row_and_every_row_a_rule() -> None:
@@ -570,7 +572,7 @@ def seconds(text: str) -> float:
     return time.process_time() - begin
 
 
-@pytest.mark.parametrize("prefix", ["", "<MessageTo(A, '"])
+@pytest.mark.parametrize("prefix", ["", pytest.param("<MessageTo(A, '", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("piece", HARD)
 def test_time_grows_with_the_length_and_no_faster(piece: str, prefix: str) -> None:
     short = min(seconds(prefix + piece * (5_000 // len(piece))) for _ in range(3))

@@ -44,12 +44,13 @@ def test_the_launcher_starts_without_an_environment(tmp_path: Path) -> None:
     assert done.stderr.startswith("StarCraft II simulator: cannot listen on 127.0.0.1:99999999")
 
 
-@pytest.mark.parametrize("name", map_names())
-def test_every_shipped_map_is_a_file_that_is_read_back(tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
-    root = tmp_path_factory.getbasetemp() / "shared_install"
-    path = install(root) / "Maps" / f"{name}.SC2Map"
-    game_map = read_map(path.read_bytes(), str(path))
-    assert f"{game_map.family}/{game_map.name}" == name
+def test_every_shipped_map_is_a_file_that_is_read_back(tmp_path: Path, subtests: pytest.Subtests) -> None:
+    root = install(tmp_path)
+    for name in map_names():
+        with subtests.test(name):
+            path = root / "Maps" / f"{name}.SC2Map"
+            game_map = read_map(path.read_bytes(), str(path))
+            assert f"{game_map.family}/{game_map.name}" == name
 
 
 def test_installing_twice_repairs_and_keeps_what_a_user_added(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ import functools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import pytest
+
 from bridge.catalog import catalogue
 from bridge.frames import WorldPoint
 from bridge.knowledge import knowledge
@@ -19,7 +21,9 @@ from simulator.catalog import load_catalog
 from .preparations import BY_RULE, prepare_for
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from _pytest.mark import ParameterSet
 
     from bridge.action import Action
     from bridge.observe.observation import SideObservation, TeamObservation
@@ -68,6 +72,26 @@ def cases() -> dict[str, Case]:
     found = [case_of(action) for action in catalogue().values()]
     found.sort(key=lambda case: (case.caster, case.race, case.place or (), getattr(case.prepare, "__qualname__", "")))
     return {case.action.name: case for case in found}
+
+
+def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> list[ParameterSet]:
+    """Cases in lists by who is told, for tests with subtests: the first of each kind now, all others in the long tests.
+
+    Args:
+        chosen: whether the action of this name may stand for others.
+        first: what is its kind.
+    """
+    now: dict[str, list[Case]] = {}
+    later: dict[str, list[Case]] = {}
+    shown: set[object] = set()
+    for name, case in cases().items():
+        stands = chosen(name) and first(name) not in shown
+        shown |= {first(name)} if stands else set()
+        (now if stands else later).setdefault(case.caster, []).append(case)
+    others = [
+        pytest.param(group, id=f"{caster}, the others", marks=pytest.mark.slow) for caster, group in later.items()
+    ]
+    return [*(pytest.param(group, id=caster) for caster, group in now.items()), *others]
 
 
 def case_of(action: Action) -> Case:

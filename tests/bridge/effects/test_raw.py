@@ -11,27 +11,38 @@ from bridge.catalog import catalogue
 from bridge.functions import functions
 from bridge.generated import without_words
 
-from .cases import Case, cases
+from .cases import by_caster, cases
 from .performance import perform
 from .without_effect import BY_RAW, SINGLE, reason
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
+    from .cases import Case
     from .stage import Stage
 
     Stages = Callable[..., Stage]
 
 
-def every_case() -> Iterator[object]:
-    """Those that are made by rule for one unit of a team are left to the long tests."""
-    for name, case in cases().items():
-        by_rule = name.startswith(SINGLE) and case.action.group == "generated"
-        yield pytest.param(case, id=name, marks=[pytest.mark.slow] if by_rule else [])
+def kind(name: str) -> object:
+    """One of each kind of function, of subject, of rule and of target stands for the others."""
+    action = cases()[name].action
+    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule, action.target_kind
 
 
-@pytest.mark.parametrize("case", list(every_case()))
-def test_a_text_action_does_what_it_says(case: Case, stage_of: Stages) -> None:
+def stands_for_others(name: str) -> bool:
+    """Those that are made by rule for one unit of a team do not."""
+    return not (name.startswith(SINGLE) and cases()[name].action.group == "generated")
+
+
+@pytest.mark.parametrize("group", by_caster(stands_for_others, kind))
+def test_a_text_action_does_what_it_says(group: list[Case], stage_of: Stages, subtests: pytest.Subtests) -> None:
+    for case in group:
+        with subtests.test(case.action.name):
+            does_what_it_says(case, stage_of)
+
+
+def does_what_it_says(case: Case, stage_of: Stages) -> None:
     action = case.action
     performance = perform(case, stage_of(case), RawExecutor())
     if action.function is None:

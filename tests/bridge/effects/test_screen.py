@@ -10,7 +10,7 @@ from bridge.act.raw import RawExecutor
 from bridge.act.screen import ScreenExecutor
 from bridge.catalog import catalogue
 
-from .cases import Case, cases
+from .cases import by_caster, cases
 from .effect import kinds
 from .performance import perform
 from .without_effect import BY_RAW, BY_SCREEN, reason
@@ -18,26 +18,26 @@ from .without_effect import BY_RAW, BY_SCREEN, reason
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .cases import Case
     from .stage import Stage
 
     Stages = Callable[..., Stage]
 
 
-def every_case() -> list[object]:
-    """One of each kind of function and of subject, with a rule and without, at once; all others in the long tests."""
-    shown: set[object] = set()
-    made: list[object] = []
-    for name, case in cases().items():
-        action = case.action
-        kind = (action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind)
-        others = kind in shown or bool(reason(name, BY_SCREEN))
-        made.append(pytest.param(case, id=name, marks=[pytest.mark.slow] if others else []))
-        shown |= set() if others else {kind}
-    return made
+def kind(name: str) -> object:
+    """One of each kind of function and of subject, with a rule and without, stands for the others."""
+    action = cases()[name].action
+    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind
 
 
-@pytest.mark.parametrize("case", every_case())
-def test_both_executors_do_the_same(case: Case, stage_of: Stages) -> None:
+@pytest.mark.parametrize("group", by_caster(lambda name: not reason(name, BY_SCREEN), kind))
+def test_both_executors_do_the_same(group: list[Case], stage_of: Stages, subtests: pytest.Subtests) -> None:
+    for case in group:
+        with subtests.test(case.action.name):
+            do_the_same(case, stage_of)
+
+
+def do_the_same(case: Case, stage_of: Stages) -> None:
     raw = perform(case, stage_of(case), RawExecutor())
     screen = perform(case, stage_of(case, layers=True), ScreenExecutor(), said=raw.text)
     if why := reason(case.action.name, BY_SCREEN):

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bridge.state import Snapshot
-    from simulator.records import UnitType
     from tests.bridge.macro.conftest import Game
 
 MELEE = ("Simple64", "Simple96", "Simple128", "Flat32", "Flat48", "Flat64", "Flat96", "Flat128")
@@ -71,34 +70,33 @@ def test_a_way_round_a_cliff_is_longer_than_the_line(make_game: Callable[..., Ga
 # footprints -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "unit", [u for u in CATALOG.units if CATALOG.footprints.get(u.footprint)], ids=lambda u: u.name
-)
-def test_every_footprint_is_the_games(unit: UnitType) -> None:
-    mask = CATALOG.footprints[unit.footprint]
-    name = next((n for n, known in knowledge().items() if known.id == unit.id), f"Unit{unit.id}")
-    footprint = footprint_of(name)
-    if not mask.cells:
-        assert footprint is None
-        return
-    assert footprint is not None
-    assert sorted(footprint.cells) == sorted(mask.cells)
-    if unit.resource:
-        assert sorted(footprint.near) == sorted({*mask.cells, *mask.around})
+def test_every_footprint_is_the_games(subtests: pytest.Subtests) -> None:
+    for unit in (unit for unit in CATALOG.units if CATALOG.footprints.get(unit.footprint)):
+        with subtests.test(unit.name):
+            mask = CATALOG.footprints[unit.footprint]
+            name = next((n for n, known in knowledge().items() if known.id == unit.id), f"Unit{unit.id}")
+            footprint = footprint_of(name)
+            if not mask.cells:
+                assert footprint is None
+                continue
+            assert footprint is not None
+            assert sorted(footprint.cells) == sorted(mask.cells)
+            if unit.resource:
+                assert sorted(footprint.near) == sorted({*mask.cells, *mask.around})
 
 
-@pytest.mark.parametrize("structure", sites())
-def test_every_structure_asks_what_the_game_asks(structure: str) -> None:
-    site = sites()[structure]
-    unit = next(u for u in CATALOG.units if u.id == knowledge()[structure].id)
-    if "Capped" in unit.placement:
-        assert site.ground == "geyser"
-        return
-    rule = CATALOG.footprints[unit.placement or unit.footprint]
-    assert site.clear == ("NearResources" in rule.forbids)
-    assert site.seen == ("Fogged" in rule.forbids)
-    anywhere = "Creep" not in rule.forbids | rule.requires
-    assert site.ground == ("any" if anywhere else GROUND_OF[unit.needs_power, "Creep" in rule.requires])
+def test_every_structure_asks_what_the_game_asks(subtests: pytest.Subtests) -> None:
+    for structure, site in sites().items():
+        with subtests.test(structure):
+            unit = next(u for u in CATALOG.units if u.id == knowledge()[structure].id)
+            if "Capped" in unit.placement:
+                assert site.ground == "geyser"
+                continue
+            rule = CATALOG.footprints[unit.placement or unit.footprint]
+            assert site.clear == ("NearResources" in rule.forbids)
+            assert site.seen == ("Fogged" in rule.forbids)
+            anywhere = "Creep" not in rule.forbids | rule.requires
+            assert site.ground == ("any" if anywhere else GROUND_OF[unit.needs_power, "Creep" in rule.requires])
 
 
 def test_everything_that_workers_build_has_a_site() -> None:

@@ -304,7 +304,7 @@ def test_cloaked_enemies_show_as_shades_to_those_who_asked_only(make_table: Any)
 
 
 @pytest.mark.parametrize("version", sorted(set(VERSION_OF_BUILD.values())))
-@pytest.mark.parametrize("pixels_per_cell", [1.5, 10.0, 30.0])
+@pytest.mark.parametrize("pixels_per_cell", [1.5, 10.0, pytest.param(30.0, marks=pytest.mark.slow)])
 def test_every_type_can_be_painted(version: str, pixels_per_cell: float) -> None:
     units = load_catalog(version).units
     wardrobe = sprites.Wardrobe(units, pixels_per_cell)

@@ -84,7 +84,7 @@ def margin(world: World) -> float:
 
 
 @pytest.mark.parametrize("name", [n for n in map_names() if n.startswith("llm_smac/")])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_battle_that_both_sides_want_ends_before_the_time_limit(name: str, seed: int) -> None:
     world = play(name, attack, seed)
     assert world.loop < 1440

@@ -48,7 +48,13 @@ def loops_until(field: Any, done: Callable[[], Any], limit: int) -> int:
 
 @pytest.mark.parametrize(
     ("name", "count", "gap"),
-    [("Zergling", 100, 2), ("Marine", 100, 2), ("Stalker", 100, 2), ("Immortal", 40, 2), ("Zergling", 100, 4)],
+    [
+        ("Zergling", 100, 2),
+        pytest.param("Marine", 100, 2, marks=pytest.mark.slow),
+        pytest.param("Stalker", 100, 2, marks=pytest.mark.slow),
+        ("Immortal", 40, 2),
+        pytest.param("Zergling", 100, 4, marks=pytest.mark.slow),
+    ],
 )
 def test_a_crowd_passes_a_choke_nearly_as_fast_as_it_fits(
     make_field: Callable[..., Any], name: str, count: int, gap: int

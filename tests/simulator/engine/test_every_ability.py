@@ -339,13 +339,19 @@ def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch,
 
 
 def cases() -> Iterator[Any]:
-    """Every ability of every version; one that is the same as in the default version is left to the long tests."""
+    """Every ability of every version; the first of each skill now, all others in the long tests.
+
+    One that is the same as in the default version counts for nothing new.
+    """
     usual = {a.id: a for a in modelled(DEFAULT_VERSION)}
+    shown: set[tuple[str, str]] = set()
     for version in VERSION_OF_BUILD.values():
         for a in modelled(version):
             known = usual.get(a.id)
             same = version != DEFAULT_VERSION and known == a and known.numbers == a.numbers
-            marks = [pytest.mark.slow] if same else []
+            others = same or (version, a.effect) in shown
+            shown |= set() if others else {(version, a.effect)}
+            marks = [pytest.mark.slow] if others else []
             yield pytest.param(version, a, id=f"{version}-{a.id}-{a.effect}", marks=marks)
 
 

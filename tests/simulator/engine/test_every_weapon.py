@@ -37,15 +37,47 @@ class Case:
 
 
 def cases() -> list[Any]:
-    """One carrier of every weapon that deals damage, per version."""
+    """One carrier of every weapon that deals damage, per version; those of a kind that had one, in the long tests."""
     found: dict[tuple[str, str], Any] = {}
+    shown: set[object] = set()
     for version in VERSIONS:
         for unit in load_catalog(version).units:
             for weapon in unit.weapons:
                 if weapon.hits and weapon.id not in NO_OWN_ATTACK and not (unit.passive or unit.uncommandable):
+                    if (version, weapon.id) in found:
+                        continue
+                    marks = [pytest.mark.slow] if kind(weapon) in shown else []
+                    shown.add(kind(weapon))
                     case = Case(version, unit.name, weapon.id)
-                    found.setdefault((version, weapon.id), pytest.param(case, id=f"{version}-{weapon.id}"))
+                    found[version, weapon.id] = pytest.param(case, id=f"{version}-{weapon.id}", marks=marks)
     return list(found.values())
+
+
+def kind(weapon: Weapon) -> object:
+    """What rules a weapon's attack goes by, without its numbers."""
+    hits = {
+        (
+            h.when,
+            h.ignores_armor,
+            bool(h.bonus),
+            h.bounce,
+            h.search is None,
+            h.sweep is None,
+            bool(h.area),
+            h.kills_self,
+        )
+        for h in weapon.hits
+    }
+    planes = tuple(weapon.reaches(plane) for plane in ("ground", "air"))
+    return (
+        planes,
+        weapon.is_beam,
+        weapon.is_kamikaze,
+        weapon.disabled,
+        weapon.range > 0.1,
+        len(weapon.hits),
+        frozenset(hits),
+    )
 
 
 def test_no_weapon_that_deals_damage_is_left_out() -> None:

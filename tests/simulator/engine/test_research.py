@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pytest
-
 from simulator import casting
 from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
 
 if TYPE_CHECKING:
-    from simulator.abilities import Ability
+    import pytest
+
     from tests.simulator.engine.conftest import Field
 
 CATALOG = load_catalog()
@@ -20,11 +19,12 @@ RESEARCHES = [a for a in CATALOG.abilities if a.effect == "research" and a.users
 WARP_GATE = 1568
 
 
-@pytest.mark.parametrize("ability", RESEARCHES, ids=lambda a: a.upgrade)
-def test_every_upgrade_has_a_price_and_a_time(ability: Ability) -> None:
-    upgrade = CATALOG.upgrade(ability.upgrade)
-    assert (ability.minerals, ability.vespene) == upgrade.cost or upgrade.name in LATER
-    assert ability.loops > 0
+def test_every_upgrade_has_a_price_and_a_time(subtests: pytest.Subtests) -> None:
+    for ability in RESEARCHES:
+        with subtests.test(ability.upgrade):
+            upgrade = CATALOG.upgrade(ability.upgrade)
+            assert (ability.minerals, ability.vespene) == upgrade.cost or upgrade.name in LATER
+            assert ability.loops > 0
 
 
 def test_research_costs_lasts_and_is_done_once(field: Field) -> None:

@@ -134,27 +134,28 @@ def test_all_nine_llm_smac_maps_are_shipped() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", map_names())
-def test_a_shipped_map_hangs_together(name: str) -> None:
-    game_map = load_map(name)
-    terrain = game_map.terrain
-    width, height = terrain.size
-    assert f"{game_map.family}/{game_map.name}" == name
-    assert game_map.path == f"{name}.SC2Map"
-    assert width * height % 8 == 0  # clients unpack one bit per cell
-    for grid in (terrain.walk, terrain.glide, terrain.build, terrain.creep, terrain.cliff, terrain.height):
-        assert grid.shape == (height, width)
-        assert not grid.flags.writeable or grid is terrain.creep
-    assert terrain.vertices.shape == (height + 1, width + 1)
-    assert (terrain.walk <= terrain.glide).all()
-    assert (terrain.build <= terrain.walk).all()
-    x0, y0, x1, y1 = terrain.playable
-    outside = terrain.walk.copy()
-    outside[y0:y1, x0:x1] = False
-    assert not outside.any()
-    # -16 + 32 v / 255 is the height of the cell's lower-left corner
-    z = terrain.height / 255 * 32 - 16
-    assert abs(z - terrain.vertices[:-1, :-1])[terrain.walk].max() < 0.2
+def test_a_shipped_map_hangs_together(subtests: pytest.Subtests) -> None:
+    for name in map_names():
+        with subtests.test(name):
+            game_map = load_map(name)
+            terrain = game_map.terrain
+            width, height = terrain.size
+            assert f"{game_map.family}/{game_map.name}" == name
+            assert game_map.path == f"{name}.SC2Map"
+            assert width * height % 8 == 0  # clients unpack one bit per cell
+            for grid in (terrain.walk, terrain.glide, terrain.build, terrain.creep, terrain.cliff, terrain.height):
+                assert grid.shape == (height, width)
+                assert not grid.flags.writeable or grid is terrain.creep
+            assert terrain.vertices.shape == (height + 1, width + 1)
+            assert (terrain.walk <= terrain.glide).all()
+            assert (terrain.build <= terrain.walk).all()
+            x0, y0, x1, y1 = terrain.playable
+            outside = terrain.walk.copy()
+            outside[y0:y1, x0:x1] = False
+            assert not outside.any()
+            # -16 + 32 v / 255 is the height of the cell's lower-left corner
+            z = terrain.height / 255 * 32 - 16
+            assert abs(z - terrain.vertices[:-1, :-1])[terrain.walk].max() < 0.2
 
 
 @pytest.mark.parametrize(

@@ -25,15 +25,20 @@ CENTRE = (32.5, 32.5)
 
 
 def rules(does: str, *, named: str = "") -> list[Any]:
-    """(version, ability) of every ability with this skill that a type of the version has on its card."""
-    found = []
+    """(version, ability) of every ability with this skill that a type of the version has on its card.
+
+    One that is the same as in the first version is left to the long tests.
+    """
+    found, usual = [], load_catalog(VERSIONS[0]).abilities
     for version in VERSIONS:
         catalog = load_catalog(version)
         for ability in catalog.abilities:
             users = [u for u in ability.users if ability in catalog.abilities_of(catalog.unit(u).row)]
             fits = ability.effect == does and ability.name.startswith(named) and users
             if fits and catalog.unit(users[0]).race == "zerg":
-                found.append(pytest.param(version, ability, id=f"{version}-{ability.name}"))
+                same = version != VERSIONS[0] and any(a == ability and a.numbers == ability.numbers for a in usual)
+                marks = [pytest.mark.slow] if same else []
+                found.append(pytest.param(version, ability, id=f"{version}-{ability.name}", marks=marks))
     return found
 
 

@@ -40,7 +40,10 @@ def starts_of(field: Any, attacker: int, loops: int) -> list[int]:
     return starts
 
 
-@pytest.mark.parametrize(("attacker", "target", "distance", "period"), PERIODS)
+@pytest.mark.parametrize(
+    ("attacker", "target", "distance", "period"),
+    [*PERIODS[:2], *(pytest.param(*row, marks=pytest.mark.slow) for row in PERIODS[2:])],  # a melee unit and a missile
+)
 def test_attacks_follow_each_other_after_a_period_with_its_random_delay(
     field: Any, attacker: str, target: str, distance: float, period: float
 ) -> None:

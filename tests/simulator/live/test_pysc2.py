@@ -75,6 +75,7 @@ def fingerprints(make_env: MakeEnv, seed: int) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_observations_in_another_process(make_env: MakeEnv) -> None:
     first, again, other = (fingerprints(make_env, seed) for seed in (5, 5, 6))
     assert first == again
@@ -83,7 +84,11 @@ def test_the_same_seed_gives_the_same_observations_in_another_process(make_env: 
 
 @pytest.mark.parametrize(
     ("map_name", "screen", "minimap", "steps"),
-    [("Map2s3z", 84, 64, 300), ("Map2s3z", (84, 87), (64, 67), 60), ("Map2cVs64zg", 32, 32, 60)],
+    [
+        ("Map2s3z", (84, 87), (64, 67), 60),
+        pytest.param("Map2s3z", 84, 64, 300, marks=pytest.mark.slow),
+        pytest.param("Map2cVs64zg", 32, 32, 60, marks=pytest.mark.slow),
+    ],
 )
 def test_a_random_agent_never_breaks_the_game(
     make_env: MakeEnv, map_name: str, screen: Any, minimap: Any, steps: int

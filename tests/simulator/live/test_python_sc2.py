@@ -41,6 +41,7 @@ def test_a_bot_settles_on_a_melee_map(tmp_path: Path) -> None:
     assert 15 < walked < 45  # 60 steps of 4 loops at 2.8 a second
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_a_bot_fights_a_battle_to_its_end(tmp_path: Path) -> None:
     seen = play("combat", tmp_path)
@@ -50,6 +51,7 @@ def test_a_bot_fights_a_battle_to_its_end(tmp_path: Path) -> None:
     assert seen["destroyed"] >= 5
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_the_replay_of_a_bot_is_watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -70,6 +72,7 @@ def test_two_bots_fight_over_lan(tmp_path: Path) -> None:
     assert set(seen["types"]) <= {"STALKER", "ZEALOT"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("game", ["a quitter", "real time"])
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_a_bot_wins_over_lan_when_the_other_one_gives_up(game: str, tmp_path: Path) -> None:
