@@ -2,7 +2,7 @@
 
     task      what is played and by whom          catalog, knowledge, maps    tables, from data
     game      the game, behind an interface       pysc2_game, compat          … on PySC2, the only part that blocks
-    snapshot  what one player knows at a moment   frames, names               geometry; numbers and their names
+    state     what one player knows at a moment   frames, names               geometry; numbers and their names
     observe   snapshot → views and text           act                         words → commands → the game
 
 A turn goes through it like this (`orchestrator.match` has the loop):

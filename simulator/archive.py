@@ -3,7 +3,7 @@
 Terrain, playable area, start locations and what stands on the map are read from it. Its script is a program that nobody
 here can run: a map that is known by its name has the script of its scenario, any other one is a plain melee game.
 
-Above: ``mapfile``, ``install``. Below: ``terrainfile``, ``maps``.
+Above: ``map_file``, ``install``. Below: ``terrain_file``, ``maps``.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from xml.etree import ElementTree as ET
 import mpyq
 import numpy as np
 
-from simulator import terrainfile
+from simulator import terrain_file
 from simulator.catalog import load_catalog
 from simulator.maps import GameMap, MapError, find_map, game_map, load_map
 from simulator.scenario import Scenario
-from simulator.terrainfile import Ground, TerrainError
+from simulator.terrain_file import Ground, TerrainError
 
 if TYPE_CHECKING:
     from simulator.maps import Terrain
@@ -74,21 +74,21 @@ def _terrain_of(data: bytes) -> tuple[Terrain, bytes]:
     """The terrain of an archive and a hash of the whole; a game is created from the same bytes again and again."""
     archive = _open(data)
     try:
-        info = terrainfile.read_map_info(_member(archive, "MapInfo"))
+        info = terrain_file.read_map_info(_member(archive, "MapInfo"))
         painted = np.zeros(info.size[::-1], dtype=np.bool_)
         for name in CLOSED:
             paint = _find(archive, name)
             if paint is not None:
-                painted |= terrainfile.read_paint(paint, info.size)
+                painted |= terrain_file.read_paint(paint, info.size)
         ground = Ground(
-            vertices=terrainfile.read_heights(_member(archive, "t3SyncHeightMap"), info.size),
-            cliff=terrainfile.read_cliffs(_member(archive, "t3SyncCliffLevel"), info.size),
-            on_cliff_tile=terrainfile.read_flags(_member(archive, "t3CellFlags"), info.size),
+            vertices=terrain_file.read_heights(_member(archive, "t3SyncHeightMap"), info.size),
+            cliff=terrain_file.read_cliffs(_member(archive, "t3SyncCliffLevel"), info.size),
+            on_cliff_tile=terrain_file.read_flags(_member(archive, "t3CellFlags"), info.size),
             painted=painted,
         )
     except TerrainError as error:
         raise ArchiveError(str(error)) from error
-    return terrainfile.terrain_of(info, ground), hashlib.sha256(data).digest()
+    return terrain_file.terrain_of(info, ground), hashlib.sha256(data).digest()
 
 
 def _open(data: bytes) -> Any:

@@ -26,7 +26,7 @@ class WorldCaches:
         self.resting_version = -1  # the population among which no body touched another when all last stood still
         self.bodies: object | None = None  # of this population, for ``contacts``
         self.census: object | None = None  # of this population, for ``census``
-        self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``needs``
+        self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``requirements``
         self.tallied = -1  # the loop in which that was counted
         self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
         self.harvesting = False  # whether anybody harvests

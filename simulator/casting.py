@@ -16,8 +16,8 @@ from simulator import commands, payments, prices, supply
 from simulator.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
-from simulator.needs import met
 from simulator.orders import Order, OrderKind
+from simulator.requirements import met
 from simulator.skills.registry import SKILLS, SMARTS
 from simulator.skills.skill import touching
 from simulator.stats import AIR_PLANE, GROUND_PLANE

@@ -1,6 +1,6 @@
 """The ground of one game: which cells its structures block now.
 
-Only the cells; which way round leads over what is free is ``pathing``'s.
+Only the cells; which way round leads over what is free is ``pathfinding``'s.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Ground:
     """The terrain with the structures that stand on it now.
 
-    ``surfaces`` is a place for what ``pathing`` works out of it per layer; it is empty after every change.
+    ``surfaces`` is a place for what ``pathfinding`` works out of it per layer; it is empty after every change.
     """
 
     def __init__(self, terrain: Terrain) -> None:

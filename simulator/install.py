@@ -123,7 +123,7 @@ def _write_launcher(path: Path) -> None:
 
 
 def _write_maps(maps: Path) -> None:
-    from simulator.mapfile import FOLDERS, is_placeholder, placeholders  # noqa: PLC0415  # numpy: 0.1 s of any --help
+    from simulator.map_file import FOLDERS, is_placeholder, placeholders  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     for folder in FOLDERS:
         (maps / folder).mkdir(parents=True, exist_ok=True)
@@ -135,7 +135,7 @@ def _write_maps(maps: Path) -> None:
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:
     """Links one map; clients look for maps exactly one folder below `Maps`."""
-    from simulator.mapfile import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
+    from simulator.map_file import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     folder = file.parent.name if file.parent != top else OWN_FOLDER
     path = f"{folder}/{file.stem}.SC2Map"

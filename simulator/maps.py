@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.scenario import Flat, Scenario
-from simulator.scenariofile import Sheet, sheets
+from simulator.scenario_file import Sheet, sheets
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

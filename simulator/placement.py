@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import pathing
+from simulator import pathfinding
 from simulator.columns import NOBODY
 from simulator.layers import Layer, layer_of
 from simulator.stats import LAYERS, bit_set
@@ -88,7 +88,7 @@ def _on_surface(world: World, unit: UnitType, at: Floats) -> Bools:
     layer = layer_of(unit)
     if layer is Layer.AIR:
         return inside
-    surface = pathing.surface(world.ground, layer)
+    surface = pathfinding.surface(world.ground, layer)
     return inside & surface.flat[surface.cell(at)]
 
 

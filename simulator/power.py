@@ -1,7 +1,7 @@
 """Power: which Pylons and phasing Warp Prisms supply the structures of their owner, and where units warp in fast.
 
 Written into the column ``powered`` when somebody came, went or was finished; asked by production, weapons and the
-API. Above: ``systems.power``, ``sites``, ``skills.warpgate``.
+API. Above: ``systems.power``, ``building_sites``, ``skills.warpgate``.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ and an ordered list of triggers. A trigger says *when* it is looked at, *if* whi
           - result: {1: victory, 2: defeat}
 
 Triggers are looked at in the order of the file, and none after the one that ends the game. Here is only the model of
-the whole; its parts are in ``script`` and ``places``, ``scenariofile`` reads it, ``systems.triggers`` executes it and
+the whole; its parts are in ``script`` and ``places``, ``scenario_file`` reads it, ``systems.triggers`` executes it and
 ``maps`` joins it with its terrain.
 """
 

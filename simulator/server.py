@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from aiohttp import WSMsgType, web
 
-from simulator.orphan import orphaned
+from simulator.parent_watch import orphaned
 from simulator.session import Session
 from simulator.status import Status
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator.armament import weapon_traits
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
 from simulator.layers import layer_of
 from simulator.mechanics import MECHANICS
 from simulator.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
 from simulator.targets import disengage, engage, measure_reach, weapon_for
+from simulator.weapon_choice import weapon_traits
 
 if TYPE_CHECKING:
     from simulator.buff_kinds import Buff

@@ -23,9 +23,9 @@ from simulator.catalog import load_catalog
 from simulator.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from simulator.creep import Creep
 from simulator.ground import Ground
-from simulator.memory import ScriptMemory
 from simulator.orders import ATTACK, Order, OrderKind
 from simulator.players import NEUTRAL, GameResult, Player, PlayerSetup
+from simulator.script_memory import ScriptMemory
 from simulator.shots import Missiles, PendingHits, Sweep
 from simulator.snapshots import Memory
 from simulator.stats import Stats

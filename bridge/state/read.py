@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 _OUTCOMES: dict[int, Outcome] = {sc_pb.Victory: "win", sc_pb.Defeat: "loss", sc_pb.Tie: "draw"}
 _ALLIANCES = (Alliance.NEUTRAL, Alliance.OWN, Alliance.ALLY, Alliance.NEUTRAL, Alliance.ENEMY)
 _DISPLAYS = (None, Display.VISIBLE, Display.REMEMBERED, Display.HIDDEN, None)
+_OWN, _REMEMBERED = Alliance.OWN, Display.REMEMBERED  # an attribute of an enumeration takes ten times a global
 _CLOAKED = frozenset({raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied})
 
 
@@ -87,7 +88,7 @@ def read_snapshot(
     observation = response.observation
     raw = observation.raw_data
     known = _units(raw.units)
-    units = {tag: unit for tag, unit in known.items() if unit.display_type is not Display.REMEMBERED}
+    units = {tag: unit for tag, unit in known.items() if unit.display_type is not _REMEMBERED}
     player = _player(observation.player_common)
     camera = raw.player.camera
     return Snapshot(
@@ -95,7 +96,7 @@ def read_snapshot(
         game_loop=observation.game_loop,
         known=known,
         units=units,
-        own=tuple([unit for unit in units.values() if unit.alliance is Alliance.OWN]),
+        own=tuple([unit for unit in units.values() if unit.alliance is _OWN]),
         player=player,
         score=_score(observation.score),
         upgrades=tuple(map(upgrade_name, sorted(raw.player.upgrade_ids))),
@@ -159,29 +160,16 @@ def read_unit(unit: raw_pb2.Unit) -> Unit | None:
     pos, buffs = unit.pos, unit.buff_ids
     name, facts = _type(unit.unit_type)
     alliance = _ALLIANCES[unit.alliance]
-    return Unit._make(
-        (
-            name,
-            facts,
-            alliance,
-            display,
-            WorldPoint(pos.x, pos.y),
-            unit.cloak in _CLOAKED,
-            tuple(buffs) if buffs else (),
-            *_of_all(unit),
-            *(_only_own(unit) if alliance is Alliance.OWN else _NOTHING_OWN),
-        )
-    )
+    place, is_cloaked = WorldPoint(pos.x, pos.y), unit.cloak in _CLOAKED
+    first = (name, facts, alliance, display, place, is_cloaked, tuple(buffs) if buffs else ())
+    return Unit._make(first + _of_all(unit) + (_only_own(unit) if alliance is _OWN else _NOTHING_OWN))
 
 
 def _only_own(unit: raw_pb2.Unit) -> tuple[Any, ...]:
     """What the API tells of the player's own units, in the order of the fields of `Unit`."""
     passengers, orders = unit.passengers, unit.orders
-    return (
-        *_of_own(unit),
-        tuple([unit_name(passenger.unit_type) for passenger in passengers]) if passengers else (),
-        tuple([_order(order) for order in orders]) if orders else (),
-    )
+    inside = tuple([unit_name(passenger.unit_type) for passenger in passengers]) if passengers else ()
+    return (*_of_own(unit), inside, tuple([_order(order) for order in orders]) if orders else ())
 
 
 _NOTHING_OWN = tuple(Unit._field_defaults.values())

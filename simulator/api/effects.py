@@ -1,7 +1,7 @@
 """What a player perceives besides units: effects on the ground, buffs, the power of pylons, what radar tells.
 
 The one place that decides which are told; raw data, feature layers and rendered images show the same. Below:
-`sight.py`, the world's fields and buffs.
+`sight.py`, the world's area effects and buffs.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ class Power(NamedTuple):
     radius: Floats
 
 
-def seen_fields(world: World, player: int, *, through_fog: bool = False) -> list[AreaEffect]:
+def seen_area_effects(world: World, player: int, *, through_fog: bool = False) -> list[AreaEffect]:
     """Fields that the API has an effect id for and that the player perceives: his own, and those in his sight."""
-    told = [field for field in world.area_effects if field.effect]
+    told = [area for area in world.area_effects if area.effect]
     if through_fog or not told:
         return told
     return [f for f in told if f.owner == player or sees(world, player, np.array(f.points, float)).any()]

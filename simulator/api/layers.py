@@ -16,7 +16,7 @@ import numpy as np
 from s2clientprotocol import spatial_pb2
 
 from simulator.api import wire
-from simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_buffs, seen_fields
+from simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
 from simulator.api.raster import Layer, draw_discs, sample
 from simulator.api.sight import Cloak, Display
 
@@ -112,8 +112,8 @@ class FeatureLayers:
         layer = self._screen.layers["effects"]
         if not frame.world.area_effects:
             return layer.blank
-        fields = seen_fields(frame.world, frame.player, through_fog=not frame.fogged)
-        spots = [(x, y, field.radius, field.effect) for field in fields for x, y in field.points]
+        areas = seen_area_effects(frame.world, frame.player, through_fog=not frame.fogged)
+        spots = [(x, y, area.radius, area.effect) for area in areas for x, y in area.points]
         table = np.array(spots, np.float64).reshape(-1, 4)
         return self._spots(layer, Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
 

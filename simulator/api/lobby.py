@@ -1,7 +1,7 @@
 """Requests around a game: create, leave, maps, ping and quit.
 
 Each function takes the process and a request and gives the body of the response, or raises `Failure` with it.
-Above: `requests.py`. Below: `game.py`, `mapfile.py`.
+Above: `requests.py`. Below: `game.py`, `map_file.py`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from simulator.api.game import Setup
 from simulator.api.process import Failure, Process
-from simulator.mapfile import SUFFIX, MapDataError, find_data, read_map
+from simulator.map_file import SUFFIX, MapDataError, find_data, read_map
 from simulator.maps import map_names
 
 if TYPE_CHECKING:

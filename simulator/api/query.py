@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import error_pb2, query_pb2
 
-from simulator import pathing, sites
+from simulator import building_sites, pathfinding
 from simulator.api.abilities import result_of, usable
 from simulator.layers import Layer
 from simulator.skills import warpgate
@@ -65,7 +65,7 @@ def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
         return 0.0
     if flying:
         return math.dist(start, end)
-    return pathing.surface(world.ground, Layer.WALK).distance(np.array(start), np.array(end))
+    return pathfinding.surface(world.ground, Layer.WALK).distance(np.array(start), np.array(end))
 
 
 def _on_map(world: World, x: float, y: float) -> bool:
@@ -80,11 +80,11 @@ def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> err
     """Whether what an ability builds, lands or warps in may stand at a point; who would do it is not looked at."""
     world = seat.world
     ability = world.catalog.ability_of_id.get(question.ability_id)
-    unit = None if ability is None else sites.product(world, ability)
+    unit = None if ability is None else building_sites.product(world, ability)
     if unit is None or ability is None:
         return error_pb2.NotSupported
     point = (question.target_pos.x + seat.origin[0], question.target_pos.y + seat.origin[1])
     if not (all(map(math.isfinite, point)) and _on_map(world, *point)):
         return error_pb2.CantBuildLocationInvalid
-    rule = warpgate.refusal if ability.effect == "warp_in" else sites.refusal
+    rule = warpgate.refusal if ability.effect == "warp_in" else building_sites.refusal
     return result_of(rule(world, seat.player, unit, point))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator.api.effects import power, seen_fields, seen_radars
+from simulator.api.effects import power, seen_area_effects, seen_radars
 from simulator.api.sight import API_NEUTRAL, alliance_of
 
 if TYPE_CHECKING:
@@ -29,11 +29,11 @@ def write_radar(raw: raw_pb2.ObservationRaw, seat: Seat) -> None:
 
 def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool) -> None:
     """Adds the effects that the player perceives to the raw data."""
-    for field in seen_fields(seat.world, seat.player, through_fog=through_fog):
-        side = int(alliance_of(np.array([field.owner]), seat.player)[0])
-        effect = raw.effects.add(effect_id=field.effect, radius=field.radius, alliance=side)
-        effect.owner = field.owner or API_NEUTRAL
-        for x, y in field.points:
+    for area in seen_area_effects(seat.world, seat.player, through_fog=through_fog):
+        side = int(alliance_of(np.array([area.owner]), seat.player)[0])
+        effect = raw.effects.add(effect_id=area.effect, radius=area.radius, alliance=side)
+        effect.owner = area.owner or API_NEUTRAL
+        for x, y in area.points:
             effect.pos.add(x=x - seat.origin[0], y=y - seat.origin[1])
 
 

@@ -22,7 +22,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator import mpq
 from simulator.api.clock import LOOPS_PER_SECOND
 from simulator.api.game import Entry, Game, Setup
-from simulator.mapfile import read_map
+from simulator.map_file import read_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

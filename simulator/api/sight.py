@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simulator import geometry, sites
+from simulator import building_sites, geometry
 from simulator.orders import OrderKind
 from simulator.snapshots import INDEX_SHIFT, Snapshot
 from simulator.systems.vision import detected
@@ -133,7 +133,7 @@ def _placeholders(world: World, player: int) -> list[Snapshot]:
     """What the player's builders are under way to build, as if it stood there; the tags are made up."""
     return [
         Snapshot(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
-        for i, (unit, point) in enumerate(sites.planned(world, player))
+        for i, (unit, point) in enumerate(building_sites.planned(world, player))
     ]
 
 

@@ -2,7 +2,7 @@
 
 It acts only through the orders that every player has, looks at its own units as they are, and keeps nothing in mind but
 whether it is attacking. It knows where enemy structures stand. All of this is an estimate: how the game's own
-computer players play is not known. Above: ``systems.opponents``. Below: ``casting``, ``commands``, ``sites``.
+computer players play is not known. Above: ``systems.opponents``. Below: ``casting``, ``commands``, ``building_sites``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import casting, commands, harvesting, sites, supply
+from simulator import building_sites, casting, commands, harvesting, supply
 from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.harvesting import Phase
@@ -190,7 +190,7 @@ def _raise(side: Side, name: str) -> bool:
 def _geyser(side: Side) -> int:
     """A free geyser of the base, or NOBODY."""
     world, hall = side.world, side.halls[0]
-    free = [s for s in world.live.tolist() if sites.is_free_geyser(world, s)]
+    free = [s for s in world.live.tolist() if building_sites.is_free_geyser(world, s)]
     away = {s: float(np.hypot(*(world.pos[s] - world.pos[hall]))) for s in free}
     near = [s for s in free if away[s] <= MECHANICS.harvest_search]
     return min(near, key=lambda s: (away[s], s), default=NOBODY)
@@ -199,7 +199,7 @@ def _geyser(side: Side) -> int:
 def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | None:
     """The nearest place for a structure around a town hall that leaves a way around it and the minerals free."""
     centre = world.pos[hall]
-    footprint = sites.footprint_of(world, unit)
+    footprint = building_sites.footprint_of(world, unit)
     if footprint is None:
         return None
     resources = harvesting.kinds(world.catalog)[1]
@@ -209,14 +209,14 @@ def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | N
         x, y = snapped((float(centre[0] + dx), float(centre[1] + dy)), footprint.size)
         between = fields.size and float(np.hypot(fields[:, 0] - x, fields[:, 1] - y).min()) < NEAREST_SITE
         roomy = not between and _has_margin(world, (x, y), footprint.size)
-        if roomy and sites.refusal(world, player, unit, (x, y)) is ActionResult.SUCCESS:
+        if roomy and building_sites.refusal(world, player, unit, (x, y)) is ActionResult.SUCCESS:
             return x, y
     return None
 
 
 def _has_margin(world: World, point: Point, size: tuple[int, int]) -> bool:
     """Whether the cells around a place are free, so that units get past."""
-    taken = sites.taken(world)
+    taken = building_sites.taken(world)
     (x, y), (width, height) = point, size
     low_x, low_y = int(x - width / 2) - 1, int(y - height / 2) - 1
     if low_x < 0 or low_y < 0:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import construction, production, sites
+from simulator import building_sites, construction, production
 from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.skills.skill import Skill
@@ -39,14 +39,14 @@ def _build(world: World, slots: list[int], ability: Ability, _: int, __: Point |
 
 
 def _can_build(world: World, slot: int, ability: Ability) -> ActionResult:
-    unit = sites.product(world, ability)
+    unit = building_sites.product(world, ability)
     if unit is None or world.unit_type(slot).flying:
         return ActionResult.NOT_SUPPORTED
     if world.addon[slot] != NOBODY:
         return ActionResult.CANT_BUILD_ON_THAT
     if slot in world.jobs:
         return ActionResult.CANT_QUEUE_THAT_ORDER
-    return sites.refusal(world, int(world.owner[slot]), unit, place_of(world, slot))
+    return building_sites.refusal(world, int(world.owner[slot]), unit, place_of(world, slot))
 
 
 SKILLS: Final = {

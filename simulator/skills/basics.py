@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, lifecycle, pathing
+from simulator import buffs, lifecycle, pathfinding
 from simulator.action_result import ActionResult
 from simulator.layers import Layer
 from simulator.skills.push_units_off import push_units_off
@@ -69,7 +69,7 @@ def _can_morph(world: World, cast: Cast) -> ActionResult:
 
 def _walkable(world: World, slot: int) -> bool:
     """Whether the ground under a flyer bears walkers."""
-    surface = pathing.surface(world.ground, Layer.WALK)
+    surface = pathfinding.surface(world.ground, Layer.WALK)
     return bool(surface.flat[surface.cell(world.pos[slot][None])][0])
 
 

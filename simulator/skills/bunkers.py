@@ -11,7 +11,7 @@ from simulator import buffs, targets
 from simulator.action_result import ActionResult
 from simulator.casts import Cast
 from simulator.columns import NOBODY
-from simulator.needs import met
+from simulator.requirements import met
 from simulator.skills.skill import Skill, number
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import commands, construction, payments, prices, production, sites
+from simulator import building_sites, commands, construction, payments, prices, production
 from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.orders import Order, OrderKind
@@ -30,7 +30,7 @@ IN_PROGRESS: Final = frozenset({"BuildInProgress", "BuildinProgressNydusCanal", 
 
 def _place(world: World, cast: Cast) -> None:
     """Begin a structure where it was asked for."""
-    unit, slot = sites.product(world, cast.ability), cast.slot
+    unit, slot = building_sites.product(world, cast.ability), cast.slot
     if unit is None:
         return
     owner, race = int(world.owner[slot]), world.unit_type(slot).race
@@ -64,35 +64,35 @@ def _where(world: World, cast: Cast, unit: UnitType) -> Point:
         x, y = world.pos[cast.target].tolist()
         return x, y
     assert cast.point is not None
-    return sites.centre(world, unit, cast.point)
+    return building_sites.centre(world, unit, cast.point)
 
 
 def _can_place(world: World, cast: Cast) -> ActionResult:
-    unit = sites.product(world, cast.ability)
+    unit = building_sites.product(world, cast.ability)
     if unit is None:
         return ActionResult.NOT_SUPPORTED
     owner = int(world.owner[cast.slot])
     if cast.target != NOBODY:
-        free = sites.is_free_geyser(world, cast.target)
+        free = building_sites.is_free_geyser(world, cast.target)
         return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_ON_THAT
     if cast.point is None:
         return ActionResult.CANT_FIND_PLACEMENT_LOCATION
-    return sites.refusal(world, owner, unit, cast.point)
+    return building_sites.refusal(world, owner, unit, cast.point)
 
 
 def _is_known(world: World, _: int, ability: Ability) -> ActionResult:
-    known = bool(ability.loops) and sites.product(world, ability) is not None
+    known = bool(ability.loops) and building_sites.product(world, ability) is not None
     return ActionResult.SUCCESS if known else ActionResult.NOT_SUPPORTED
 
 
 def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
     """Begin a structure far away, as a Nydus Network does its worms."""
-    unit = sites.product(world, ability)
+    unit = building_sites.product(world, ability)
     if unit is None or point is None:
         return []
     owner = int(world.owner[slots[0]])
     paid = payments.charge(world, owner, prices.cost_of(ability))
-    construction.begin(world, unit, owner, sites.centre(world, unit, point), loops=ability.loops, paid=paid)
+    construction.begin(world, unit, owner, building_sites.centre(world, unit, point), loops=ability.loops, paid=paid)
     world.timers.setdefault(slots[0], {})[ability.timer] = world.loop + ability.cooldown_loops
     return slots[:1]
 

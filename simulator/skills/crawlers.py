@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import lifecycle, sites
+from simulator import building_sites, lifecycle
 from simulator.action_result import ActionResult
 from simulator.skills import teleport
 from simulator.skills.push_units_off import push_units_off
@@ -20,14 +20,14 @@ def _root(world: World, cast: Cast) -> None:
     if _room(world, cast) is not ActionResult.SUCCESS:
         return
     unit = world.catalog.unit(cast.ability.unit)
-    teleport.to(world, cast.slot, sites.centre(world, unit, place_of(world, cast)))
+    teleport.to(world, cast.slot, building_sites.centre(world, unit, place_of(world, cast)))
     lifecycle.become(world, cast.slot, unit)
     push_units_off(world, cast.slot)
 
 
 def _room(world: World, cast: Cast) -> ActionResult:
     unit = world.catalog.unit(cast.ability.unit)
-    return sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
+    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
 
 
 SKILLS: Final = {

@@ -1,8 +1,8 @@
 """Cyclone: Lock On, which follows its target with missiles while the Cyclone goes where it wants.
 
-The lock is a field that moves with the target: its owner sees there, it fires at its periods, and it ends when the
-target is dead, hidden or too far away, or the Cyclone is dead, helpless or calls it off. The cooldown runs from there.
-In 4.10 each period is one missile of the ability's own; in 5.0.13 the lock fires the ordinary weapon's.
+The lock is an area effect that moves with the target: its owner sees there, it fires at its periods, and it ends when
+the target is dead, hidden or too far away, or the Cyclone is dead, helpless or calls it off. The cooldown runs from
+there. In 4.10 each period is one missile of the ability's own; in 5.0.13 the lock fires the ordinary weapon's.
 """
 
 from __future__ import annotations

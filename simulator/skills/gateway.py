@@ -1,7 +1,7 @@
 """Skills of the warriors: Blink and Shadow Stride, Charge, and the Adept's Phase Shift.
 
-The Adept's shade is a unit of its own that its player may send around; a field ties the two together and ends with
-the Adept standing where the shade stood, or with a shade that is gone.
+The Adept's shade is a unit of its own that its player may send around; an area effect ties the two together and ends
+with the Adept standing where the shade stood, or with a shade that is gone.
 """
 
 from __future__ import annotations
@@ -143,17 +143,17 @@ def _phase_shift(world: World, cast: Cast) -> None:
     )
 
 
-def _shift(world: World, field: AreaEffect) -> None:
+def _shift(world: World, area: AreaEffect) -> None:
     """Send the Adept to its shade when the time has come; let the shade go when the Adept is dead or has given up."""
-    adept, shade = world.slot_of(field.source), world.slot_of(field.target)
+    adept, shade = world.slot_of(area.source), world.slot_of(area.target)
     held = adept != NOBODY and buffs.has(world, adept, SHIFTING) and world.carrier[adept] == NOBODY
     if shade == NOBODY or not held:
-        field.end = world.loop
+        area.end = world.loop
         if shade != NOBODY:
             world.remove(shade)
         if adept != NOBODY:
             buffs.remove(world, adept, SHIFTING)
-    elif world.loop >= field.end:
+    elif world.loop >= area.end:
         _arrive(world, adept, shade)
 
 
@@ -172,9 +172,9 @@ def _arrive(world: World, adept: int, shade: int) -> None:
 def _cancel_shift(world: World, cast: Cast) -> None:
     """Give up the shift: told to the Adept or to its shade."""
     tag = world.tag_of(cast.slot)
-    for field in world.area_effects:
-        if field.rule == "phase_shift" and tag in (field.source, field.target):
-            adept = world.slot_of(field.source)
+    for area in world.area_effects:
+        if area.rule == "phase_shift" and tag in (area.source, area.target):
+            adept = world.slot_of(area.source)
             if adept != NOBODY:
                 buffs.remove(world, adept, SHIFTING)
 

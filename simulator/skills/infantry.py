@@ -1,7 +1,7 @@
 """Infantry: stimpacks, concussive shells and the Reaper's charge.
 
-The Reaper's leaps are its mover's (``pathing``), its regeneration out of combat and combat shields are numbers of the
-tables.
+The Reaper's leaps are its mover's (``pathfinding``), its regeneration out of combat and combat shields are numbers of
+the tables.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, lifecycle, pathing
+from simulator import buffs, lifecycle, pathfinding
 from simulator.area_effects import AreaEffect
 from simulator.columns import NOBODY
 from simulator.damage import apply_damage
@@ -121,7 +121,7 @@ def _fly_back(world: World, item: AreaEffect) -> None:
         return
     x, y = world.pos[slot].tolist()
     goal = x + item.memory["dx"], y + item.memory["dy"]
-    surface = pathing.surface(world.ground, Layer(int(world.layer[slot])))
+    surface = pathfinding.surface(world.ground, Layer(int(world.layer[slot])))
     there = world.pos[slot] * 0.0 + goal
     if not surface.flat[surface.cell(there[None])][0]:
         item.end = world.loop

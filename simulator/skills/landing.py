@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import lifecycle, sites
+from simulator import building_sites, lifecycle
 from simulator.action_result import ActionResult
 from simulator.columns import NOBODY
 from simulator.skills import addons, teleport
@@ -39,7 +39,7 @@ def _can_lift(world: World, cast: Cast) -> ActionResult:
 def _can_land(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
         return ActionResult.CANT_LAND_LOCATION_INVALID
-    why = sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
+    why = building_sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
     return ActionResult.SUCCESS if why is ActionResult.SUCCESS else ActionResult.CANT_LAND_LOCATION_INVALID
 
 
@@ -48,7 +48,7 @@ def _settle(world: World, cast: Cast) -> None:
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
     if cast.point is None or _can_land(world, cast) is not ActionResult.SUCCESS:
         return
-    teleport.to(world, slot, sites.centre(world, unit, cast.point))
+    teleport.to(world, slot, building_sites.centre(world, unit, cast.point))
     lifecycle.become(world, slot, unit)
     push_units_off(world, slot)
     attach(world, slot)

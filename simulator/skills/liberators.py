@@ -1,8 +1,8 @@
 """Liberators: a Defender zone is laid out, the ship takes its mode, and then fires at what stands in the circle.
 
-The zone is a field from the order on (the API's effect 8 while it is set up, 9 when it works); it ends when the ship
-leaves its mode, dies, or is carried away from it. That a ship fires only inside is in the columns ``zone`` and
-``zone_radius``, which choosing and measuring targets look at.
+The zone is an area effect from the order on (the API's effect 8 while it is set up, 9 when it works); it ends when
+the ship leaves its mode, dies, or is carried away from it. That a ship fires only inside is in the columns ``zone``
+and ``zone_radius``, which choosing and measuring targets look at.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Skills over large areas: Mass Recall of the Mothership and of the Nexus, Time Warp, and the cloaking field.
 
-A recall marks the units it takes; each of them leaves when its mark runs out. Time Warp is a field that lays a slowing
-buff on enemies in every loop, and so does the cloaking field with friends.
+A recall marks the units it takes; each of them leaves when its mark runs out. Time Warp is an area effect that lays a
+slowing buff on enemies in every loop, and so does the cloaking field with friends.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _taken(world: World, cast: Cast) -> list[int]:
 
 
 def _recall(world: World, cast: Cast) -> None:
-    """Mark the units; a field brings them to where the caster is now when the marks run out."""
+    """Mark the units; an area effect brings them to where the caster is now when the marks run out."""
     name, taken = str(cast.ability.numbers["buff"]), _taken(world, cast)
     for slot in taken:
         buffs.apply(world, slot, name, source=cast.slot)
@@ -61,31 +61,31 @@ def _recall(world: World, cast: Cast) -> None:
     lay(world, cast, "recall", end=world.loop + lasts, due=world.loop + 1).points.append((x, y))
 
 
-def _bring(world: World, field: AreaEffect) -> None:
+def _bring(world: World, area: AreaEffect) -> None:
     """Take the marked units along at the end; without the caster they stay and are free."""
-    caster = world.slot_of(field.source)
+    caster = world.slot_of(area.source)
     lost = caster == NOBODY or buffs.has(world, caster, SCRAMBLED)
-    if not lost and world.loop < field.end:
+    if not lost and world.loop < area.end:
         return
-    name = str(world.catalog.ability(field.ability).numbers["buff"])
-    for slot in _marked(world, name, field):
+    name = str(world.catalog.ability(area.ability).numbers["buff"])
+    for slot in _marked(world, name, area):
         buffs.remove(world, slot, name)
         if not lost:
-            _arrive(world, slot, field)
-    field.end = world.loop
+            _arrive(world, slot, area)
+    area.end = world.loop
 
 
-def _marked(world: World, name: str, field: AreaEffect) -> list[int]:
+def _marked(world: World, name: str, area: AreaEffect) -> list[int]:
     rows = world.buffs.rows
-    mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == field.begun)
-    mine &= (rows["source"] == world.slot_of(field.source)) | (rows["source"] == NOBODY)
+    mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == area.begun)
+    mine &= (rows["source"] == world.slot_of(area.source)) | (rows["source"] == NOBODY)
     slots: list[int] = rows["slot"][mine].tolist()
     return slots
 
 
-def _arrive(world: World, slot: int, field: AreaEffect) -> None:
+def _arrive(world: World, slot: int, area: AreaEffect) -> None:
     """Stand as far from the destination as it stood from the middle of the recall, or as near to there as it fits."""
-    (from_x, from_y), (to_x, to_y) = field.points
+    (from_x, from_y), (to_x, to_y) = area.points
     x, y = world.pos[slot].tolist()
     wanted = to_x + x - from_x, to_y + y - from_y
     world.queue[slot] = []
@@ -108,11 +108,11 @@ def _time_warp(world: World, cast: Cast) -> None:
     lay(world, cast, "time_warp", end=grown + number(cast, "duration_loops"), due=grown, effect=GROWING_EFFECT)
 
 
-def _slow(world: World, field: AreaEffect) -> None:
-    field.effect = WARP_EFFECT
-    plane = str(world.catalog.ability(field.ability).numbers["plane"])
-    for slot in foes(world, around(world, field.at, field.radius, plane=plane), field.owner):
-        buffs.apply(world, slot, WARPED, source=world.slot_of(field.source), owner=field.owner)
+def _slow(world: World, area: AreaEffect) -> None:
+    area.effect = WARP_EFFECT
+    plane = str(world.catalog.ability(area.ability).numbers["plane"])
+    for slot in foes(world, around(world, area.at, area.radius, plane=plane), area.owner):
+        buffs.apply(world, slot, WARPED, source=world.slot_of(area.source), owner=area.owner)
 
 
 # the cloaking field ---------------------------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ def fly(world: World, missile: AreaEffect) -> None:
 
 
 def end(world: World, missile: AreaEffect) -> None:
-    """Take a missile, or any other field, out of the world at the end of this loop."""
+    """Take a missile, or any other area effect, out of the world at the end of this loop."""
     missile.end = world.loop
 
 

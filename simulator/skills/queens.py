@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, commands, construction, lifecycle, sites
+from simulator import buffs, building_sites, commands, construction, lifecycle
 from simulator.action_result import ActionResult
 from simulator.orders import Order, OrderKind
 from simulator.skills.skill import Skill, number, place_of
@@ -51,7 +51,7 @@ def _heal(world: World, slot: int, amount: float) -> None:
 def _plant(world: World, cast: Cast) -> None:
     """Plant a creep tumor, which grows by itself and then burrows."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
-    place = sites.centre(world, unit, place_of(world, cast))
+    place = building_sites.centre(world, unit, place_of(world, cast))
     construction.begin(world, unit, int(world.owner[slot]), place, loops=cast.ability.loops, paid=(0.0, 0.0))
     if cast.ability.id == PLANT:
         world.timers.setdefault(slot, {})[cast.ability.timer] = math.inf  # a tumor plants one other in its life
@@ -60,7 +60,7 @@ def _plant(world: World, cast: Cast) -> None:
 def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
     """Creep without a structure on it; the tumor's own must be in sight."""
     unit = world.catalog.unit(cast.ability.unit)
-    return sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
+    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
 
 
 def _burrow_when_grown(world: World, slots: list[int]) -> None:

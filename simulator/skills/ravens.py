@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from simulator import buffs, lifecycle, sites
+from simulator import buffs, building_sites, lifecycle
 from simulator.action_result import ActionResult
 from simulator.catalog import LOOPS_PER_NORMAL_SECOND
 from simulator.columns import NOBODY
@@ -29,14 +29,14 @@ def _has_room(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
         return ActionResult.CANT_BUILD_LOCATION_INVALID
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    return sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
+    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
 
 
 def _place_turret(world: World, cast: Cast) -> None:
     """Put up a turret that stands for a while and fires at ground and air."""
     assert cast.point is not None
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    turret = lifecycle.spawn(world, unit, int(world.owner[cast.slot]), sites.centre(world, unit, cast.point))
+    turret = lifecycle.spawn(world, unit, int(world.owner[cast.slot]), building_sites.centre(world, unit, cast.point))
     push_units_off(world, turret)
     more = world.stats.changed(int(world.owner[turret]), "behavior", "AutoTurretTimedLife", "Duration", 0.0)
     lasts = number(cast, "duration_loops") + more * LOOPS_PER_NORMAL_SECOND

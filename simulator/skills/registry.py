@@ -1,4 +1,4 @@
-"""Skills: the rules behind abilities, buffs and fields that are not the same for all.
+"""The rules behind abilities, buffs and area effects that are not the same for all.
 
 One module per group of units. Each offers some of these tables, and here they are joined:
 

@@ -1,7 +1,7 @@
 """Skills of what the robotics facility makes: Purification Nova and the Immortal's barrier.
 
-Observers and Warp Prisms change mode by the common morph. The nova is a unit that its player may steer; a field ties
-it to its Disruptor and lets it burst when its time is over.
+Observers and Warp Prisms change mode by the common morph. The nova is a unit that its player may steer; an area
+effect ties it to its Disruptor and lets it burst when its time is over.
 """
 
 from __future__ import annotations
@@ -61,31 +61,31 @@ def _nova(world: World, cast: Cast) -> None:
     )
 
 
-def _burn(world: World, field: AreaEffect) -> None:
+def _burn(world: World, area: AreaEffect) -> None:
     """Burst at the end; go out without harm when the Disruptor dies, is carried, or is out of its owner's hands."""
-    disruptor, nova = world.slot_of(field.source), world.slot_of(field.target)
+    disruptor, nova = world.slot_of(area.source), world.slot_of(area.target)
     held = (
         NOBODY not in (nova, disruptor)
         and world.carrier[disruptor] == NOBODY
         and not any(buffs.has(world, disruptor, name) for name in QUELLS_NOVA)
     )
     if not held:
-        field.end = world.loop
-    elif world.loop >= field.end:
-        _burst(world, field, disruptor, nova)
-    if field.end <= world.loop and nova != NOBODY:
+        area.end = world.loop
+    elif world.loop >= area.end:
+        _burst(world, area, disruptor, nova)
+    if area.end <= world.loop and nova != NOBODY:
         world.remove(nova)
 
 
-def _burst(world: World, field: AreaEffect, disruptor: int, nova: int) -> None:
+def _burst(world: World, area: AreaEffect, disruptor: int, nova: int) -> None:
     """Hurt everybody on the ground around the nova, friends too; only the owner's own Disruptors are spared."""
-    ability = world.catalog.ability(field.ability)
+    ability = world.catalog.ability(area.ability)
     x, y = world.pos[nova].tolist()
     amount, bonus = number(ability, "damage"), number(ability, "bonus_vs_shields")
-    for slot in around(world, (x, y), field.radius, plane="ground"):
-        own = int(world.owner[slot]) == field.owner
+    for slot in around(world, (x, y), area.radius, plane="ground"):
+        own = int(world.owner[slot]) == area.owner
         if not (own and world.unit_type(slot).name == "Disruptor"):
-            apply_damage(world, disruptor, field.owner, slot, amount, shield_bonus=bonus)
+            apply_damage(world, disruptor, area.owner, slot, amount, shield_bonus=bonus)
 
 
 # the barrier ----------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The Sentry's skills: Guardian Shield, Force Field and Hallucination.
 
 A force field is a neutral unit whose cells nobody on the ground can enter until it ends, a massive unit comes near or
-a bile breaks it. A guardian shield is a field that follows its Sentry and lays a short buff on whom it covers.
+a bile breaks it. A guardian shield is an area effect that follows its Sentry and lays a short buff on whom it covers.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ def _guardian_shield(world: World, cast: Cast) -> None:
     lay(world, cast, "guardian_shield", end=end, due=world.loop + 1, effect=SHIELD_EFFECT)
 
 
-def _cover(world: World, field: AreaEffect) -> None:
+def _cover(world: World, area: AreaEffect) -> None:
     """Follow the Sentry, and every period cover its owner's units around it; structures are not covered."""
-    sentry = world.slot_of(field.source)
+    sentry = world.slot_of(area.source)
     if sentry == NOBODY or buffs.has(world, sentry, SCRAMBLED):
-        field.end = world.loop
+        area.end = world.loop
         return
-    field.points = [_place(world, sentry)]
-    period = number(world.catalog.ability(field.ability), "period_loops")
-    if (world.loop - field.begun) % period or world.carrier[sentry] != NOBODY:
+    area.points = [_place(world, sentry)]
+    period = number(world.catalog.ability(area.ability), "period_loops")
+    if (world.loop - area.begun) % period or world.carrier[sentry] != NOBODY:
         return
-    near = around(world, field.at, field.radius + float(world.radius[sentry]), structures=False)
-    for slot in friends(world, near, field.owner):
+    near = around(world, area.at, area.radius + float(world.radius[sentry]), structures=False)
+    for slot in friends(world, near, area.owner):
         buffs.apply(world, slot, SHIELD_BUFF, source=sentry)
 
 

@@ -127,7 +127,7 @@ def place_of(world: World, cast: Cast) -> Point:
 def lay(
     world: World, cast: Cast, rule: str, *, end: float, due: float, effect: int = 0, period: float = 1.0
 ) -> AreaEffect:
-    """Lay a field where a cast is aimed, as wide as the ability says; whoever lays it may change it on.
+    """Begin an area effect where a cast is aimed, as wide as the ability says; the caller may change it on.
 
     Its ``rule`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
     """

@@ -179,8 +179,8 @@ def _cant_set_trap(world: World, cast: Cast) -> ActionResult:
     return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_LOCATION_INVALID
 
 
-def _trap_done(world: World, field: AreaEffect) -> None:
-    trap = world.slot_of(field.source)
+def _trap_done(world: World, area: AreaEffect) -> None:
+    trap = world.slot_of(area.source)
     if trap != NOBODY:
         world.build_progress[trap] = 1.0
         buffs.apply(world, trap, TRAP_LIFE)
@@ -228,14 +228,14 @@ def _spring(world: World, cast: Cast) -> None:
     world.area_effects += [spot, seen]
 
 
-def _catch(world: World, field: AreaEffect) -> None:
-    trap = world.slot_of(field.source)
+def _catch(world: World, area: AreaEffect) -> None:
+    trap = world.slot_of(area.source)
     if trap == NOBODY:
         return
-    near = around(world, field.at, field.radius, plane="ground", structures=False)
+    near = around(world, area.at, area.radius, plane="ground", structures=False)
     for slot in _catchable(world, trap, near):
         targets.disengage(world, slot)
-        buffs.apply(world, slot, STASIS, source=trap, owner=field.owner)
+        buffs.apply(world, slot, STASIS, source=trap, owner=area.owner)
 
 
 # Void Ray -------------------------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def _come_down(world: World, slot: int, point: Point) -> None:
 
 
 def _glides(world: World, item: AreaEffect) -> None:
-    """Bring a locust one step nearer to its landing place; the field's radius is the step."""
+    """Bring a locust one step nearer to its landing place; the area effect's radius is the step."""
     slot = world.slot_of(item.target)
     if slot == NOBODY:
         item.end = world.loop

@@ -44,14 +44,14 @@ def _psi_storm(world: World, cast: Cast) -> None:
     lay(world, cast, "psi_storm", end=end, due=world.loop, effect=STORM_EFFECT, period=period)
 
 
-def _search(world: World, field: AreaEffect) -> None:
+def _search(world: World, area: AreaEffect) -> None:
     """Find whom the storm touches, friends too: who is new to it takes damage at once."""
-    source = world.slot_of(field.source)
-    for slot in around(world, field.at, field.radius, structures=False):
+    source = world.slot_of(area.source)
+    for slot in around(world, area.at, area.radius, structures=False):
         fresh = not buffs.has(world, slot, STORM_BUFF)
-        buffs.apply(world, slot, STORM_BUFF, source=source, owner=field.owner)
+        buffs.apply(world, slot, STORM_BUFF, source=source, owner=area.owner)
         if fresh:
-            _hurt(world, slot, source, field.owner)
+            _hurt(world, slot, source, area.owner)
 
 
 def _storm_tick(world: World, slot: int, row: np.void) -> None:
@@ -111,12 +111,12 @@ def _fuse(world: World, cast: Cast) -> None:
     )
 
 
-def _form(world: World, field: AreaEffect) -> None:
-    archon = world.slot_of(field.source)
+def _form(world: World, area: AreaEffect) -> None:
+    archon = world.slot_of(area.source)
     if archon == NOBODY:
-        field.end = world.loop
+        area.end = world.loop
         return
-    world.build_progress[archon] = min((world.loop - field.begun) / (field.end - field.begun), 1.0)
+    world.build_progress[archon] = min((world.loop - area.begun) / (area.end - area.begun), 1.0)
     if world.build_progress[archon] >= 1.0:
         refresh(world, archon)
         world.orders_changed = world.scan_now = True

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from simulator import construction, pathing, payments, power, prices
+from simulator import construction, pathfinding, payments, power, prices
 from simulator.action_result import ActionResult
 from simulator.layers import layer_of
 from simulator.skills.skill import Skill
@@ -60,7 +60,7 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionRe
 def _is_free(world: World, unit: UnitType, point: Point) -> bool:
     """Whether a unit's body touches nobody and no wall at a point."""
     at = np.array([point])
-    surface = pathing.surface(world.ground, layer_of(unit))
+    surface = pathfinding.surface(world.ground, layer_of(unit))
     if not surface.flat[surface.cell(at)][0]:
         return False
     live = world.live

@@ -1,4 +1,4 @@
-"""Fields: effects on the ground do their work at their periods, and end."""
+"""Area effects do their work at their periods, and end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def run(world: World) -> None:
-    """Run the rule of every field that is due, in the order in which they came, and remove those that are over."""
+    """Run the rule of every area effect that is due, in the order of their coming, and remove those that are over."""
     if not world.area_effects:
         return
     for item in list(world.area_effects):

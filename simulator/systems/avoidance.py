@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry, pathing
+from simulator import geometry, pathfinding
 from simulator.arrays import some, which
 from simulator.contacts import within
 from simulator.layers import Layer
@@ -123,6 +123,6 @@ def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
     for layer in LAYERS:
         mine = layers == layer.value
         if layer is not AIR and some(mine):
-            surface = pathing.surface(world.ground, layer)
+            surface = pathfinding.surface(world.ground, layer)
             free[mine] = surface.flat[surface.cell(points[mine])]
     return free

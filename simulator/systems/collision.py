@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry, pathing
+from simulator import geometry, pathfinding
 from simulator.arrays import some, which
 from simulator.census import census
 from simulator.columns import NOBODY
@@ -27,7 +27,7 @@ from simulator.systems import avoidance
 if TYPE_CHECKING:
     from simulator.columns import Bools, Ints
     from simulator.geometry import Floats
-    from simulator.pathing import Surface
+    from simulator.pathfinding import Surface
     from simulator.world import World
 
 OVERLAP_PRESSED = 0.03
@@ -203,7 +203,7 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
             mine = _moved(mine, before, after)
             after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
-        surface = pathing.surface(world.ground, layer)
+        surface = pathfinding.surface(world.ground, layer)
         free = surface.open.take(surface.cell(after.take(mine, 0)))
         if np.count_nonzero(free) < len(free):
             near = _moved(mine[~free], before, after)

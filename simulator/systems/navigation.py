@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import geometry, pathing
+from simulator import geometry, pathfinding
 from simulator.arrays import some, which
 from simulator.layers import Layer
 from simulator.mechanics import MECHANICS
@@ -18,7 +18,7 @@ from simulator.mechanics import MECHANICS
 if TYPE_CHECKING:
     from simulator.columns import Ints
     from simulator.geometry import Floats
-    from simulator.pathing import Surface
+    from simulator.pathfinding import Surface
     from simulator.world import World
 
 CORNER_REACHED = 0.4
@@ -53,7 +53,7 @@ def find_ways(world: World) -> None:
 
 def _look_over(world: World, slots: Ints, layer: Layer) -> None:
     goal = world.goal[slots]
-    surface = pathing.surface(world.ground, layer)
+    surface = pathfinding.surface(world.ground, layer)
     straight = np.ones(len(slots), dtype=np.bool_)
     if layer is not AIR:
         straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from simulator import commands
 from simulator.arrays import some, which
+from simulator.arrival import packed
 from simulator.columns import NOBODY
-from simulator.crowds import packed
 from simulator.mechanics import MECHANICS
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from simulator import casting, commands, lifecycle, melee
+from simulator import casting, commands, lifecycle, melee_start
 from simulator.placement import free_places
 from simulator.places import Column, Grid, RandomPlace, kind_of_place
 from simulator.players import NEUTRAL, GameResult
@@ -49,7 +49,7 @@ def set_up(world: World) -> None:
     for units in scenario.units:
         create(world, units, placed=True)
     if scenario.melee:
-        for workers, field in melee.start(world):
+        for workers, field in melee_start.start(world):
             commands.gather(world, workers, field)
 
 
@@ -216,7 +216,7 @@ def _command(world: World, spec: OrderSpec, slots: list[int], *, queue: bool) ->
     elif spec.move is not None:
         commands.move(world, slots, point_of(world, spec.move), queue=queue)
     elif spec.gather_near is not None:
-        fields = melee.mineral_fields(world, point_of(world, spec.gather_near))
+        fields = melee_start.mineral_fields(world, point_of(world, spec.gather_near))
         if fields.size:
             commands.gather(world, slots, world.tag_of(int(fields[0])), queue=queue)
     elif spec.unload_at is not None:

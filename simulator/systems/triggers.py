@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator import melee
+from simulator import melee_start
 from simulator.columns import NOBODY
 from simulator.players import NEUTRAL, PlayerSetup
 from simulator.script import At, Died, Enters, Every, Made, Touches
@@ -59,7 +59,7 @@ def run(world: World) -> None:
             if world.ended:
                 return
     if deaths and scenario.melee:
-        melee.judge(world)
+        melee_start.judge(world)
 
 
 def _do(world: World, trigger: Trigger, subject: int) -> None:

@@ -104,7 +104,7 @@ def _light(world: World, player: int) -> None:
 
 
 def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]]:
-    """Places that a player sees without a unit there, with the radius: by his fields, and by his buffs on others."""
+    """Places that a player sees without a unit there, with the radius: by its area effects and its buffs on others."""
     lights = [(item.at, item.sights) for item in world.area_effects if item.sights and item.owner == player]
     rows = world.buffs.rows
     for row in rows[np.isin(rows["buff"], _lighting(world.catalog)) & (rows["owner"] == player)] if len(rows) else ():

@@ -34,7 +34,7 @@ from protocol.configfile import loads
 from protocol.errors import ConfigError
 from protocol.messages import Briefing
 from protocol.recording import Recording
-from simulator.mapfile import read_map
+from simulator.map_file import read_map
 from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:

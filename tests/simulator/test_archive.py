@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from simulator import terrainfile, walkability
+from simulator import terrain_file, walkability
 from simulator.archive import ArchiveError, read_archive
 from simulator.cli import app
 from simulator.install import InstallError, install, link_maps
-from simulator.mapfile import MapDataError, is_placeholder, read_map
+from simulator.map_file import MapDataError, is_placeholder, read_map
 from simulator.maps import load_map
-from simulator.terrainfile import TerrainError
+from simulator.terrain_file import TerrainError
 from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def test_the_playable_area_is_found_wherever_the_versions_put_it(place: int) -> 
     data = map_info()
     at = data.index(b"Dark")
     moved = data[:at] + b"\x02\0\0\0preview.tga\0"[:place] + data[at:]
-    assert terrainfile.read_map_info(moved) == terrainfile.MapInfo((WIDTH, HEIGHT), PLAYABLE)
+    assert terrain_file.read_map_info(moved) == terrain_file.MapInfo((WIDTH, HEIGHT), PLAYABLE)
 
 
 def test_the_upper_cell_of_a_straight_cliff_is_free_and_the_lower_one_is_not() -> None:
@@ -254,7 +254,7 @@ def test_shipped_terrain_is_never_walkable_where_the_rule_closes_it_without_tile
 
 def test_a_terrain_file_of_the_wrong_kind_is_refused() -> None:
     with pytest.raises(TerrainError, match="t3SyncHeightMap does not begin with SMAP"):
-        terrainfile.read_heights(b"nothing", (4, 4))
+        terrain_file.read_heights(b"nothing", (4, 4))
 
 
 # installing -----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simulator.install import InstallError, install, is_installed
-from simulator.mapfile import FOLDERS, read_map
+from simulator.map_file import FOLDERS, read_map
 from simulator.maps import map_names
 
 LAUNCHER = "Versions/Base75689/SC2_x64"

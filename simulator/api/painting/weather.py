@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from simulator.api.effects import seen_fields
+from simulator.api.effects import seen_area_effects
 from simulator.api.painting import marks, palette
 from simulator.api.sight import API_NEUTRAL, alliance_of
 
@@ -107,24 +107,24 @@ def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
     """Paints the effects that lie on the ground, and returns those that hang above."""
     if not frame.world.area_effects:
         return []
-    fields = seen_fields(frame.world, frame.player, through_fog=not frame.fogged)
-    above = [field for field in fields if MANNERS.get(field.effect, OTHER).above]
-    _paint(image, frame, screen, [field for field in fields if field not in above])
+    areas = seen_area_effects(frame.world, frame.player, through_fog=not frame.fogged)
+    above = [area for area in areas if MANNERS.get(area.effect, OTHER).above]
+    _paint(image, frame, screen, [area for area in areas if area not in above])
     return above
 
 
-def paint_above(image: Image, frame: Frame, screen: Screen, fields: list[AreaEffect]) -> None:
+def paint_above(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) -> None:
     """Paints the effects that hang over the units."""
-    if fields:
-        _paint(image, frame, screen, fields)
+    if areas:
+        _paint(image, frame, screen, areas)
 
 
-def _paint(image: Image, frame: Frame, screen: Screen, fields: list[AreaEffect]) -> None:
-    for field in fields:
-        manner, age = MANNERS.get(field.effect, OTHER), frame.world.loop - field.begun
-        edge = palette.mix(manner.colour, palette.LIVERIES[_side(field, frame)].dot, EDGE_SIDE)
-        radius = max(field.radius / screen.scale, 2.0)
-        for point in field.points:
+def _paint(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) -> None:
+    for area in areas:
+        manner, age = MANNERS.get(area.effect, OTHER), frame.world.loop - area.begun
+        edge = palette.mix(manner.colour, palette.LIVERIES[_side(area, frame)].dot, EDGE_SIDE)
+        radius = max(area.radius / screen.scale, 2.0)
+        for point in area.points:
             centre = screen.to_pixels(point[0], point[1], frame.camera)
             if _in_view(centre, 2 * radius, screen):
                 _disc(image, centre, radius, manner, edge)
@@ -137,9 +137,9 @@ def _in_view(centre: Point, reach: float, screen: Screen) -> bool:
     return -reach < x < screen.columns + reach and -reach < y < screen.rows + reach
 
 
-def _side(field: AreaEffect, frame: Frame) -> int:
-    owner = np.array([field.owner or API_NEUTRAL])
-    alliance = alliance_of(np.array([field.owner]), frame.player)
+def _side(area: AreaEffect, frame: Frame) -> int:
+    owner = np.array([area.owner or API_NEUTRAL])
+    alliance = alliance_of(np.array([area.owner]), frame.player)
     return int(palette.sides(owner, alliance, frame.player)[0])
 
 

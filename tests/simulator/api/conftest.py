@@ -12,7 +12,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from simulator import lifecycle
 from simulator.api.game import Game, Setup
 from simulator.api.observation import observe
-from simulator.mapfile import read_map
+from simulator.map_file import read_map
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,7 +13,7 @@ from simulator.catalog import DEFAULT_VERSION, load_catalog
 from simulator.columns import NOBODY
 from simulator.maps import GameMap, map_from
 from simulator.players import PlayerSetup
-from simulator.scenariofile import parse_scenario
+from simulator.scenario_file import parse_scenario
 from simulator.tick import advance
 from simulator.world import World
 

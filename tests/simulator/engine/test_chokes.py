@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from simulator import commands, lifecycle, pathing
+from simulator import commands, lifecycle, pathfinding
 from simulator.layers import Layer
 from simulator.placement import free_places
 
@@ -80,7 +80,7 @@ def test_100_units_pass_the_ramp_of_a_base(make_field: Callable[..., Any]) -> No
     field = make_field("simple64")
     world = field.world
     slots = crowd(world, "Zergling", 100, BASE)
-    way = pathing.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    way = pathfinding.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
     commands.move(world, slots.tolist(), OUTSIDE)
     alone = way / (world.catalog.unit("Zergling").speed_n / 16)
     near = loops_until(field, lambda: np.hypot(*(world.pos[slots] - OUTSIDE).T).max() < 9, 2000)
@@ -93,7 +93,7 @@ def test_a_walk_is_as_long_as_the_distance_that_is_told(make_field: Callable[...
     field = make_field("simple64")
     world = field.world
     marine = field.put("Marine", 1, *BASE)
-    told = pathing.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    told = pathfinding.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
     assert told > 1.2 * math.dist(BASE, OUTSIDE), "there is something to walk around"
     commands.move(world, [marine], OUTSIDE)
     walked = 0.0

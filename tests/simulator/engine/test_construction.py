@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, commands, sites, supply
+from simulator import building_sites, casting, commands, supply
 from simulator.action_result import ActionResult
 from simulator.catalog import load_catalog
 
@@ -189,7 +189,7 @@ def test_where_a_structure_may_stand(
     field.put("Zealot", 1, 52.0, 30.0)
     field.put("MineralField", 0, 20.0, 20.5)
     field.put("VespeneGeyser", 0, 10.5, 50.5)
-    assert sites.refusal(field.world, 1, CATALOG.unit(name), point) is refusal
+    assert building_sites.refusal(field.world, 1, CATALOG.unit(name), point) is refusal
 
 
 def test_what_stands_in_the_way_when_the_builder_comes_ends_the_order(field: Field) -> None:

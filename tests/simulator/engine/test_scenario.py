@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from simulator.maps import MapError, find_map, load_map, map_from, map_names
-from simulator.scenariofile import ScenarioError, parse_scenario, read_scenario
+from simulator.scenario_file import ScenarioError, parse_scenario, read_scenario
 from simulator.tick import advance, new_game
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from simulator.maps import MapError, map_from
 from simulator.orders import OrderKind
 from simulator.places import Grid, Region, Span
 from simulator.players import GameResult
-from simulator.scenariofile import ScenarioError, parse_scenario, sheets
+from simulator.scenario_file import ScenarioError, parse_scenario, sheets
 from simulator.script import Comparison
 from simulator.tick import advance, new_game
 

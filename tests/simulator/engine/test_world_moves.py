@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands, lifecycle, pathing
+from simulator import commands, lifecycle, pathfinding
 from simulator.layers import Layer
 from simulator.maps import load_map
 from simulator.placement import free_places
@@ -33,7 +33,7 @@ def all_on_their_surface(world: World) -> bool:
     for slot in world.live.tolist():
         if world.walled[slot]:
             continue
-        surface = pathing.surface(world.ground, Layer(int(world.layer[slot])))
+        surface = pathfinding.surface(world.ground, Layer(int(world.layer[slot])))
         if not surface.flat[surface.cell(world.pos[slot])]:
             return False
     return bool(np.isfinite(world.pos[world.live]).all())

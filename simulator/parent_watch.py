@@ -1,4 +1,4 @@
-"""Notices that nobody wants the game any more: whoever started it is dead, and no client has been there for a minute.
+"""Exit when the parent process is gone and no client is connected for a minute.
 
 A client that is killed (SIGKILL, the out-of-memory killer) ends no game, and the next one starts a game of its own, so
 that games would pile up. A game that was started by hand lives as long as the shell that started it, or its clients.

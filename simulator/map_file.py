@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from yaml import YAMLError
 
 from simulator.maps import GameMap, MapError, find_map, load_map, map_from, map_names
-from simulator.scenariofile import ScenarioError, parse_scenario
+from simulator.scenario_file import ScenarioError, parse_scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import pathing
+from simulator import pathfinding
 from simulator.ground import Ground
 from simulator.layers import Layer
 from simulator.maps import load_map
-from simulator.pathing import NEIGHBOURS, Surface
+from simulator.pathfinding import NEIGHBOURS, Surface
 
 ROOM = """
 ..........
@@ -74,21 +74,21 @@ def test_a_line_does_not_pass_between_two_cells_that_touch_at_a_corner() -> None
 def test_structures_close_the_ground_and_open_it_again() -> None:
     terrain = load_map("llm_smac/3s_vs_3z").terrain
     ground = Ground(terrain)
-    bare = pathing.surface(ground, Layer.WALK)
+    bare = pathfinding.surface(ground, Layer.WALK)
     wall = np.array([(16, y) for y in range(-2, 40)])
     ground.block(7, wall)
-    assert pathing.surface(ground, Layer.WALK).distance(at(5, 5), at(25, 5)) == 0
-    assert pathing.surface(ground, Layer.GLIDE).distance(at(5, 5), at(25, 5)) == 0
-    assert pathing.surface(ground, Layer.AIR).distance(at(5, 5), at(25, 5)) == 20
+    assert pathfinding.surface(ground, Layer.WALK).distance(at(5, 5), at(25, 5)) == 0
+    assert pathfinding.surface(ground, Layer.GLIDE).distance(at(5, 5), at(25, 5)) == 0
+    assert pathfinding.surface(ground, Layer.AIR).distance(at(5, 5), at(25, 5)) == 20
     assert not ground.walk[5, 16]
     ground.unblock(7)
-    assert pathing.surface(ground, Layer.WALK) is bare
+    assert pathfinding.surface(ground, Layer.WALK) is bare
     assert terrain.walk.all()
 
 
 def test_games_on_one_terrain_share_what_was_found() -> None:
     terrain = load_map("llm_smac/2c_vs_64zg").terrain
-    assert pathing.surface(Ground(terrain), Layer.WALK) is pathing.surface(Ground(terrain), Layer.WALK)
+    assert pathfinding.surface(Ground(terrain), Layer.WALK) is pathfinding.surface(Ground(terrain), Layer.WALK)
 
 
 @settings(max_examples=60, deadline=None)
@@ -96,7 +96,7 @@ def test_games_on_one_terrain_share_what_was_found() -> None:
 def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
     x: float, y: float, to_x: float, to_y: float
 ) -> None:
-    ledge = pathing.surface(Ground(load_map("llm_smac/2c_vs_64zg").terrain), Layer.WALK)
+    ledge = pathfinding.surface(Ground(load_map("llm_smac/2c_vs_64zg").terrain), Layer.WALK)
     a, b = at(x, y), at(to_x, to_y)
     there, back = ledge.distance(a, b), ledge.distance(b, a)
     if there == 0 or back == 0:
