@@ -34,10 +34,10 @@ from simulator.skills import (
     sentry,
     stargate,
     templar,
-    terran,
+    terran_tables,
     transports,
     warpgate,
-    zerg,
+    zerg_tables,
 )
 
 if TYPE_CHECKING:
@@ -82,11 +82,11 @@ SKILLS: Final[dict[str, Skill]] = {
     **stargate.SKILLS,
     **mothership.SKILLS,
     **battery.SKILLS,
-    **terran.SKILLS,
+    **terran_tables.SKILLS,
     **transports.SKILLS,
     **bunkers.SKILLS,
     **carrier.SKILLS,
-    **zerg.SKILLS,
+    **zerg_tables.SKILLS,
 }
 AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
     **sentry.AREA_EFFECTS,
@@ -95,32 +95,32 @@ AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {
     **robotics.AREA_EFFECTS,
     **stargate.AREA_EFFECTS,
     **mothership.AREA_EFFECTS,
-    **terran.AREA_EFFECTS,
-    **zerg.AREA_EFFECTS,
+    **terran_tables.AREA_EFFECTS,
+    **zerg_tables.AREA_EFFECTS,
 }
 TICKS: Final[dict[str, BuffRule]] = {
     **templar.TICKS,
     **mothership.TICKS,
-    **terran.TICKS,
-    **zerg.TICKS,
+    **terran_tables.TICKS,
+    **zerg_tables.TICKS,
 }
 ENDS: Final[dict[str, BuffRule]] = {
     **robotics.ENDS,
     **stargate.ENDS,
-    **terran.ENDS,
-    **zerg.ENDS,
+    **terran_tables.ENDS,
+    **zerg_tables.ENDS,
 }
-FINALS: Final[dict[str, BuffRule]] = {**zerg.FINALS}
+FINALS: Final[dict[str, BuffRule]] = {**zerg_tables.FINALS}
 PASSIVES: Final[dict[str, UnitRule]] = _joined(
     sentry.PASSIVES,
     gateway.PASSIVES,
     robotics.PASSIVES,
     stargate.PASSIVES,
     mothership.PASSIVES,
-    terran.PASSIVES,
+    terran_tables.PASSIVES,
     transports.PASSIVES,
     carrier.PASSIVES,
-    zerg.PASSIVES,
+    zerg_tables.PASSIVES,
     warpgate.PASSIVES,
 )
 SMARTS: Final[tuple[SmartRule, ...]] = (
@@ -128,8 +128,8 @@ SMARTS: Final[tuple[SmartRule, ...]] = (
     *battery.SMARTS,
     *transports.SMARTS,
     *production.SMARTS,
-    *terran.SMARTS,
+    *terran_tables.SMARTS,
 )
 DEATHS: Final[dict[str, Callable[[World, int], None]]] = _joined(
-    harvest.DEATHS, transports.DEATHS, carrier.DEATHS, zerg.DEATHS, terran.DEATHS
+    harvest.DEATHS, transports.DEATHS, carrier.DEATHS, zerg_tables.DEATHS, terran_tables.DEATHS
 )

@@ -1,4 +1,4 @@
-"""Terran: the tables of all modules with Terran skills, joined."""
+"""Terran: the tables of all modules with Terran abilities, joined."""
 
 from __future__ import annotations
 
