@@ -20,15 +20,15 @@ from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import debug_pb2
 
-from bridge.act.raw import RawExecutor
-from bridge.game import GameConfig
-from bridge.knowledge import knowledge
-from bridge.maps import known_maps
-from bridge.pysc2_game import PySC2Game
-from simulator.install import install
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.game.game import GameConfig
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_bridge.knowledge import knowledge
+from khala_bridge.task.maps import known_maps
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
 ARMY = (
     "Stalker", "Zealot", "Sentry", "HighTemplar", "Immortal", "Phoenix", "VoidRay", "Oracle", "Marine", "Marauder",

@@ -21,15 +21,15 @@ from typing import Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import Actor
-from bridge.catalog import catalogue
-from bridge.functions import general
-from bridge.knowledge import knowledge
-from bridge.maps import MapSpec
-from bridge.observe import Observer
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import AgentConfig, TaskConfig
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.functions import general
+from khala_bridge.knowledge import knowledge
+from khala_bridge.observe import Observer
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.task.config import AgentConfig, TaskConfig
+from khala_bridge.task.maps import MapSpec
+from khala_protocol.speech import parse
 
 AGENT = "Commander"
 TEAMS = ("Stalker", "Zealot", "Immortal", "HighTemplar", "Sentry")

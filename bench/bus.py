@@ -4,7 +4,7 @@
     python bench/bus.py --json               one JSON object on stdout
 
 Compared are, in turns of a few rounds so that a noisy machine treats them alike:
-    bus    `protocol.bus`: observations as STATE, replies as SPEECH
+    bus    `khala_protocol.bus`: observations as STATE, replies as SPEECH
     raw    Zenoh in asyncio: plain publishers, direct callbacks, a queue filled by `call_soon_threadsafe`
     bare   Zenoh without asyncio: the agent answers inside its callback, the host waits on a thread's event
 with the host itself as the router, and with a router process between them. Agents are spread over worker processes, one
@@ -29,9 +29,9 @@ from typing import Any, Protocol
 import zenoh
 from zenoh.handlers import Callback
 
-from protocol.bus import Delivery
-from protocol.bus.config import BusConfig, settings
-from protocol.bus.zenoh import ZenohBus, open_bus
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig, settings
+from khala_protocol.bus.zenoh import ZenohBus, open_bus
 
 ROUNDS = {1: 400, 8: 200, 32: 120, 128: 60}
 TURN_ROUNDS = 10
@@ -146,7 +146,7 @@ class Host(Protocol):
 
 
 class BusHost(Host):
-    """Over `protocol.bus`."""
+    """Over `khala_protocol.bus`."""
 
     async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None:
         self.bus: ZenohBus = await open_bus(config)

@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING
 
 import httpx
 
-from agents.llm.client import Request
-from agents.llm.openai_compatible import OpenAICompatible
-from agents.llm.pricing import Prices
-from agents.llm.profiles import PROFILES
-from agents.llm.transport import AiohttpTransport
-from protocol.messages import ChatMessage
+from khala_agents.llm.client import Request
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.profiles import PROFILES
+from khala_agents.llm.transport import AiohttpTransport
+from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable

@@ -21,16 +21,16 @@ from typing import Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.catalog import catalogue
-from bridge.frames import CAMERA_WIDTH
-from bridge.imagespec import ImageSpec
-from bridge.names import unit_name
-from bridge.observe import Observer
-from bridge.observe.image.album import Album
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import AgentConfig, TaskConfig, TeamConfig
-from protocol.messages import Frames
-from simulator.client import Client, command, interface
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.frames import CAMERA_WIDTH
+from khala_bridge.names import unit_name
+from khala_bridge.observe import Observer
+from khala_bridge.observe.image.album import Album
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_bridge.task.images import ImageSpec
+from khala_protocol.messages import Frames
+from khala_simulator.process.client import Client, command, interface
 
 BATTLES = {"2s3z": "llm_smac/2s3z", "2c_vs_64zg": "llm_smac/2c_vs_64zg", "pvz_task6": "llm_pysc2/pvz_task6_level1"}
 PICTURES = {

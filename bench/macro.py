@@ -1,4 +1,4 @@
-"""Asks the rules of `bridge.macro` in the middle of a game on the simulator and says what an answer costs.
+"""Asks the rules of `khala_bridge.auto` in the middle of a game on the simulator and says what an answer costs.
 
     python -m bench.macro            a table
     python -m bench.macro --json     one JSON object on stdout
@@ -20,13 +20,13 @@ from typing import Any
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.available import available, question
-from bridge.catalog import catalogue
-from bridge.ground import land_of
-from bridge.knowledge import knowledge
-from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.state import EpisodeInfo, Snapshot, read_info, read_snapshot
-from simulator.client import Client, interface
+from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.knowledge import knowledge
+from khala_bridge.state import EpisodeInfo, Snapshot, read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+from khala_bridge.state.ground import land_of
+from khala_simulator.process.client import Client, interface
 
 MAPS = ("Simple64", "Simple128")
 ACTIONS = (

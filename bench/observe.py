@@ -24,14 +24,14 @@ from typing import Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import Actor
-from bridge.functions import general
-from bridge.knowledge import knowledge
-from bridge.observe import Observer
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import AgentConfig, TaskConfig, TeamConfig
-from orchestrator.config import load_task
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.catalogue.functions import general
+from khala_bridge.knowledge import knowledge
+from khala_bridge.observe import Observer
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_orchestrator.config import load_task
+from khala_protocol.speech import parse
 
 BATTLES = {  # task: own units, enemy units
     "2s3z": ({"Stalker": 2, "Zealot": 3}, {"Stalker": 2, "Zealot": 3}),

@@ -25,18 +25,18 @@ from pydantic import BaseModel, ConfigDict
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import Actor
-from bridge.knowledge import knowledge
-from bridge.maps import MapSpec
-from bridge.observe import Observer
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import AgentConfig, TaskConfig
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.knowledge import knowledge
+from khala_bridge.observe import Observer
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.task.config import AgentConfig, TaskConfig
+from khala_bridge.task.maps import MapSpec
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.observe.observation import SideObservation
+    from khala_bridge.observe.observation import SideObservation
 
 CORPUS = Path(__file__).parent.parent / "tests" / "bridge" / "corpus"
 AGENT = "CombatGroup1"

@@ -19,10 +19,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from protocol.codec import encode
-from protocol.keys import Topic, agent_key, run_key
-from protocol.messages import ChatMessage, Exchange, Observation, Reply, Report, TeamView, UnitView, View
-from protocol.recording import Recorder, read
+from khala_protocol.codec import encode
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import ChatMessage, Exchange, Observation, Reply, Report, TeamView, UnitView, View
+from khala_protocol.recording import Recorder, read
 
 AGENTS = 8
 TEXT_BYTES = 20_000

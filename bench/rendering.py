@@ -22,12 +22,12 @@ from rich.table import Table
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.game import Game, Setup
-from simulator.api.layers import Frame
-from simulator.maps import load_map
+from khala_simulator.api.game import Game, Setup
+from khala_simulator.api.layers import Frame
+from khala_simulator.maps.game_map import load_map
 
 if TYPE_CHECKING:
-    from simulator.api.seat import Seat
+    from khala_simulator.api.seat import Seat
 
 SIZES = (128, 256, 512, 1024)
 MINIMAP = 128

@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.config import all_tasks
+from khala_orchestrator.config import all_tasks
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

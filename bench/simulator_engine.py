@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from simulator import commands, lifecycle
-from simulator.maps import load_map
-from simulator.placement import free_places
-from simulator.systems.triggers import players_of
-from simulator.tick import advance, new_game
-from simulator.world import World
+from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.movement.placement import free_places
+from khala_simulator.systems.triggers import players_of
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Callable

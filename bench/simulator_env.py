@@ -29,9 +29,9 @@ from absl import flags
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.compat import features, maps, run_configs, sc2_env
-from simulator.client import Client, command, interface
-from simulator.install import install
+from khala_bridge.compat import features, maps, run_configs, sc2_env
+from khala_simulator.process.client import Client, command, interface
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -21,8 +21,8 @@ from typing import Any
 from absl import flags
 
 from bench.simulator_env import make_env
-from bridge.compat import actions
-from simulator.install import install
+from khala_bridge.compat import actions
+from khala_simulator.process.install import install
 
 GOAL_MB, GOAL_START_S = 200, 1.5
 SETTLED = 10

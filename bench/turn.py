@@ -29,35 +29,35 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.original import step_s
-from bridge.act import Actor
-from bridge.observe import Observer
-from bridge.observe.teams import Roster, Team
 from khala import games
 from khala.children import Children
 from khala.local import one_side, shares
-from orchestrator.announce import Announcer
-from orchestrator.brief import briefing
-from orchestrator.config import MatchConfig, load_task
-from orchestrator.roster import Roster as Attendance
-from orchestrator.roster import Seat
-from orchestrator.turn import Question, Turn
-from protocol.bus import Delivery
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import open_bus
-from protocol.codec import decode_as
-from protocol.keys import Topic, every_agent
-from protocol.keys import parse as parse_key
-from protocol.messages import Exchange, Observation, Run
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.observe import Observer
+from khala_bridge.state.teams import Roster, Team
+from khala_orchestrator.announce import Announcer
+from khala_orchestrator.brief import briefing
+from khala_orchestrator.config import MatchConfig, load_task
+from khala_orchestrator.roster import Roster as Attendance
+from khala_orchestrator.roster import Seat
+from khala_orchestrator.turn import Question, Turn
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.codec import decode_as
+from khala_protocol.keys import Topic, every_agent
+from khala_protocol.keys import parse as parse_key
+from khala_protocol.messages import Exchange, Observation, Run
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from bridge.observe import SideObservation
-    from bridge.state import Snapshot
-    from bridge.task import AgentConfig, TaskConfig
-    from orchestrator.turn import Answer, Answers
-    from protocol.bus import Bus, Sample, Subscription
+    from khala_bridge.observe import SideObservation
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import AgentConfig, TaskConfig
+    from khala_orchestrator.turn import Answer, Answers
+    from khala_protocol.bus import Bus, Sample, Subscription
 
 GOALS_MS = {1: 10, 8: 20, 32: 45, 128: 150}
 PARTS = ("before", "bus", "agent", "http", "merge", "build")

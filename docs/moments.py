@@ -18,12 +18,12 @@ import numpy as np
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.painting import palette
-from simulator.api.painting.silhouettes import OUTLINES
-from simulator.api.painting.sprites import Look, wardrobe
-from simulator.api.sight import Alliance
-from simulator.catalog import load_catalog
-from simulator.client import Client, command, interface
+from khala_simulator.api.painting import palette
+from khala_simulator.api.painting.silhouettes import OUTLINES
+from khala_simulator.api.painting.sprites import Look, wardrobe
+from khala_simulator.api.sight import Alliance
+from khala_simulator.process.client import Client, command, interface
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from protocol.messages import Message, Observation, Reply, Report, Result, Run, UnitView
-from protocol.recording import read
-from protocol.speech import parse
+from khala_protocol.messages import Message, Observation, Reply, Report, Result, Run, UnitView
+from khala_protocol.recording import read
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,24 +15,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from agents.llm.vision import ANTHROPIC, OPENAI
-from agents.scripted.players import PLAYERS
-from bridge.imagespec import PAPER, ImageSpec
 from khala.local import one_side
-from orchestrator.config import MatchConfig, load_task
-from orchestrator.host import assemble
-from orchestrator.match import SilentObserver
-from orchestrator.roster import Seat
-from orchestrator.turn import Answer, Answers
-from protocol.messages import Reply
-from simulator.install import install
+from khala_agents.llm.vision import ANTHROPIC, OPENAI
+from khala_agents.scripted.players import PLAYERS
+from khala_bridge.task.images import PAPER, ImageSpec
+from khala_orchestrator.config import MatchConfig, load_task
+from khala_orchestrator.host import assemble
+from khala_orchestrator.match import SilentObserver
+from khala_orchestrator.roster import Seat
+from khala_orchestrator.turn import Answer, Answers
+from khala_protocol.messages import Reply
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from bridge.task import TaskConfig
-    from orchestrator.turn import Question
-    from protocol.messages import ImageRef
+    from khala_bridge.task.config import TaskConfig
+    from khala_orchestrator.turn import Question
+    from khala_protocol.messages import ImageRef
 
 DOCS = Path(__file__).parent
 OUT = DOCS / "images" / "seen"

@@ -16,12 +16,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from bridge.catalog import GROUPS, Action, catalogue, example
-from bridge.coverage import coverage
-from bridge.functions import functions
-from bridge.knowledge import knowledge
-from orchestrator.cli import Json
-from protocol.errors import ConfigError
+from khala_bridge.catalogue.catalogue import GROUPS, Action, catalogue, example
+from khala_bridge.catalogue.coverage import coverage
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import knowledge
+from khala_orchestrator.cli import Json
+from khala_protocol.errors import ConfigError
 
 EPILOG = """
 Examples:\n

@@ -15,7 +15,7 @@ import sys
 from collections import deque
 from typing import TYPE_CHECKING, Any, Self
 
-from protocol.errors import KhalaError
+from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,21 +16,21 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-import agents.cli
-import orchestrator.cli
-import simulator.cli
-import simulator.install
+import khala_agents.cli
+import khala_orchestrator.cli
+import khala_simulator.cli
+import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
 from khala.knowledge.cli import app as knowledge
-from orchestrator.cli import Insecure, Json, Listen
-from orchestrator.config import MatchConfig, change, load_task, new_run_name
-from orchestrator.console import Progress, stderr_console
-from protocol.bus.config import BusConfig
-from protocol.errors import ConfigError, KhalaError
-from protocol.keys import check_name
-from protocol.messages import Result, Wire
+from khala_orchestrator.cli import Insecure, Json, Listen
+from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
+from khala_orchestrator.console import Progress, stderr_console
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.errors import ConfigError, KhalaError
+from khala_protocol.keys import check_name
+from khala_protocol.messages import Result, Wire
 
 T = TypeVar("T")
 
@@ -215,16 +215,16 @@ def front_door(
 for command, epilog in (
     (run, RUN_EPILOG),
     (host, HOST_EPILOG),
-    (agents.cli.agent, agents.cli.AGENT_EPILOG),
-    (agents.cli.llm, agents.cli.LLM_EPILOG),
-    (orchestrator.cli.router, orchestrator.cli.ROUTER_EPILOG),
-    (orchestrator.cli.replay, orchestrator.cli.REPLAY_EPILOG),
-    (orchestrator.cli.tasks, None),
+    (khala_agents.cli.agent, khala_agents.cli.AGENT_EPILOG),
+    (khala_agents.cli.llm, khala_agents.cli.LLM_EPILOG),
+    (khala_orchestrator.cli.router, khala_orchestrator.cli.ROUTER_EPILOG),
+    (khala_orchestrator.cli.replay, khala_orchestrator.cli.REPLAY_EPILOG),
+    (khala_orchestrator.cli.tasks, None),
     (actions, ACTIONS_EPILOG),
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
-app.add_typer(simulator.cli.app, name="sc2")
+app.add_typer(khala_simulator.cli.app, name="sc2")
 app.add_typer(knowledge, name="knowledge")
 
 
@@ -233,7 +233,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     faults: list[BaseException] = []
     try:
         app(arguments, prog_name="khala")
-    except* (KhalaError, simulator.install.InstallError) as group:
+    except* (KhalaError, khala_simulator.process.install.InstallError) as group:
         faults = list(_leaves(group))
     for fault in faults:
         sys.stderr.write(f"khala: {fault}\n")
@@ -251,7 +251,7 @@ def _leaves(group: BaseExceptionGroup[Any]) -> Iterator[BaseException]:
 
 def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     """The match that the options describe; its recording is in a directory of its own below `out`."""
-    from bridge.observe import Observer  # noqa: PLC0415  # half a second that other commands do without
+    from khala_bridge.observe import Observer  # noqa: PLC0415  # half a second that other commands do without
 
     match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
     loaded = change(load_task(task), **given)

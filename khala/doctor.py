@@ -57,7 +57,7 @@ def _python() -> Iterator[Finding]:
 
 def _pysc2() -> Iterator[Finding]:
     try:
-        from bridge import compat  # noqa: PLC0415  # half a second that only this check needs
+        from khala_bridge import compat  # noqa: PLC0415  # half a second that only this check needs
     except ImportError as error:
         yield Finding("PySC2", "wrong", str(error), "run `make install`, or `uv sync`: it keeps enum34 out")
         return
@@ -73,7 +73,7 @@ def _pysc2() -> Iterator[Finding]:
 
 
 def _game() -> Iterator[Finding]:
-    from simulator.install import is_installed  # noqa: PLC0415
+    from khala_simulator.process.install import is_installed  # noqa: PLC0415
 
     given = os.environ.get("SC2PATH")
     if given is None:

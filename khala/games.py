@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from bridge.errors import GameMissing
-from bridge.game import find_sc2
 from khala import __version__
-from simulator.install import InstallError, install, is_installed
+from khala_bridge.errors import GameMissing
+from khala_bridge.game.game import find_sc2
+from khala_simulator.process.install import InstallError, install, is_installed
 
 
 def cache() -> Path:

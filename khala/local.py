@@ -11,27 +11,27 @@ import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from agents.build import Workshop
-from agents.config import WorkerSpec
-from bridge.act import executor_of
-from bridge.game import GameConfig, GameThread, OneSide
-from bridge.pysc2_game import PySC2Game
 from khala import games
 from khala.children import Children
-from orchestrator.host import host
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import open_bus
-from protocol.errors import RecordingError
-from protocol.messages import Report
+from khala_agents.build import Workshop
+from khala_agents.config import WorkerSpec
+from khala_bridge.act import executor_of
+from khala_bridge.game.game import GameConfig, GameThread, OneSide
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_orchestrator.host import host
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.errors import RecordingError
+from khala_protocol.messages import Report
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
     from pathlib import Path
     from typing import Any
 
-    from orchestrator.config import MatchConfig
-    from protocol.bus.zenoh import ZenohBus
-    from protocol.messages import Result, Wire
+    from khala_orchestrator.config import MatchConfig
+    from khala_protocol.bus.zenoh import ZenohBus
+    from khala_protocol.messages import Result, Wire
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""

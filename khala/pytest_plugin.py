@@ -18,7 +18,7 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from protocol.recording.difference import Difference
+    from khala_protocol.recording.difference import Difference
 
 
 @pytest.fixture

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from agents.policy import as_policy
-from agents.replay import replay_agent
 from khala import games
 from khala.local import one_side
-from orchestrator.replay import recorded_config, replay
-from protocol.recording import Recording
+from khala_agents.policy import as_policy
+from khala_agents.replay import replay_agent
+from khala_orchestrator.replay import recorded_config, replay
+from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from protocol.recording.difference import Difference
+    from khala_protocol.recording.difference import Difference
 
 __all__ = ["replay_agents", "replay_host"]
 
@@ -44,7 +44,7 @@ async def replay_agents(path: Path | str, policies: Mapping[str, object] | None 
 
     Args:
         path: a recording.
-        policies: by agent, a policy or what `agents.policy.as_policy` makes one of; the others decide with their
+        policies: by agent, a policy or what `khala_agents.policy.as_policy` makes one of; the others decide with their
             recorded completions.
     """
     recording = Recording.open(path)

@@ -6,16 +6,16 @@ import re
 from itertools import groupby, takewhile
 from typing import TYPE_CHECKING
 
-from bridge.catalog import GROUPS, catalogue, example
-from bridge.coverage import coverage
-from bridge.generated import GROUP
 from docs.pages.markdown import code, codes, head, join, table
+from khala_bridge.catalogue.catalogue import GROUPS, catalogue, example
+from khala_bridge.catalogue.coverage import coverage
+from khala_bridge.catalogue.generated import GROUP
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.catalog import Action
-    from bridge.coverage import Coverage
+    from khala_bridge.catalogue.catalogue import Action
+    from khala_bridge.catalogue.coverage import Coverage
 
 RACES = {None: "Every race", "protoss": "Protoss", "terran": "Terran", "zerg": "Zerg"}
 SHOWN = 6
@@ -28,7 +28,7 @@ def actions() -> str:
     written = [action for action in catalogue().values() if action.group != GROUP]
     made = [action for action in catalogue().values() if action.group == GROUP]
     return join(
-        head("Actions", "`bridge/data/actions` and `bridge/generated.py`"),
+        head("Actions", "`bridge/khala_bridge/data/actions` and `bridge/khala_bridge/catalogue/generated.py`"),
         f"What an agent may say between `<` and `>`: {len(written)} actions with words of their own, and {len(made)} "
         "that follow from PySC2's functions. A task lists the ones that each of its unit types has, one by one or in "
         "groups: `group:skill`, for the actions of a side `group:train/protoss`. `khala actions` shows the same on the "
@@ -50,7 +50,7 @@ def functions() -> str:
     kinds = sorted({row.function.kind for row in rows})
     counts = [_counts(kind, [row for row in rows if row.function.kind == kind]) for kind in kinds]
     return join(
-        head("Functions", "`bridge.coverage`"),
+        head("Functions", "`khala_bridge.catalogue.coverage`"),
         f"PySC2 has {len(rows)} functions. {len(reached)} can be reached in words. {len(interface)} are those of its "
         f"interface, {len(gone)} belong to what version 4.10 of the game does not have; both are listed first, each "
         "with the reason. `khala actions --function NAME` tells of one.",

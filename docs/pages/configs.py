@@ -6,12 +6,12 @@ import inspect
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from agents.config import CONFIGS, AgentsFile, ModelConfig, load_model, model_files
-from agents.llm.profiles import PROFILES, Profile
-from bridge import task
-from bridge.observe import teams
 from docs.pages.markdown import code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts
+from khala_agents.config import CONFIGS, AgentsFile, ModelConfig, load_model, model_files
+from khala_agents.llm.profiles import PROFILES, Profile
+from khala_bridge.state import teams
+from khala_bridge.task import config
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 NAMES: dict[object, str] = {
-    task.KeyName: "name",
-    task.UnitTypeName: "[unit type](units.md)",
-    task.ActionName: "[action](actions.md)",
-    task.MapName: "[map](maps.md)",
+    config.KeyName: "name",
+    config.UnitTypeName: "[unit type](units.md)",
+    config.ActionName: "[action](actions.md)",
+    config.MapName: "[map](maps.md)",
 }
 """Names that are checked while a file is read; the first one may stand in a key of the bus."""
 DESCRIBER = Describer(NAMES)
@@ -33,11 +33,11 @@ def task_files() -> str:
     """What stands in a task file."""
     example = CONFIGS / "tasks" / "llm_smac" / "2s3z_pair.yaml"
     return join(
-        head("Task files", "the models in `bridge/task.py`"),
+        head("Task files", "the models in `bridge/khala_bridge/task/config.py`"),
         "YAML. A path to such a file can be given wherever a task is named; the shipped ones are [listed](tasks.md). "
         "A mistake is reported with file, line and field. A name has 1 to 64 letters, digits, `_`, `.` or `-`.",
         "Of the rules of the clock, `frozen` is the only one that is played so far.",
-        *_sections(task.TaskConfig, "##"),
+        *_sections(config.TaskConfig, "##"),
         "## Which unit answers to whom",
         _grouping(),
         "## Example",
@@ -48,7 +48,9 @@ def task_files() -> str:
 def model_files_page() -> str:
     """What stands in a model file and in a file of agents, which ones ship, and what profiles differ in."""
     return join(
-        head("Model files and agents files", "the models in `agents/config.py` and the files in `configs/`"),
+        head(
+            "Model files and agents files", "the models in `agents/khala_agents/config.py` and the files in `configs/`"
+        ),
         "YAML. A model is given by the name of a shipped file or by a path that ends in `.yaml`. No file holds a key: "
         "it names the environment variable that does.",
         "## Shipped models",
@@ -78,7 +80,7 @@ def _file(path: Path, language: str) -> tuple[str, str]:
 
 
 def _grouping() -> str:
-    """The rules of `bridge.observe.teams`, without its title and its sources."""
+    """The rules of `khala_bridge.state.teams`, without its title and its sources."""
     _, *paragraphs = (inspect.getdoc(teams) or "").split("\n\n")
     return prose("\n\n".join(text for text in paragraphs if not text.startswith("The head")))
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from bridge.maps import known_maps
 from docs.pages.markdown import code, codes, head, join, table
-from orchestrator.config import all_tasks, task_files
-from protocol.messages import LOOPS_PER_S
-from simulator.maps import MapError, load_map
-from simulator.tick import new_game
+from khala_bridge.task.maps import known_maps
+from khala_orchestrator.config import all_tasks, task_files
+from khala_protocol.messages import LOOPS_PER_S
+from khala_simulator.maps.game_map import MapError, load_map
+from khala_simulator.tick import new_game
 
 if TYPE_CHECKING:
-    from bridge.maps import MapSpec
-    from bridge.task import AgentConfig, TaskConfig
-    from simulator.world import World
+    from khala_bridge.task.config import AgentConfig, TaskConfig
+    from khala_bridge.task.maps import MapSpec
+    from khala_simulator.world.world import World
 
 AGENTS, OPPONENT = 1, 2
 """Player numbers on the shipped maps."""
@@ -41,7 +41,7 @@ def maps() -> str:
     """Every known map, and what stands on it in the simulator."""
     rows = [_map_row(spec) for spec in known_maps().values()]
     return join(
-        head("Maps", "`bridge/data/maps.yaml` and `simulator/data/maps`"),
+        head("Maps", "`bridge/khala_bridge/data/maps.yaml` and `simulator/khala_simulator/data/maps`"),
         "Files are below the directory `Maps` of the install. What stands on a map, and when it ends, is the map's own "
         "affair; the last columns are what the simulator's maps hold.",
         table(("map", "file", "race", "against", "limit", "cells", "agents' units", "enemy units"), rows),

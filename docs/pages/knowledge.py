@@ -1,19 +1,19 @@
-"""The pages of what is known of the game: unit types, abilities and upgrades, out of `bridge.knowledge`."""
+"""The pages of what is known of the game: unit types, abilities and upgrades, out of `khala_bridge.knowledge`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bridge.knowledge import RACES, VERSION, VERSIONS, abilities, knowledge, upgrades
-from bridge.knowledge.load import words_of
-from bridge.knowledge.words import number as n
-from bridge.knowledge.words import price
 from docs.pages.markdown import code, codes, head, join, table
+from khala_bridge.knowledge import RACES, VERSION, VERSIONS, abilities, knowledge, upgrades
+from khala_bridge.knowledge.load import words_of
+from khala_bridge.knowledge.words import number as n
+from khala_bridge.knowledge.words import price
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bridge.knowledge import AbilityFacts, UnitType, UpgradeFacts, Weapon
+    from khala_bridge.knowledge import AbilityFacts, UnitType, UpgradeFacts, Weapon
 
 SOURCE = "`bridge/data/knowledge`"
 MAKING = {"train", "warp_in", "build", "build_addon", "grow", "structure_morph"}

@@ -5,15 +5,15 @@ from __future__ import annotations
 import inspect
 
 from docs.pages.markdown import fence, head, join
-from protocol import speech
-from protocol.speech import arguments, headings
+from khala_protocol import speech
+from khala_protocol.speech import arguments, headings
 
 
 def page() -> str:
     """What a reply looks like, and the rules of tolerance."""
     _, example, *paragraphs = (inspect.getdoc(speech) or "").split("\n\n")
     return join(
-        head("The text language", "the docstrings of `protocol/speech`"),
+        head("The text language", "the docstrings of `protocol/khala_protocol/speech`"),
         "What an agent says. Names of actions and what they take are in [the catalogue](actions.md).",
         fence(inspect.cleandoc(example)),
         *(text for text in paragraphs if text.startswith("`parse`")),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts, remarks
-from protocol import keys, messages
-from protocol.messages import MESSAGE_TYPES, Wire
+from khala_protocol import keys, messages
+from khala_protocol.messages import MESSAGE_TYPES, Wire
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -22,7 +22,7 @@ LITERALS = {"AgentStatus": "AgentReport.status", "RejectionReason": "Rejection.r
 def page() -> str:
     """Keys, messages, their parts, and what single words mean."""
     return join(
-        head("Messages", "`protocol/messages.py` and `protocol/keys.py`"),
+        head("Messages", "`protocol/khala_protocol/messages.py` and `protocol/khala_protocol/keys.py`"),
         "UTF-8 JSON, one object a message, told apart by `kind`. Unknown fields are errors, and so is another major "
         "version `v`. How they are delivered: [the bus](../design/bus.md).",
         "## Keys",

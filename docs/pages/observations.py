@@ -5,17 +5,17 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING
 
-from bridge.observe.text import SECTIONS_OF, find_sections
 from docs.pages.markdown import code, codes, head, join, table
+from khala_bridge.observe.text import SECTIONS_OF, find_sections
 
 if TYPE_CHECKING:
-    from bridge.observe.text import Section
+    from khala_bridge.observe.text import Section
 
 
 def page() -> str:
     """Sections, who has which, and what a short page leaves out."""
     return join(
-        head("Observations", "`bridge/observe/text`"),
+        head("Observations", "`bridge/khala_bridge/observe/text`"),
         "An observation is a text of sections. Which ones an agent has follows from its `kind`, unless its task names "
         "them (`sections`, see [task files](task-files.md)). A section with nothing to say is left out. To write one of"
         " your own: [sections](../how-to/sections.md). Why it is built so: [observations](../design/observation.md).",

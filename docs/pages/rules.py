@@ -11,15 +11,15 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, codes, head, join, table
-from simulator import stats
-from simulator.casting import ORDINARY, is_modelled
-from simulator.catalog import VERSION_OF_BUILD, load_catalog
-from simulator.skills.registry import DEATHS, PASSIVES, SKILLS
+from khala_simulator.abilities.casting import ORDINARY, is_modelled
+from khala_simulator.abilities.registry import DEATHS, PASSIVES, SKILLS
+from khala_simulator.tables import stats
+from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from simulator.catalog import Ability, Catalog, UnitType, Upgrade
+    from khala_simulator.tables.catalog import Ability, Catalog, UnitType, Upgrade
 
 RACES = ("protoss", "terran", "zerg")
 IMPLEMENTED, ESTIMATED, MISSING = "implemented", "estimated", "not modelled"
@@ -31,7 +31,10 @@ def page() -> str:
     catalog = load_catalog()
     abilities = melee_abilities(catalog)
     return join(
-        head("Rules of combat", "`simulator/data/tables`, `simulator/skills` and `simulator/systems`"),
+        head(
+            "Rules of combat",
+            "`simulator/data/tables`, `simulator/khala_simulator/abilities` and `simulator/khala_simulator/systems`",
+        ),
         "What of StarCraft II the simulator models. *Implemented*: the numbers are the game's and the rule is known. "
         "*Estimated*: it works, and what is said beside it could not be taken from a source. *Not modelled*: it is "
         "answered with `NotSupported`, or has no effect. Every ability that is not *not modelled* is used once, with "

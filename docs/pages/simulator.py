@@ -10,23 +10,23 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import simulator.api
+import khala_simulator.api
 from docs.pages.markdown import code, codes, head, join, prose, table
-from simulator.api.data import rows as api_rows
-from simulator.api.requests import HANDLERS
-from simulator.casting import is_modelled
-from simulator.catalog import VERSION_OF_BUILD, load_catalog
-from simulator.install import BASE_BUILD
-from simulator.maps import load_map, map_names
-from simulator.mechanics import entries
-from simulator.status import AFTER, LEGAL, Status
-from simulator.tick import SYSTEMS
+from khala_simulator.abilities.casting import is_modelled
+from khala_simulator.api.data import rows as api_rows
+from khala_simulator.maps.game_map import load_map, map_names
+from khala_simulator.process.install import BASE_BUILD
+from khala_simulator.process.requests import HANDLERS
+from khala_simulator.process.status import AFTER, LEGAL, Status
+from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.mechanics import entries
+from khala_simulator.tick import SYSTEMS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.mechanics import Entry
-    from simulator.world import World
+    from khala_simulator.tables.mechanics import Entry
+    from khala_simulator.world.world import World
 
 SOURCES = "SOURCES.md"
 REFUSAL = "not supported"
@@ -39,9 +39,9 @@ SOURCED = {"catalog": "the game's data", "replay": "recorded games"}
 def page() -> str:
     """Everything that a reader of results must know of the game that was played."""
     return join(
-        head("The simulator", "`simulator/data` and the simulator's own tables"),
+        head("The simulator", "`simulator/khala_simulator/data` and the simulator's own tables"),
         "How it is built: [design](../design/simulator.md). Where the data is from: "
-        "[SOURCES.md](../../simulator/data/SOURCES.md).",
+        "[SOURCES.md](../../simulator/khala_simulator/data/SOURCES.md).",
         _tables(),
         "## One game loop",
         "The laws of the world, in the order in which they apply.",
@@ -160,7 +160,7 @@ def _short(names: list[str]) -> list[str]:
 
 def _chapter(title: str) -> str:
     """A chapter of the data's own account of its sources."""
-    text = (resources.files("simulator.data") / SOURCES).read_text(encoding="utf-8")
+    text = (resources.files("khala_simulator.data") / SOURCES).read_text(encoding="utf-8")
     return prose(text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip())
 
 
@@ -171,7 +171,7 @@ def _refused() -> str:
 
 def _refusals() -> list[str]:
     """The sentences with which requests are refused, where the game would do what is asked."""
-    directory = Path(next(iter(simulator.api.__path__)))
+    directory = Path(next(iter(khala_simulator.api.__path__)))
     constants = (
         node.value
         for path in sorted(directory.glob("*.py"))

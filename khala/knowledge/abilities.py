@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from bridge.functions import functions_of
 from khala.knowledge.measures import in_seconds, plain, seconds, sparse
 from khala.knowledge.melee import melee_types
 from khala.knowledge.naming import ability_name, table_name, unit_name, unit_names, upgrade_name, upgrade_names
-from simulator.abilities import AIMS
+from khala_bridge.catalogue.functions import functions_of
+from khala_simulator.tables.abilities import AIMS
 
 if TYPE_CHECKING:
-    from simulator.abilities import Ability, Filter, Need
-    from simulator.catalog import Catalog
-    from simulator.records import Upgrade
+    from khala_simulator.tables.abilities import Ability, Filter, Need
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.tables.records import Upgrade
 
 TARGETS: Final = {aim: name for name, aim in AIMS.items()}
 EVERYWHERE: Final = 500

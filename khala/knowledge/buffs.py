@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from khala.knowledge.measures import plain, seconds, sparse
 
 if TYPE_CHECKING:
-    from simulator.buff_kinds import Buff
-    from simulator.catalog import Catalog
+    from khala_simulator.tables.buffs import Buff
+    from khala_simulator.tables.catalog import Catalog
 
 
 def buff_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:

@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 import typer
 
-from bridge.knowledge.facts import VERSIONS
-from bridge.knowledge.lookup import find, long
-from orchestrator.cli import Json
-from protocol.errors import KhalaError
+from khala_bridge.knowledge.facts import VERSIONS
+from khala_bridge.knowledge.lookup import find, long
+from khala_orchestrator.cli import Json
+from khala_protocol.errors import KhalaError
 
 SHOW_EPILOG = """
 Examples:\n
@@ -64,7 +64,7 @@ def write(
     """Make the facts in bridge/data/knowledge anew from the simulator's tables.
 
     To be done after a change of the tables: one line is one unit type, ability, upgrade or buff. Words about them, in
-    bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts by themselves.
+    bridge/khala_bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts by themselves.
     """
     from khala.knowledge import files  # noqa: PLC0415  # the tables and PySC2's names: seconds that --help need not wait
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from bridge import data
 from khala.knowledge.abilities import ability_facts
 from khala.knowledge.buffs import buff_facts
 from khala.knowledge.units import unit_facts
 from khala.knowledge.upgrades import upgrade_facts
-from simulator.catalog import load_catalog
+from khala_bridge import data
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from pathlib import Path

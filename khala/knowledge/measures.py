@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from protocol.messages import LOOPS_PER_S
-from simulator.catalog import LOOPS_PER_NORMAL_SECOND
+from khala_protocol.messages import LOOPS_PER_S
+from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 
 FASTER: Final = LOOPS_PER_S / LOOPS_PER_NORMAL_SECOND
 """Normal seconds in a second of the speed "faster"."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from simulator.catalog import Catalog
+    from khala_simulator.tables.catalog import Catalog
 
 
 @functools.cache

@@ -9,12 +9,12 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Final
 
-from bridge import names
-from bridge.functions import functions
-from simulator.catalog import load_catalog
+from khala_bridge import names
+from khala_bridge.catalogue.functions import functions
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
-    from simulator.abilities import Ability
+    from khala_simulator.tables.abilities import Ability
 
 PYSC2_VERSION: Final = "4.10"
 """Version of the game whose numbers PySC2's tables have."""
@@ -65,5 +65,5 @@ def ability_name(ability: Ability) -> str:
 
 
 def _made_up(name: str) -> bool:
-    """Whether `bridge.names` knew no name for a number and made one of it."""
+    """Whether `khala_bridge.names` knew no name for a number and made one of it."""
     return name.removeprefix("Unit").isdigit() or name.removeprefix("Upgrade").isdigit()

@@ -16,8 +16,8 @@ from khala.knowledge.naming import unit_name, unit_names
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from simulator.catalog import Catalog
-    from simulator.records import Hit, Production, UnitType, Weapon
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.tables.records import Hit, Production, UnitType, Weapon
 
 
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:

@@ -9,8 +9,8 @@ from khala.knowledge.measures import per_second, plain, seconds, sparse
 from khala.knowledge.naming import unit_name, unit_names, upgrade_name, upgrade_names
 
 if TYPE_CHECKING:
-    from simulator.catalog import Catalog
-    from simulator.records import Change, UnitType, Upgrade
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.tables.records import Change, UnitType, Upgrade
 
 UNIT_FIELDS: Final = {
     "Speed": ("speed", "speed_n"),

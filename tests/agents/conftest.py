@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
-from agents.llm.client import Completion, LLMError, Request
-from protocol.bus import Delivery
-from protocol.bus.memory import MemoryBroker, MemoryBus
-from protocol.codec import decode, encode
-from protocol.keys import RUN_TOPICS, Topic, agent_key, every_agent, run_key
-from protocol.messages import (
+from khala_agents.llm.client import Completion, LLMError, Request
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.memory import MemoryBroker, MemoryBus
+from khala_protocol.codec import decode, encode
+from khala_protocol.keys import RUN_TOPICS, Topic, agent_key, every_agent, run_key
+from khala_protocol.messages import (
     ActionSpec,
     Briefing,
     Casualties,
@@ -34,7 +34,7 @@ W = TypeVar("W", bound=Wire)
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Mapping
 
-    from protocol.bus import Publisher, Sample, Subscription
+    from khala_protocol.bus import Publisher, Sample, Subscription
 
 RUN, SIDE, AGENT = "test", "blue", "Stalkers"
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agents.build import Workshop
-from agents.config import ModelConfig, WorkerSpec
-from agents.llm_policy import LLMPolicy
-from protocol.configfile import loads
-from protocol.errors import ConfigError
+from khala_agents.build import Workshop
+from khala_agents.config import ModelConfig, WorkerSpec
+from khala_agents.llm_policy import LLMPolicy
+from khala_protocol.configfile import loads
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,20 +13,20 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents import cli
-from protocol.bus import Delivery
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import open_bus
-from protocol.codec import decode_as, encode
-from protocol.errors import KhalaError
-from protocol.keys import Topic, agent_key, every_agent
-from protocol.messages import Reply
+from khala_agents import cli
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.errors import KhalaError
+from khala_protocol.keys import Topic, agent_key, every_agent
+from khala_protocol.messages import Reply
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
     from pathlib import Path
 
-    from protocol.messages import Briefing, Observation
+    from khala_protocol.messages import Briefing, Observation
 
 app = typer.Typer(pretty_exceptions_enable=False)
 app.command(epilog=cli.AGENT_EPILOG)(cli.agent)

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agents.build import Workshop, client_for, load_policy
-from agents.config import WorkerSpec, load_agents, load_model, model_files
-from agents.llm.anthropic import Anthropic
-from agents.llm.openai_compatible import OpenAICompatible
-from agents.llm_policy import LLMPolicy
-from agents.policy import FunctionPolicy, ObjectPolicy
-from agents.scripted.policies import Silent
-from protocol.configfile import loads
-from protocol.errors import ConfigError
+from khala_agents.build import Workshop, client_for, load_policy
+from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
+from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.policy import FunctionPolicy, ObjectPolicy
+from khala_agents.scripted.policies import Silent
+from khala_protocol.configfile import loads
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-from agents.config import AgentsFile, ModelConfig
+from khala_agents.config import AgentsFile, ModelConfig
 
 KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY")
 ROOT = Path(__file__).resolve().parents[2]
@@ -170,7 +170,7 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (tmp_path / "my_agent.py").write_text(
         "def decide(briefing, observation):\n    return 'text'\n\n"
         "class Mine:\n    async def decide(self, briefing, observation):\n        return 'text'\n\n"
-        "from agents.policy import Policy\n\n"
+        "from khala_agents.policy import Policy\n\n"
         "class Whole(Policy):\n    async def decide(self, context):\n        return 'text'\n\n"
         "mine = Mine()\nnumber = 3\n",
         encoding="utf-8",

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.build import replay_policies
-from agents.llm.client import LLMError, Unavailable, Unreachable
-from agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
-from agents.llm.pricing import Prices
-from agents.llm.replay import NotRecorded
-from agents.llm.retry import RetryRule
-from agents.llm_policy import LLMPolicy
-from agents.memory import LastSteps
-from agents.policy import Context
-from protocol.codec import decode_as, encode
-from protocol.messages import Exchange, Usage
+from khala_agents.build import replay_policies
+from khala_agents.llm.client import LLMError, Unavailable, Unreachable
+from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.replay import NotRecorded
+from khala_agents.llm.retry import RetryRule
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.memory import LastSteps
+from khala_agents.policy import Context
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.messages import Exchange, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from protocol.messages import Briefing, Observation
+    from khala_protocol.messages import Briefing, Observation
 
 CLOCK = "jumps"
 BUSY = Unavailable("busy", status="http 429")

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agents.policy import Context, FunctionPolicy, ObjectPolicy, Policy, as_policy
+from khala_agents.policy import Context, FunctionPolicy, ObjectPolicy, Policy, as_policy
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from protocol.messages import Briefing, Observation
+    from khala_protocol.messages import Briefing, Observation
 
 CLOCK = "jumps"
 

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agents.memory import LastSteps, NoMemory
-from agents.prompt import Prompt, system_text
-from protocol.messages import ActionSpec, ChatMessage, Clock, Correspondent, TeamSpec
-from protocol.speech import parse
+from khala_agents.memory import LastSteps, NoMemory
+from khala_agents.prompt import Prompt, system_text
+from khala_protocol.messages import ActionSpec, ChatMessage, Clock, Correspondent, TeamSpec
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from protocol.messages import Briefing, ClockRule, Observation
+    from khala_protocol.messages import Briefing, ClockRule, Observation
 
 SYSTEM = """\
 # Who you are

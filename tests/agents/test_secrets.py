@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from aiohttp import web
 
-from agents.build import Workshop, client_for
-from agents.config import ModelConfig, WorkerSpec
-from agents.secret import MASK, read_key, scrub
-from agents.worker import run_worker
-from protocol.bus import Delivery
-from protocol.errors import ConfigError
-from protocol.keys import everything
+from khala_agents.build import Workshop, client_for
+from khala_agents.config import ModelConfig, WorkerSpec
+from khala_agents.secret import MASK, read_key, scrub
+from khala_agents.worker import run_worker
+from khala_protocol.bus import Delivery
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import everything
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
     from pathlib import Path
 
-    from protocol.bus.memory import MemoryBroker
-    from protocol.messages import Briefing, Observation
+    from khala_protocol.bus.memory import MemoryBroker
+    from khala_protocol.messages import Briefing, Observation
 
 KEY = "sk-very-secret-0123456789abcdef"
 
@@ -124,7 +124,7 @@ async def test_a_key_is_in_no_log_message_or_recording_even_if_the_server_echoes
 async def test_a_key_is_in_no_error_of_a_client(echoing_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import traceback
 
-    from agents.llm.client import LLMError, Request
+    from khala_agents.llm.client import LLMError, Request
 
     monkeypatch.setenv("ECHO_KEY", KEY)
     config = ModelConfig(profile="compatible", model="m", base_url=echoing_server, api_key_env="ECHO_KEY")

@@ -12,25 +12,25 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.build import replay_policies
-from agents.llm.limits import Limits, Ticket
-from agents.llm.replay import NotRecorded
-from agents.llm.vision import ANTHROPIC, Vision
-from agents.llm_policy import LLMPolicy
-from agents.memory import LastSteps
-from agents.pictures import Pictures
-from agents.policy import Context, Policy
-from agents.worker import run_worker
-from protocol.bus import Delivery
-from protocol.codec import decode_as, encode
-from protocol.keys import image_key
-from protocol.messages import Exchange, ImageRef
+from khala_agents.build import replay_policies
+from khala_agents.llm.limits import Limits, Ticket
+from khala_agents.llm.replay import NotRecorded
+from khala_agents.llm.vision import ANTHROPIC, Vision
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.memory import LastSteps
+from khala_agents.pictures import Pictures
+from khala_agents.policy import Context, Policy
+from khala_agents.worker import run_worker
+from khala_protocol.bus import Delivery
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.keys import image_key
+from khala_protocol.messages import Exchange, ImageRef
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Mapping
 
-    from protocol.bus.memory import MemoryBroker
-    from protocol.messages import Briefing, Observation
+    from khala_protocol.bus.memory import MemoryBroker
+    from khala_protocol.messages import Briefing, Observation
 
 CLOCK = "jumps"
 RUN, SIDE, AGENT = "test", "blue", "Stalkers"

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.llm.client import LLMError, Refused
-from agents.llm.limits import Budget, Limits
-from agents.llm.pricing import Prices
-from agents.llm_policy import LLMPolicy
-from agents.policy import Decision, FunctionPolicy, Policy
-from agents.scripted.policies import Fixed
-from agents.worker import Tally, run_worker, run_workers
-from protocol.errors import BusError
-from protocol.keys import Topic, every_agent
-from protocol.messages import Exchange, Reply, Usage
+from khala_agents.llm.client import LLMError, Refused
+from khala_agents.llm.limits import Budget, Limits
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.policy import Decision, FunctionPolicy, Policy
+from khala_agents.scripted.policies import Fixed
+from khala_agents.worker import Tally, run_worker, run_workers
+from khala_protocol.errors import BusError
+from khala_protocol.keys import Topic, every_agent
+from khala_protocol.messages import Exchange, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
 
-    from agents.policy import Context, Said
-    from protocol.bus import Delivery
-    from protocol.bus.memory import MemoryBroker, MemoryBus
-    from protocol.messages import Briefing, Observation, Result, Run
+    from khala_agents.policy import Context, Said
+    from khala_protocol.bus import Delivery
+    from khala_protocol.bus.memory import MemoryBroker, MemoryBus
+    from khala_protocol.messages import Briefing, Observation, Result, Run
 
 CLOCK = "jumps"
 RUN, SIDE, AGENT = "test", "blue", "Stalkers"

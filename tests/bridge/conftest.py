@@ -10,12 +10,12 @@ import pytest
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.knowledge import knowledge
-from bridge.maps import known_maps
-from bridge.standard import standard_task
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import TaskConfig
-from protocol.configfile import load
+from khala_bridge.knowledge import knowledge
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.task.config import TaskConfig
+from khala_bridge.task.maps import known_maps
+from khala_bridge.task.standard import standard_task
+from khala_protocol.configfile import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 
-from bridge.act import Actor, Command, JointAction
-from bridge.frames import WorldPoint
-from bridge.observe import Observer
-from bridge.task import AgentConfig
-from protocol.messages import RejectionReason
-from protocol.speech import parse
+from khala_bridge.act import Actor, Command, JointAction
+from khala_bridge.frames import WorldPoint
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import AgentConfig
+from khala_protocol.messages import RejectionReason
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
 

@@ -6,23 +6,23 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.act import Actor, JointAction
-from bridge.catalog import catalogue
-from bridge.frames import WorldPoint
-from bridge.functions import functions
-from bridge.macro import RULES, Impossible, Order
-from bridge.observe import Observer
-from bridge.task import AgentConfig, AutoConfig
-from protocol.speech import parse
+from khala_bridge.act import Actor, JointAction
+from khala_bridge.auto import RULES, Impossible, Order
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.frames import WorldPoint
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import AgentConfig, AutoConfig
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.macro import Ask
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.auto import Ask
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
 
@@ -179,7 +179,7 @@ def test_what_the_host_does_by_itself_comes_last_and_is_nobodys_word(
         told.append(_[-1])  # type: ignore[arg-type]  # the tags that agents ordered
         return [Order(functions()["Train_Probe_quick"], (NEXUS,))] if auto.train_workers else []
 
-    monkeypatch.setattr("bridge.act.actor.automatic", automatic)
+    monkeypatch.setattr("khala_bridge.act.actor.automatic", automatic)
     joint = act("Team Stalker-1:\n<Stop()>", auto=AutoConfig(train_workers=True))
     assert [(command.said is None, command.units) for command in joint.commands] == [(False, (S,)), (True, (NEXUS,))]
     assert told == [frozenset({S})]

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge import macro
-from bridge.action import Action
-from bridge.catalog import GROUPS, catalogue, catalogue_sha256, chosen, curated, example, read
-from bridge.errors import CatalogueError
-from bridge.knowledge import abilities, ability_of, knowledge
+from khala_bridge import auto
+from khala_bridge.catalogue.action import Action
+from khala_bridge.catalogue.catalogue import GROUPS, catalogue, catalogue_sha256, chosen, curated, example, read
+from khala_bridge.errors import CatalogueError
+from khala_bridge.knowledge import abilities, ability_of, knowledge
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -86,7 +86,7 @@ def test_actions_have_what_is_common_to_their_file_and_what_is_their_own(tmp_pat
 
 
 def test_every_rule_that_an_action_names_is_there() -> None:
-    assert {action.rule for action in catalogue().values() if action.rule} <= set(macro.RULES)
+    assert {action.rule for action in catalogue().values() if action.rule} <= set(auto.RULES)
 
 
 def test_what_is_written_of_an_action_can_be_shown_to_a_model(subtests: pytest.Subtests) -> None:
@@ -180,7 +180,7 @@ def test_the_hash_changes_with_nothing_but_the_catalogue() -> None:
 
 
 def test_the_catalogue_needs_no_pysc2() -> None:
-    script = "import sys, bridge.catalog as c; c.catalogue(); sys.exit('pysc2' in sys.modules)"
+    script = "import sys, khala_bridge.catalogue.catalogue as c; c.catalogue(); sys.exit('pysc2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from bridge.compat import old_shuffle, protobuf_kind
+from khala_bridge.compat import old_shuffle, protobuf_kind
 
-IMPORT = "import bridge.compat"
+IMPORT = "import khala_bridge.compat"
 UNCHANGED = f"""
 import os, random, sys, warnings
 filters, shuffle, environ, path = list(warnings.filters), random.shuffle, dict(os.environ), list(sys.path)

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.catalog import catalogue
-from bridge.compat import actions as pysc2
-from bridge.coverage import coverage
-from bridge.functions import functions
-from bridge.generated import without_words
-from bridge.knowledge import abilities
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.coverage import coverage
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.catalogue.generated import without_words
+from khala_bridge.compat import actions as pysc2
+from khala_bridge.knowledge import abilities
 
 if TYPE_CHECKING:
-    from bridge.catalog import Action
+    from khala_bridge.catalogue.catalogue import Action
 
 ORDERS = [action for action in catalogue().values() if action.function]
 CHILDREN_OF_CASTERS = {"InfestedTerran", "InfestedTerranBurrowed"}

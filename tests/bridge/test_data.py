@@ -6,14 +6,14 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bridge import data
-from bridge.catalog import catalogue, catalogue_sha256
-from bridge.compat import upgrades
-from bridge.functions import check_against_pysc2
-from bridge.knowledge import knowledge
-from bridge.maps import known_maps
-from bridge.names import unit_name
-from bridge.standard import standard_task
+from khala_bridge import data
+from khala_bridge.catalogue.catalogue import catalogue, catalogue_sha256
+from khala_bridge.catalogue.functions import check_against_pysc2
+from khala_bridge.compat import upgrades
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import unit_name
+from khala_bridge.task.maps import known_maps
+from khala_bridge.task.standard import standard_task
 
 if TYPE_CHECKING:
     import pytest

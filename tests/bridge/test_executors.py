@@ -10,23 +10,23 @@ import pytest
 from s2clientprotocol import common_pb2, error_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import Actor, JointAction, executor_of
-from bridge.act.raw import RawExecutor
-from bridge.act.screen import ScreenExecutor
-from bridge.compat import actions as pysc2
-from bridge.frames import WorldPoint
-from bridge.functions import functions
-from bridge.observe import Observer
-from protocol.speech import parse
+from khala_bridge.act import Actor, JointAction, executor_of
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.compat import actions as pysc2
+from khala_bridge.frames import WorldPoint
+from khala_bridge.observe import Observer
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.act import Command, Executor, Played, Step
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.act import Command, Executor, Played, Step
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
     Snap = Callable[..., Snapshot]

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.compat import features, point
-from bridge.frames import Camera, MapFrame, MinimapPoint, ScreenPoint, WorldPoint
+from khala_bridge.compat import features, point
+from khala_bridge.frames import Camera, MapFrame, MinimapPoint, ScreenPoint, WorldPoint
 
 WORLD = st.floats(0, 200, allow_nan=False)
 MAPS = (MapFrame(32, 32, (0, 0, 32, 32)), MapFrame(96, 60, (0, 23, 96, 52)), MapFrame(88, 96, (10, 8, 80, 90)))

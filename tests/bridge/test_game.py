@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.act import JointAction, Played, Step
-from bridge.act.raw import RawExecutor
-from bridge.errors import GameError, GameHangs, GameMissing
-from bridge.game import GameConfig, GameInfo, GameThread, OneSide, StepResult, find_sc2
-from bridge.maps import known_maps
-from bridge.pysc2_game import PySC2Game
-from bridge.state import EpisodeInfo
-from protocol.errors import KhalaError
+from khala_bridge.act import JointAction, Played, Step
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.errors import GameError, GameHangs, GameMissing
+from khala_bridge.game.game import GameConfig, GameInfo, GameThread, OneSide, StepResult, find_sc2
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_bridge.state import EpisodeInfo
+from khala_bridge.task.maps import known_maps
+from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from bridge.act import Plan
-    from bridge.state import Snapshot
+    from khala_bridge.act import Plan
+    from khala_bridge.state import Snapshot
 
 
 class FakeGame:

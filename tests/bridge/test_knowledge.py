@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.compat import units, upgrades
-from bridge.functions import functions
-from bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
-from bridge.knowledge import upgrades as known_upgrades
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.compat import units, upgrades
+from khala_bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
+from khala_bridge.knowledge import upgrades as known_upgrades
 
 RACES = (units.Neutral, units.Protoss, units.Terran, units.Zerg)
 NUMBERS = {member.name: int(member) for race in RACES for member in race}

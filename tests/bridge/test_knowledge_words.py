@@ -7,11 +7,11 @@ from fnmatch import fnmatchcase
 
 import pytest
 
-from bridge.errors import CatalogueError
-from bridge.knowledge import VERSIONS, abilities, advice, knowledge, short, upgrades
-from bridge.knowledge.facts import ability_facts, buff_facts, unit_facts, upgrade_facts
-from bridge.knowledge.load import ability_words, unit_words, upgrade_words
-from bridge.knowledge.words import PLACEHOLDER, Filler, listed, price, rounded
+from khala_bridge.errors import CatalogueError
+from khala_bridge.knowledge import VERSIONS, abilities, advice, knowledge, short, upgrades
+from khala_bridge.knowledge.facts import ability_facts, buff_facts, unit_facts, upgrade_facts
+from khala_bridge.knowledge.load import ability_words, unit_words, upgrade_words
+from khala_bridge.knowledge.words import PLACEHOLDER, Filler, listed, price, rounded
 
 BY_THEIR_ABILITIES = {
     ("HighTemplar", "Mutalisk"), ("HighTemplar", "Viper"), ("HighTemplar", "Medivac"), ("HighTemplar", "Raven"),

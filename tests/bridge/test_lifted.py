@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.act import Actor
-from bridge.observe import Observer
-from bridge.task import AgentConfig, TaskConfig
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import AgentConfig, TaskConfig
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
 GRAVITON_BEAM = 5
 

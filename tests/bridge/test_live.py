@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.act import Actor, executor_of
-from bridge.errors import GameError
-from bridge.game import GameConfig, StepResult
-from bridge.maps import known_maps
-from bridge.observe import Feedback, Observer
-from bridge.pysc2_game import PySC2Game
-from protocol.speech import parse
-from simulator.install import install
+from khala_bridge.act import Actor, executor_of
+from khala_bridge.errors import GameError
+from khala_bridge.game.game import GameConfig, StepResult
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_bridge.observe import Feedback, Observer
+from khala_bridge.task.maps import known_maps
+from khala_protocol.speech import parse
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Play = Callable[..., "Battle"]
 

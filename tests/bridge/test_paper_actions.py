@@ -1,7 +1,7 @@
 """Every text action of the paper is there, with its arguments, unit types and function.
 
 `golden/paper_actions.tsv` holds the 161 names of the paper's tables B1 to B10 and of its first implementation: name,
-arguments, function, unit types, other spellings; the tables' slips corrected as bridge/data/SOURCES.md tells.
+arguments, function, unit types, other spellings; the tables' slips corrected as bridge/khala_bridge/data/SOURCES.md tells.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from bridge.catalog import alias_of
-from bridge.functions import functions
+from khala_bridge.catalogue.catalogue import alias_of
+from khala_bridge.catalogue.functions import functions
 
 if TYPE_CHECKING:
-    from bridge.catalog import Action
+    from khala_bridge.catalogue.catalogue import Action
 
 
 class Row(NamedTuple):

@@ -6,8 +6,8 @@ from itertools import product
 
 import pytest
 
-from bridge.maps import known_maps
-from orchestrator.config import load_task
+from khala_bridge.task.maps import known_maps
+from khala_orchestrator.config import load_task
 
 CASTS = {  # of each task: agents, and the types of units that they lead, besides what later levels of a game bring
     1: {"CombatGroup7": {"Adept"}},

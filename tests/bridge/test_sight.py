@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import raw_pb2
 
-from bridge.observe import Observer, TeamObservation
-from protocol.messages import Frames, Resources
+from khala_bridge.observe import Observer, TeamObservation
+from khala_protocol.messages import Frames, Resources
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
-    from protocol.messages import UnitView
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
+    from khala_protocol.messages import UnitView
 
     Make = Callable[..., raw_pb2.Unit]
     Snap = Callable[..., Snapshot]

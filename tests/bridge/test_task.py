@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.maps import known_maps
-from bridge.task import AgentConfig, TaskConfig, TeamConfig
-from protocol.configfile import load, loads
-from protocol.errors import ConfigError
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_bridge.task.maps import known_maps
+from khala_protocol.configfile import load, loads
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import raw_pb2
 
-from bridge.compat import units as pysc2_units
-from bridge.forms import FORMS, form_of, forms_of
-from bridge.observe.teams import Roster
-from bridge.state import Player, Unit, read_unit
-from bridge.task import AgentConfig, TaskConfig
+from khala_bridge.compat import units as pysc2_units
+from khala_bridge.knowledge.forms import FORMS, form_of, forms_of
+from khala_bridge.state import Player, Unit, read_unit
+from khala_bridge.state.teams import Roster
+from khala_bridge.task.config import AgentConfig, TaskConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.observe import Feedback, Observer
-from protocol.messages import Received, Rejection
-from protocol.speech import parse
+from khala_bridge.observe import Feedback, Observer
+from khala_protocol.messages import Received, Rejection
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
 
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
     Snap = Callable[..., Snapshot]

@@ -7,26 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.act import Actor, JointAction
-from bridge.act.reasons import (
-    REASONS,
-    cooldown,
-    energy,
-    otherwise,
-    power,
-    price,
-    queue,
-    tech,
-    under_construction,
-)
-from bridge.act.validity import Validity
-from bridge.catalog import catalogue
-from bridge.functions import functions, general
-from bridge.knowledge import ability_of
-from bridge.macro import Ledger
-from bridge.observe import Observer
-from bridge.task import AgentConfig
-from protocol.speech import parse
+from khala_bridge.act import Actor, JointAction
+from khala_bridge.act.reasons import REASONS, cooldown, energy, otherwise, power, price, queue, tech, under_construction
+from khala_bridge.act.validity import Validity
+from khala_bridge.auto import Ledger
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.functions import functions, general
+from khala_bridge.knowledge import ability_of
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import AgentConfig
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,8 +24,8 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Make = Callable[..., raw_pb2.Unit]
 

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from bridge.catalog import catalogue
 from khala.cli import main
+from khala_bridge.catalogue.catalogue import catalogue
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:

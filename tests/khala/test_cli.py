@@ -15,8 +15,8 @@ from threading import Thread
 import pytest
 
 from khala.cli import main
-from protocol.messages import Report
-from protocol.recording import Recording
+from khala_protocol.messages import Report
+from khala_protocol.recording import Recording
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import pytest_asyncio
 
-from agents.policy import FunctionPolicy
-from agents.worker import run_worker
-from bridge.act.raw import RawExecutor
-from bridge.game import GameConfig, GameThread, OneSide
-from bridge.pysc2_game import PySC2Game
-from orchestrator.config import MatchConfig, change, load_task
-from orchestrator.host import host
-from protocol.bus import Delivery
-from protocol.bus.memory import MemoryBroker
-from protocol.codec import encode
-from protocol.keys import Topic, agent_key
-from protocol.messages import Message, Reply, Report, Result
-from protocol.recording import Recording
-from simulator.install import install
+from khala_agents.policy import FunctionPolicy
+from khala_agents.worker import run_worker
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.game.game import GameConfig, GameThread, OneSide
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_orchestrator.host import host
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.codec import encode
+from khala_protocol.keys import Topic, agent_key
+from khala_protocol.messages import Message, Reply, Report, Result
+from khala_protocol.recording import Recording
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
     from pathlib import Path
 
-    from protocol.messages import Briefing, Observation, Wire
+    from khala_protocol.messages import Briefing, Observation, Wire
 
     Decide = Callable[[Briefing, Observation], str | Awaitable[str]]
 

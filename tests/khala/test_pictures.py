@@ -8,29 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.policy import Policy
-from agents.replay import replay_agent
-from agents.worker import run_worker
-from orchestrator.record import RecordingBus
-from orchestrator.roster import Roster, Seat
-from orchestrator.transcript import Selection, save_pictures, summary, transcript
-from orchestrator.turn import Question, Turn
-from protocol.bus import Delivery
-from protocol.bus.config import BusConfig
-from protocol.bus.memory import MemoryBroker
-from protocol.bus.zenoh import ZenohBus, open_bus
-from protocol.codec import encode
-from protocol.errors import RecordingError
-from protocol.keys import Topic, agent_key, run_key
-from protocol.messages import AgentCard, Briefing, Clock, ImageRef, Observation, Run, View
-from protocol.recording import Recorder, Recording
+from khala_agents.policy import Policy
+from khala_agents.replay import replay_agent
+from khala_agents.worker import run_worker
+from khala_orchestrator.record import RecordingBus
+from khala_orchestrator.roster import Roster, Seat
+from khala_orchestrator.transcript import Selection, save_pictures, summary, transcript
+from khala_orchestrator.turn import Question, Turn
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.bus.zenoh import ZenohBus, open_bus
+from khala_protocol.codec import encode
+from khala_protocol.errors import RecordingError
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import AgentCard, Briefing, Clock, ImageRef, Observation, Run, View
+from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
     from pathlib import Path
 
-    from agents.policy import Context
-    from protocol.bus import Bus
+    from khala_agents.policy import Context
+    from khala_protocol.bus import Bus
 
     Connect = Callable[[], Awaitable[Bus]]
 

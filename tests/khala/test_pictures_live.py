@@ -10,23 +10,23 @@ import cv2
 import numpy as np
 import pytest
 
-from agents.policy import Policy
-from agents.worker import run_worker
-from bridge.imagespec import ImageSpec
 from khala.local import one_side
-from orchestrator.config import MatchConfig, change, load_task
-from orchestrator.host import host
-from orchestrator.replay import replay
-from protocol.bus.memory import MemoryBroker
-from protocol.messages import Observation
-from protocol.recording import Recording
-from simulator.install import install
+from khala_agents.policy import Policy
+from khala_agents.worker import run_worker
+from khala_bridge.task.images import ImageSpec
+from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_orchestrator.host import host
+from khala_orchestrator.replay import replay
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.messages import Observation
+from khala_protocol.recording import Recording
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from agents.policy import Context
-    from bridge.task import TaskConfig
+    from khala_agents.policy import Context
+    from khala_bridge.task.config import TaskConfig
 
 pytestmark = pytest.mark.game
 

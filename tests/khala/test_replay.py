@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.codec import encode
-from protocol.messages import Briefing, Observation, Reply, Run
-from protocol.recording import Recorder, Recording
+from khala_protocol.codec import encode
+from khala_protocol.messages import Briefing, Observation, Reply, Run
+from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from protocol.messages import Wire
-    from protocol.recording.difference import Difference
+    from khala_protocol.messages import Wire
+    from khala_protocol.recording.difference import Difference
 
     Replay = Callable[..., Awaitable[list[Difference]]]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bench.scenarios import PLAYERS, SHAME, Row, play, scenarios, table
-from protocol.messages import Report
-from protocol.recording import Recording
+from khala_protocol.messages import Report
+from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
     from pathlib import Path

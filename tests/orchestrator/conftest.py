@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from orchestrator.roster import Seat
-from orchestrator.turn import Question
-from protocol.bus.memory import MemoryBroker
-from protocol.messages import Observation, View
+from khala_orchestrator.roster import Seat
+from khala_orchestrator.turn import Question
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.messages import Observation, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable

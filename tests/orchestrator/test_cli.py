@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.cli import people, tasks
+from khala_orchestrator.cli import people, tasks
 
 
 @pytest.mark.parametrize(

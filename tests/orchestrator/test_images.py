@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.imagespec import PAPER
-from orchestrator.config import change, load_task
-from protocol.errors import ConfigError
+from khala_bridge.task.images import PAPER
+from khala_orchestrator.config import change, load_task
+from khala_protocol.errors import ConfigError
 
 
 def shown(words: str | None) -> dict[str, tuple[str, ...]]:

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.mailbox import MAX_CHARACTERS, Mailbox
-from orchestrator.roster import Seat
-from protocol.messages import Message
+from khala_orchestrator.mailbox import MAX_CHARACTERS, Mailbox
+from khala_orchestrator.roster import Seat
+from khala_protocol.messages import Message
 
 A, B, C, FOE = Seat("p1", "A"), Seat("p1", "B"), Seat("p1", "C"), Seat("p2", "B")
 

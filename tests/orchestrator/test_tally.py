@@ -6,12 +6,12 @@ import pytest
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.state import Snapshot, read_info, read_snapshot
-from orchestrator.tally import Tally
-from protocol.messages import AgentReport, Rejection, Report, Usage
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_orchestrator.tally import Tally
+from khala_protocol.messages import AgentReport, Rejection, Report, Usage
 
 if TYPE_CHECKING:
-    from protocol.messages import AgentStatus, Outcome, Result
+    from khala_protocol.messages import AgentStatus, Outcome, Result
 
 
 def snapshot(

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from orchestrator.roster import MissingAgents, Roster, Seat
-from orchestrator.turn import Question, Turn
-from protocol.bus import Delivery
-from protocol.codec import decode_as, encode
-from protocol.keys import Topic, agent_key, alive_key
-from protocol.messages import Observation, Reply
+from khala_orchestrator.roster import MissingAgents, Roster, Seat
+from khala_orchestrator.turn import Question, Turn
+from khala_protocol.bus import Delivery
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.keys import Topic, agent_key, alive_key
+from khala_protocol.messages import Observation, Reply
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from protocol.bus.memory import MemoryBroker, MemoryBus
+    from khala_protocol.bus.memory import MemoryBroker, MemoryBus
 
     Observe = Callable[..., list[Question]]
 

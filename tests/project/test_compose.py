@@ -17,7 +17,7 @@ import yaml
 
 from khala.cli import app
 from khala.doctor import KEYS
-from orchestrator.config import load_task
+from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

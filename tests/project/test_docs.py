@@ -19,23 +19,23 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pytest
 import typer
 
-from agents.config import AgentsFile, ModelConfig
-from agents.policy import Context, Policy, as_policy
-from bridge import catalog
-from bridge.errors import CatalogueError
-from bridge.task import TaskConfig
 from docs.generate import PAGES, REFERENCE, main, outdated, write
 from docs.pages.markdown import anchor, cell, table
 from khala import testing
 from khala.cli import app
-from protocol import speech
-from protocol.codec import decode
-from protocol.configfile import loads
-from protocol.errors import ConfigError
-from protocol.messages import Briefing
-from protocol.recording import Recording
-from simulator.map_file import read_map
-from simulator.tick import advance, new_game
+from khala_agents.config import AgentsFile, ModelConfig
+from khala_agents.policy import Context, Policy, as_policy
+from khala_bridge.catalogue import catalogue
+from khala_bridge.errors import CatalogueError
+from khala_bridge.task.config import TaskConfig
+from khala_protocol import speech
+from khala_protocol.codec import decode
+from khala_protocol.configfile import loads
+from khala_protocol.errors import ConfigError
+from khala_protocol.messages import Briefing
+from khala_protocol.recording import Recording
+from khala_simulator.maps.map_file import read_map
+from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from _pytest.mark import ParameterSet
     from pydantic import BaseModel
 
-    from protocol.messages import Observation
+    from khala_protocol.messages import Observation
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -225,10 +225,10 @@ def test_a_file_on_a_page_is_valid(block: Block) -> None:
 @pytest.mark.parametrize("block", blocks("yaml actions"))
 def test_actions_on_a_page_could_stand_in_the_catalogue(block: Block, tmp_path: Path) -> None:
     (tmp_path / "page.yaml").write_text(block.text, encoding="utf-8")
-    found = catalog.read(tmp_path / "page.yaml")
+    found = catalogue.read(tmp_path / "page.yaml")
     assert found
-    assert {action.group for action in found.values()} <= set(catalog.GROUPS)
-    assert not {name.casefold() for name in found} & {name.casefold() for name in catalog.catalogue()}
+    assert {action.group for action in found.values()} <= set(catalogue.GROUPS)
+    assert not {name.casefold() for name in found} & {name.casefold() for name in catalogue.catalogue()}
 
 
 def test_the_fault_of_an_action_is_told_as_the_page_says(tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_the_fault_of_an_action_is_told_as_the_page_says(tmp_path: Path) -> None
     file = tmp_path / "zerg_raid.yaml"
     file.write_text(block.text.replace("Move_minimap", "Move_minmap"), encoding="utf-8")
     with pytest.raises(CatalogueError) as raised:
-        catalog.read(file)
+        catalogue.read(file)
     assert f"khala: {raised.value}\n" in page.read_text(encoding="utf-8")
 
 

@@ -7,9 +7,9 @@ import re
 import cv2
 import pytest
 
-from bridge.imagespec import PAPER
-from bridge.observe.text import SECTIONS_OF
 from docs import seen
+from khala_bridge.observe.text import SECTIONS_OF
+from khala_bridge.task.images import PAPER
 
 PAGE = seen.PAGE.read_text(encoding="utf-8")
 SHOWN = re.findall(r"!\[[^\]]*\]\(\.\./images/seen/([\w-]+)\.webp\)", PAGE)

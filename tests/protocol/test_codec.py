@@ -11,9 +11,9 @@ from annotated_types import Ge
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from protocol.codec import decode, decode_as, encode
-from protocol.errors import MalformedMessage, WrongVersion
-from protocol.messages import MESSAGE_TYPES, Frozen, Message, Reply, Usage, Wire
+from khala_protocol.codec import decode, decode_as, encode
+from khala_protocol.errors import MalformedMessage, WrongVersion
+from khala_protocol.messages import MESSAGE_TYPES, Frozen, Message, Reply, Usage, Wire
 
 if TYPE_CHECKING:
     from collections.abc import Callable

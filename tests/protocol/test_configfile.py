@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from protocol.configfile import load, loads
-from protocol.errors import ConfigError
+from khala_protocol.configfile import load, loads
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,8 +8,8 @@ import re
 
 import pytest
 
-from protocol import errors
-from protocol.errors import BusClosed, BusError, ConfigError, KhalaError, PeerError, RecordingError, WrongVersion
+from khala_protocol import errors
+from khala_protocol.errors import BusClosed, BusError, ConfigError, KhalaError, PeerError, RecordingError, WrongVersion
 
 CLASSES = [one for _, one in inspect.getmembers(errors, inspect.isclass) if one.__module__ == errors.__name__]
 

@@ -7,8 +7,8 @@ import zenoh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocol.errors import WrongKey
-from protocol.keys import (
+from khala_protocol.errors import WrongKey
+from khala_protocol.keys import (
     AGENT_TOPICS,
     NUMBERED_TOPICS,
     RUN_TOPICS,

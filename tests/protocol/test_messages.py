@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from protocol import messages
-from protocol.keys import AGENT_TOPICS, NUMBERED_TOPICS, RUN_TOPICS, Topic
-from protocol.messages import (
+from khala_protocol import messages
+from khala_protocol.keys import AGENT_TOPICS, NUMBERED_TOPICS, RUN_TOPICS, Topic
+from khala_protocol.messages import (
     MESSAGE_TYPES,
     SCHEMA_VERSION,
     Briefing,

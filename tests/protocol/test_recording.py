@@ -15,10 +15,10 @@ import jsonschema  # type: ignore[import-untyped]  # comes with check-jsonschema
 import pytest
 from mcap.reader import make_reader
 
-from protocol.codec import encode
-from protocol.errors import RecordingError
-from protocol.keys import Topic, agent_key, run_key
-from protocol.messages import (
+from khala_protocol.codec import encode
+from khala_protocol.errors import RecordingError
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import (
     Briefing,
     Casualties,
     ChatMessage,
@@ -33,7 +33,7 @@ from protocol.messages import (
     View,
     Wire,
 )
-from protocol.recording import Recorded, Recorder, Recording, read, recover
+from khala_protocol.recording import Recorded, Recorder, Recording, read, recover
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -245,7 +245,7 @@ def test_a_damaged_file_gives_a_prefix(path: Path, tmp_path: Path, seed: int) ->
 
 WRITER = """
 import itertools, sys
-from protocol.recording import Recorder, read
+from khala_protocol.recording import Recorder, read
 
 steps = [list(group) for _, group in itertools.groupby(read(sys.argv[1]), key=lambda s: s.message.step)]
 with Recorder(sys.argv[2]) as recorder:
@@ -347,7 +347,7 @@ def test_a_full_disk_is_said_and_leaves_nothing_open(path: Path, monkeypatch: py
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
     full = Path("/dev/full").open("wb")  # noqa: SIM115 - whether it is closed is what is tested
-    monkeypatch.setattr("protocol.recording.recorder._create", lambda _: full)
+    monkeypatch.setattr("khala_protocol.recording.recorder._create", lambda _: full)
     with pytest.raises(RecordingError) as raised:
         Recorder(path)
     assert str(raised.value) == (

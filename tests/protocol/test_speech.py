@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import protocol.speech
-import protocol.speech.arguments
-import protocol.speech.headings
-from protocol.messages import Call
-from protocol.speech import ListenTo, MessageTo, Speech, parse, render
+import khala_protocol.speech
+import khala_protocol.speech.arguments
+import khala_protocol.speech.headings
+from khala_protocol.messages import Call
+from khala_protocol.speech import ListenTo, MessageTo, Speech, parse, render
 
 REPLY = """Analysis: the Zealot 0x10ac is weak, so <Attack_Unit(0x10ac)> it.
 Actions:
@@ -384,7 +384,7 @@ def test_a_reply_is_read_as_it_was_meant(subtests: pytest.Subtests) -> None:
 def test_every_rule_of_the_documentation_has_a_row_and_every_row_a_rule() -> None:
     documented = [
         rule
-        for module in (protocol.speech, protocol.speech.headings, protocol.speech.arguments)
+        for module in (khala_protocol.speech, khala_protocol.speech.headings, khala_protocol.speech.arguments)
         for rule in re.findall(r"^\| ([SHA]\d+) \|", module.__doc__ or "", re.MULTILINE)
     ]
     assert len(documented) == len(set(documented))

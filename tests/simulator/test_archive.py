@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from simulator import terrain_file, walkability
-from simulator.archive import ArchiveError, read_archive
-from simulator.cli import app
-from simulator.install import InstallError, install, link_maps
-from simulator.map_file import MapDataError, is_placeholder, read_map
-from simulator.maps import load_map
-from simulator.terrain_file import TerrainError
-from simulator.tick import advance, new_game
+from khala_simulator.cli import app
+from khala_simulator.maps import terrain_file, walkability
+from khala_simulator.maps.archive import ArchiveError, read_archive
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_map
+from khala_simulator.maps.terrain_file import TerrainError
+from khala_simulator.process.install import InstallError, install, link_maps
+from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
     from pathlib import Path

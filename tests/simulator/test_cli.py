@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from simulator.cli import app
-from simulator.install import install, is_installed
-from simulator.maps import map_names
+from khala_simulator.cli import app
+from khala_simulator.maps.game_map import map_names
+from khala_simulator.process.install import install, is_installed
 
 run = CliRunner().invoke
 
@@ -71,8 +71,8 @@ def test_a_port_in_use_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     def taken(host: str, port: int) -> None:
         raise OSError(98, "Address already in use")
 
-    monkeypatch.setattr("simulator.__main__.listen", taken)
-    monkeypatch.setattr("simulator.__main__.signal.signal", lambda *_: None)
+    monkeypatch.setattr("khala_simulator.__main__.listen", taken)
+    monkeypatch.setattr("khala_simulator.__main__.signal.signal", lambda *_: None)
     result = run(app, ["serve", "--port", "5999"])
     assert result.exit_code == 1
     assert "cannot listen on 127.0.0.1:5999: [Errno 98] Address already in use" in result.output

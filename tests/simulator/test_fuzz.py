@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.lan import HOST
-from simulator.client import Client, interface
-from simulator.session import Session
-from simulator.status import Status
+from khala_simulator.process.client import Client, interface
+from khala_simulator.process.lan import HOST
+from khala_simulator.process.session import Session
+from khala_simulator.process.status import Status
 
 KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
 SCALARS: dict[int, st.SearchStrategy[Any]] = {

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from simulator.install import InstallError, install, is_installed
-from simulator.map_file import FOLDERS, read_map
-from simulator.maps import map_names
+from khala_simulator.maps.game_map import map_names
+from khala_simulator.maps.map_file import FOLDERS, read_map
+from khala_simulator.process.install import InstallError, install, is_installed
 
 LAUNCHER = "Versions/Base75689/SC2_x64"
 

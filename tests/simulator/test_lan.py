@@ -10,12 +10,12 @@ import pytest
 from s2clientprotocol import common_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api import joining, lockstep
-from simulator.api.clock import SharedClock
-from simulator.api.lan import HOST
-from simulator.client import Client, ResponseError, command, interface
-from simulator.session import Session
-from simulator.status import Status
+from khala_simulator.process import joining, lockstep
+from khala_simulator.process.client import Client, ResponseError, command, interface
+from khala_simulator.process.clock import SharedClock
+from khala_simulator.process.lan import HOST
+from khala_simulator.process.session import Session
+from khala_simulator.process.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

@@ -5,7 +5,7 @@ import io
 import mpyq
 import pytest
 
-from simulator import mpq
+from khala_simulator.process import mpq
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 9, 40])

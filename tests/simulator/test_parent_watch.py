@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from simulator.parent_watch import PATIENCE_LOOKS, orphaned
+from khala_simulator.process.parent_watch import PATIENCE_LOOKS, orphaned
 
 ALONE = PATIENCE_LOOKS
 

@@ -11,10 +11,10 @@ from aiohttp import WSMsgType
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.__main__ import Arguments, listen, main, parse
-from simulator.client import interface
-from simulator.server import serve
-from simulator.session import Session
+from khala_simulator.__main__ import Arguments, listen, main, parse
+from khala_simulator.process.client import interface
+from khala_simulator.process.server import serve
+from khala_simulator.process.session import Session
 
 Ws = aiohttp.ClientWebSocketResponse
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, debug_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, ResponseError, command, interface
-from simulator.install import install
-from simulator.session import Session
-from simulator.status import Status
+from khala_simulator.process.client import Client, ResponseError, command, interface
+from khala_simulator.process.install import install
+from khala_simulator.process.session import Session
+from khala_simulator.process.status import Status
 
 PARTICIPANT = sc.PlayerSetup(type=sc.Participant)
 COMPUTER = sc.PlayerSetup(type=sc.Computer, race=common_pb2.Zerg, difficulty=sc.VeryHard)
@@ -407,7 +407,7 @@ def test_a_fault_of_ours_is_told_and_does_not_end_the_process(
     def fail(*_: object) -> None:
         raise ZeroDivisionError("oh")
 
-    monkeypatch.setattr("simulator.api.game.advance", fail)
+    monkeypatch.setattr("khala_simulator.api.game.advance", fail)
     with pytest.raises(ResponseError, match=r"^The simulator failed in step: ZeroDivisionError: oh$"):
         playing.step()
     assert "Traceback" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.status import AFTER, GAME_OVER, LEGAL, Machine, Status, UsageError
+from khala_simulator.process.status import AFTER, GAME_OVER, LEGAL, Machine, Status, UsageError
 
 KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
 

@@ -12,8 +12,8 @@ import pytest
 from aiohttp import web
 from pydantic import SecretStr
 
-from agents.llm.anthropic import Anthropic
-from agents.llm.client import (
+from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.client import (
     Completion,
     LLMError,
     MalformedCompletion,
@@ -24,15 +24,15 @@ from agents.llm.client import (
     Unavailable,
     Unreachable,
 )
-from agents.llm.openai_compatible import OpenAICompatible
-from agents.llm.pricing import Prices
-from agents.llm.profiles import PROFILES, Profile
-from agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
-from agents.scripted.faults import Faults
-from protocol.messages import ChatMessage, Usage
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.profiles import PROFILES, Profile
+from khala_agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
+from khala_agents.scripted.faults import Faults
+from khala_protocol.messages import ChatMessage, Usage
 
 if TYPE_CHECKING:
-    from agents.llm.client import LLMClient
+    from khala_agents.llm.client import LLMClient
 
 PROMPT = (
     ChatMessage(role="system", content="You are an agent."),

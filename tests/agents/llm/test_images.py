@@ -11,18 +11,18 @@ import pytest
 from aiohttp import web
 from pydantic import SecretStr
 
-from agents.llm.anthropic import Anthropic
-from agents.llm.client import Request, prompt_sha256
-from agents.llm.openai_compatible import OpenAICompatible
-from agents.llm.pricing import Prices
-from agents.llm.profiles import PROFILES
-from agents.scripted.endpoint import TOKENS_PER_IMAGE, Endpoint, count_tokens
-from protocol.messages import ChatMessage, ImageRef
+from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.client import Request, prompt_sha256
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.profiles import PROFILES
+from khala_agents.scripted.endpoint import TOKENS_PER_IMAGE, Endpoint, count_tokens
+from khala_protocol.messages import ChatMessage, ImageRef
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from agents.llm.client import LLMClient
+    from khala_agents.llm.client import LLMClient
 
 SCREEN, MINIMAP = b"\xff\xd8\xffscreen", b"\x89PNG minimap"
 PICTURES = {hashlib.sha256(data).hexdigest(): data for data in (SCREEN, MINIMAP)}

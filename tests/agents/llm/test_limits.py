@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
-from agents.llm.pricing import Prices
-from protocol.messages import Usage
+from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from khala_agents.llm.pricing import Prices
+from khala_protocol.messages import Usage
 
 CLOCK = "jumps"
 PRICES = Prices(prompt=1000.0, completion=2000.0)  # a thousandth and two of a dollar a token

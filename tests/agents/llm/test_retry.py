@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from agents.llm.client import (
+from khala_agents.llm.client import (
     Completion,
     LLMError,
     MalformedCompletion,
@@ -20,9 +20,9 @@ from agents.llm.client import (
     Unavailable,
     Unreachable,
 )
-from agents.llm.http import error_for, retry_after_s
-from agents.llm.limits import LimitExceeded
-from agents.llm.retry import RetryRule, retried
+from khala_agents.llm.http import error_for, retry_after_s
+from khala_agents.llm.limits import LimitExceeded
+from khala_agents.llm.retry import RetryRule, retried
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ async def run(model: Any, rule: RetryRule = EXACT, deadline: float | None = None
     return await retried(failing(model), rule, deadline=deadline, rng=random.Random(seed))
 
 
-# status → what it is, tried again; the list of `agents.llm.retry` and `agents.llm.http`, as a table
+# status → what it is, tried again; the list of `khala_agents.llm.retry` and `khala_agents.llm.http`, as a table
 STATUSES = [
     (300, Refused, False),
     (400, Refused, False),

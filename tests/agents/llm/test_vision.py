@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from agents.config import ModelConfig, load_model, model_files
-from agents.llm.client import estimated_image_tokens, estimated_tokens
-from agents.llm.profiles import PROFILES
-from agents.llm.vision import ANTHROPIC, OPENAI, OPENAI_REASONING, QWEN, Detail, TokenRule, Vision
-from protocol.messages import ChatMessage, ImageRef
+from khala_agents.config import ModelConfig, load_model, model_files
+from khala_agents.llm.client import estimated_image_tokens, estimated_tokens
+from khala_agents.llm.profiles import PROFILES
+from khala_agents.llm.vision import ANTHROPIC, OPENAI, OPENAI_REASONING, QWEN, Detail, TokenRule, Vision
+from khala_protocol.messages import ChatMessage, ImageRef
 
 MINI = TokenRule(kind="patches", pixels=32, most=1536, each=1.62)
 

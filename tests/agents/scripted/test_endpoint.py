@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import aiohttp
 import pytest
 
-from agents.scripted.endpoint import Behaviour, Endpoint, EndpointError, count_tokens
-from agents.scripted.faults import Faults, parse_faults
-from protocol.errors import ConfigError
+from khala_agents.scripted.endpoint import Behaviour, Endpoint, EndpointError, count_tokens
+from khala_agents.scripted.faults import Faults, parse_faults
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

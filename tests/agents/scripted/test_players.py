@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.scripted.players import PLAYERS, focus_fire, in_reach, random_legal, silent
-from agents.scripted.reading import Action, Situation, Unit, read
-from protocol.speech import parse
+from khala_agents.scripted.players import PLAYERS, focus_fire, in_reach, random_legal, silent
+from khala_agents.scripted.reading import Action, Situation, Unit, read
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable

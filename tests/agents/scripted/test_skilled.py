@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from agents.scripted.reading import read
-from agents.scripted.skilled import skilled
-from agents.scripted.skilled.builds import BUILDS
-from agents.scripted.skilled.kinds import KINDS
-from protocol.speech import parse
+from khala_agents.scripted.reading import read
+from khala_agents.scripted.skilled import skilled
+from khala_agents.scripted.skilled.builds import BUILDS
+from khala_agents.scripted.skilled.kinds import KINDS
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from bridge.catalog import catalogue
-from bridge.frames import WorldPoint
-from bridge.knowledge import knowledge
-from bridge.names import order_name
-from bridge.state import Alliance
-from bridge.task import AgentConfig, TaskConfig, TeamConfig
-from simulator.api.abilities import Command, judge
-from simulator.casting import is_modelled
-from simulator.catalog import load_catalog
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import order_name
+from khala_bridge.state import Alliance
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_simulator.abilities.casting import is_modelled
+from khala_simulator.api.abilities import Command, judge
+from khala_simulator.tables.catalog import load_catalog
 
 from .preparations import BY_RULE, prepare_for
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     from _pytest.mark import ParameterSet
 
-    from bridge.action import Action
-    from bridge.observe.observation import SideObservation, TeamObservation
-    from bridge.state import Snapshot
-    from simulator.abilities import Ability
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.observe.observation import SideObservation, TeamObservation
+    from khala_bridge.state import Snapshot
+    from khala_simulator.tables.abilities import Ability
 
     from .preparations import Preparation
     from .stage import Stage

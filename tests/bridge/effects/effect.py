@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from s2clientprotocol import raw_pb2
 
-from bridge.names import buff_name, order_name, unit_name, upgrade_name
+from khala_bridge.names import buff_name, order_name, unit_name, upgrade_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import common_pb2
     from s2clientprotocol import sc2api_pb2 as sc
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
 MOVED = 0.3
 """World units that a unit has to be off its place to count as moved."""

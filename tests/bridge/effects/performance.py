@@ -5,16 +5,16 @@ from __future__ import annotations
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
-from bridge.act import Actor
-from bridge.observe import Observer
-from protocol.speech import parse
+from khala_bridge.act import Actor
+from khala_bridge.observe import Observer
+from khala_protocol.speech import parse
 
 from .cases import AGENT, its_own, replies, task_of
 from .effect import changes
 
 if TYPE_CHECKING:
-    from bridge.act import Executor
-    from bridge.act.plan import Plan
+    from khala_bridge.act import Executor
+    from khala_bridge.act.plan import Plan
 
     from .cases import Case
     from .stage import Stage

@@ -8,17 +8,19 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
-from simulator.abilities import Aim
-from simulator.skills import addons
-from simulator.tick import advance
-from simulator.traits import refresh
+from khala_simulator.abilities import casting, commands
+from khala_simulator.abilities.terran import addons
+from khala_simulator.combat import buffs, lifecycle, targets
+from khala_simulator.combat.traits import refresh
+from khala_simulator.economy import harvesting, production
+from khala_simulator.tables.abilities import Aim
+from khala_simulator.tick import advance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.abilities import Ability
-    from simulator.world import World
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.world.world import World
 
     Point = tuple[float, float]
     Preparation = Callable[[World, int], None]

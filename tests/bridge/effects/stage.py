@@ -13,23 +13,23 @@ from typing import TYPE_CHECKING, Any
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.available import available, question
-from bridge.compat import features, point
-from bridge.knowledge import knowledge
-from bridge.state import read_info, read_snapshot
-from simulator import lifecycle
-from simulator.api import bookmark
-from simulator.client import Client, interface
-from simulator.traits import refresh
+from khala_bridge.compat import features, point
+from khala_bridge.knowledge import knowledge
+from khala_bridge.state import read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+from khala_simulator.combat import lifecycle
+from khala_simulator.combat.traits import refresh
+from khala_simulator.process import bookmark
+from khala_simulator.process.client import Client, interface
 
 from .effect import Seen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from bridge.act.plan import Plan, Played
-    from simulator.records import UnitType
-    from simulator.world import World
+    from khala_bridge.act.plan import Plan, Played
+    from khala_simulator.tables.records import UnitType
+    from khala_simulator.world.world import World
 
     Point = tuple[float, float]
     Preparation = Callable[[World, int], None]
@@ -236,7 +236,7 @@ def _usual_place(unit: UnitType) -> Point:
 
 
 def _eyes() -> Any:
-    """The part of PySC2 that reads observations and translates functions, as `bridge.pysc2_game` asks for it."""
+    """The part of PySC2 that reads observations and translates functions, as `khala_bridge.game.pysc2_game` asks for it."""
     interface_format = features.AgentInterfaceFormat(
         feature_dimensions=features.Dimensions(screen=128, minimap=64),
         camera_width_world_units=24,

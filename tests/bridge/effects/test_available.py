@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.functions import functions
-from bridge.knowledge import knowledge
-from simulator import commands
-from simulator.traits import refresh
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import knowledge
+from khala_simulator.abilities import commands
+from khala_simulator.combat.traits import refresh
 
 from .stage import Stage
 

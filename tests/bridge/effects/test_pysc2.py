@@ -7,27 +7,27 @@ from typing import TYPE_CHECKING, NamedTuple
 import pytest
 from s2clientprotocol import common_pb2, debug_pb2
 
-from bridge.act import Actor
-from bridge.act.plan import Played, Step
-from bridge.act.raw import RawExecutor
-from bridge.act.screen import ScreenExecutor
-from bridge.compat import actions as pysc2
-from bridge.game import GameConfig
-from bridge.knowledge import knowledge
-from bridge.maps import known_maps
-from bridge.names import order_name, unit_name
-from bridge.observe import Observer
-from bridge.pysc2_game import PySC2Game
-from bridge.task import AgentConfig, TaskConfig, TeamConfig
-from protocol.speech import parse
-from simulator.install import install
+from khala_bridge.act import Actor
+from khala_bridge.act.plan import Played, Step
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.compat import actions as pysc2
+from khala_bridge.game.game import GameConfig
+from khala_bridge.game.pysc2_game import PySC2Game
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import order_name, unit_name
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_bridge.task.maps import known_maps
+from khala_protocol.speech import parse
+from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bridge.act import Executor
-    from bridge.act.plan import Plan
-    from bridge.state import Snapshot
+    from khala_bridge.act import Executor
+    from khala_bridge.act.plan import Plan
+    from khala_bridge.state import Snapshot
 
 pytestmark = pytest.mark.game
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.act.raw import RawExecutor
-from bridge.catalog import catalogue
-from bridge.functions import functions
-from bridge.generated import without_words
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.catalogue.generated import without_words
 
 from .cases import by_caster, cases
 from .performance import perform

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.act.raw import RawExecutor
-from bridge.act.screen import ScreenExecutor
-from bridge.catalog import catalogue
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.catalogue.catalogue import catalogue
 
 from .cases import by_caster, cases
 from .effect import kinds

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from bridge.imagespec import ImageSpec
-from bridge.observe import Observer
-from bridge.observe.image import titles
-from bridge.observe.image.picture import encoded
-from bridge.observe.image.screen import Legend
-from orchestrator.config import load_task
+from khala_bridge.observe import Observer
+from khala_bridge.observe.image import titles
+from khala_bridge.observe.image.picture import encoded
+from khala_bridge.observe.image.screen import Legend
+from khala_bridge.task.images import ImageSpec
+from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.observe.image.picture import Picture
-    from bridge.state import Snapshot
-    from bridge.task import TaskConfig
+    from khala_bridge.observe.image.picture import Picture
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
 
     Snap = Callable[..., Snapshot]
     Show = Callable[..., tuple[Picture, ...]]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from s2clientprotocol import spatial_pb2
 
-from bridge.frames import Camera
-from bridge.imagespec import DRAWN_LAYERS, GAME_LAYERS, MINIMAP_LAYERS
-from bridge.observe.image import features, own
-from bridge.observe.image.layers import LAYERS, Layer, coloured, explain
-from bridge.observe.image.moment import Moment
-from bridge.observe.image.palette import LIVERIES
+from khala_bridge.frames import Camera
+from khala_bridge.observe.image import features, own
+from khala_bridge.observe.image.layers import LAYERS, Layer, coloured, explain
+from khala_bridge.observe.image.moment import Moment
+from khala_bridge.observe.image.palette import LIVERIES
+from khala_bridge.task.images import DRAWN_LAYERS, GAME_LAYERS, MINIMAP_LAYERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
     Change = Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]

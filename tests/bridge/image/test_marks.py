@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.knowledge import knowledge
-from bridge.observe.image.codes import code_of
-from bridge.observe.image.lettering import written
-from bridge.observe.image.marks import Marked, marks_of, place
+from khala_bridge.knowledge import knowledge
+from khala_bridge.observe.image.codes import code_of
+from khala_bridge.observe.image.lettering import written
+from khala_bridge.observe.image.marks import Marked, marks_of, place
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bridge.frames import Camera
-from bridge.observe.image import minimap
-from bridge.observe.image.canvas import margin_of
-from bridge.observe.image.minimap import Site
-from bridge.observe.image.moment import Moment
-from bridge.observe.image.palette import LIVERIES
-from protocol.messages import Frames
+from khala_bridge.frames import Camera
+from khala_bridge.observe.image import minimap
+from khala_bridge.observe.image.canvas import margin_of
+from khala_bridge.observe.image.minimap import Site
+from khala_bridge.observe.image.moment import Moment
+from khala_bridge.observe.image.palette import LIVERIES
+from khala_protocol.messages import Frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from s2clientprotocol import raw_pb2
 
-    from bridge.observe.image.palette import Colour
-    from bridge.state import Snapshot
+    from khala_bridge.observe.image.palette import Colour
+    from khala_bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
     Unit = Callable[..., raw_pb2.Unit]

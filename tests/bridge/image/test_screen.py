@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from s2clientprotocol import raw_pb2
 
-from bridge.frames import Camera
-from bridge.observe.image import palette, screen
-from bridge.observe.image.canvas import margin_of
-from bridge.observe.image.moment import Moment
-from bridge.observe.image.palette import LIVERIES
+from khala_bridge.frames import Camera
+from khala_bridge.observe.image import palette, screen
+from khala_bridge.observe.image.canvas import margin_of
+from khala_bridge.observe.image.moment import Moment
+from khala_bridge.observe.image.palette import LIVERIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.observe.image.palette import Colour
-    from bridge.state import Snapshot
+    from khala_bridge.observe.image.palette import Colour
+    from khala_bridge.state import Snapshot
 
     Snap = Callable[..., Snapshot]
     Unit = Callable[..., raw_pb2.Unit]

@@ -9,20 +9,20 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.available import available, question
-from bridge.catalog import catalogue
-from bridge.functions import functions
-from bridge.knowledge import knowledge
-from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.names import unit_name
-from bridge.state import Snapshot, Unit, read_info, read_snapshot
-from simulator.client import Client, command, interface
+from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import unit_name
+from khala_bridge.state import Snapshot, Unit, read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+from khala_simulator.process.client import Client, command, interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from bridge.frames import WorldPoint
-    from bridge.macro import Order
+    from khala_bridge.auto import Order
+    from khala_bridge.frames import WorldPoint
 
 RACES = {"protoss": common_pb2.Protoss, "terran": common_pb2.Terran, "zerg": common_pb2.Zerg}
 FREE = (debug_pb2.all_resources, debug_pb2.tech_tree, debug_pb2.food, debug_pb2.fast_build)

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.frames import WorldPoint
-from bridge.ground import land_of
-from bridge.macro.side import army
-from bridge.names import unit_name
+from khala_bridge.frames import WorldPoint
+from khala_bridge.names import unit_name
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.side import army
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.macro import Order
+    from khala_bridge.auto import Order
     from tests.bridge.macro.conftest import Game
 
 

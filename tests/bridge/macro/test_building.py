@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.frames import WorldPoint
-from bridge.ground import footprint_of, land_of, sites
-from bridge.knowledge import knowledge
-from bridge.macro.places import front
-from bridge.names import unit_name
+from khala_bridge.auto.places import front
+from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import unit_name
+from khala_bridge.state.ground import footprint_of, land_of, sites
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.macro import Order
-    from bridge.state import Unit
+    from khala_bridge.auto import Order
+    from khala_bridge.state import Unit
     from tests.bridge.macro.conftest import Game
 
 MAPS = ("Simple64", "Flat48", "Flat64", "Simple96")

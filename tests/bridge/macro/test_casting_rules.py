@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.action import Action
-from bridge.frames import WorldPoint
-from bridge.ground import land_of
-from bridge.macro import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.catalogue.action import Action
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground import land_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

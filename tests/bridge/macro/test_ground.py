@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.frames import WorldPoint
-from bridge.ground import Ground, footprint_of, land_of, sites
-from bridge.ground.land import built_by
-from bridge.ground.resources import base_places
-from bridge.ground.terrain import SEED_REACH
-from bridge.knowledge import knowledge
-from simulator.catalog import load_catalog
-from simulator.maps import find_map, load_map
+from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import knowledge
+from khala_bridge.state.ground import Ground, footprint_of, land_of, sites
+from khala_bridge.state.ground.land import built_by
+from khala_bridge.state.ground.resources import base_places
+from khala_bridge.state.ground.terrain import SEED_REACH
+from khala_simulator.maps.game_map import find_map, load_map
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
     from tests.bridge.macro.conftest import Game
 
 MELEE = ("Simple64", "Simple96", "Simple128", "Flat32", "Flat48", "Flat64", "Flat96", "Flat128")

@@ -8,14 +8,14 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.available import available, question
-from bridge.catalog import catalogue
-from bridge.frames import WorldPoint
-from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.macro.workers import automatic
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import AutoConfig
-from simulator.client import Client, interface
+from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.auto.workers import automatic
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+from khala_bridge.task.config import AutoConfig
+from khala_simulator.process.client import Client, interface
 
 MAPS = (
     "llm_pysc2/pvz_task1_level1", "llm_pysc2/pvz_task3_level2", "llm_pysc2/pvz_task8_level3", "llm_smac/2s3z",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.functions import functions
+from khala_bridge.catalogue.functions import functions
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,9 +10,9 @@ import pytest
 from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.catalog import catalogue
-from bridge.macro import RULES, Ask, Impossible, Ledger
-from bridge.state import Snapshot, read_snapshot
+from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.state import Snapshot, read_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Callable

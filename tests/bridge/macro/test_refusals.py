@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.frames import WorldPoint
-from bridge.macro import Impossible
+from khala_bridge.auto import Impossible
+from khala_bridge.frames import WorldPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable

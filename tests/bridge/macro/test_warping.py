@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.frames import WorldPoint
-from bridge.macro.warp import fields
+from khala_bridge.auto.warp import fields
+from khala_bridge.frames import WorldPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable

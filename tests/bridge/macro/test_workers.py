@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from bridge.ground import land_of
-from bridge.macro import Ledger
-from bridge.macro.workers import automatic
-from bridge.names import unit_name
-from bridge.task import AutoConfig
-from simulator.client import command
+from khala_bridge.auto import Ledger
+from khala_bridge.auto.workers import automatic
+from khala_bridge.names import unit_name
+from khala_bridge.state.ground import land_of
+from khala_bridge.task.config import AutoConfig
+from khala_simulator.process.client import command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.macro import Order
+    from khala_bridge.auto import Order
     from tests.bridge.macro.conftest import Game
 
 RICH = (debug_pb2.all_resources, debug_pb2.food)

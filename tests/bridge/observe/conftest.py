@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import common_pb2
 
-from bridge.functions import functions, general
-from bridge.observe import Feedback, Observer
-from bridge.task import TaskConfig
+from khala_bridge.catalogue.functions import functions, general
+from khala_bridge.observe import Feedback, Observer
+from khala_bridge.task.config import TaskConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
     Make = Callable[..., raw_pb2.Unit]
     Snap = Callable[..., Snapshot]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.observe.text import SECTIONS, SECTIONS_OF, find_sections, tokens
+from khala_bridge.observe.text import SECTIONS, SECTIONS_OF, find_sections, tokens
 
 AGENTS = {"Commander": "commander", "Developer": "developer", "Builder": "builder", "CombatGroup1": "combat_group"}
 NOTICE = "Left out to keep this short\n"

@@ -9,18 +9,18 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from agents.scripted.reading import read
-from bridge.available import available, question
-from bridge.knowledge import knowledge
-from bridge.names import unit_name
-from bridge.observe import Observer
-from bridge.observe.text import SECTIONS_OF, tokens
-from bridge.state import Snapshot, read_info, read_snapshot
-from bridge.task import TaskConfig
-from simulator.client import Client, command, interface
+from khala_agents.scripted.reading import read
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import unit_name
+from khala_bridge.observe import Observer
+from khala_bridge.observe.text import SECTIONS_OF, tokens
+from khala_bridge.state import Snapshot, read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+from khala_bridge.task.config import TaskConfig
+from khala_simulator.process.client import Client, command, interface
 
 if TYPE_CHECKING:
-    from bridge.observe import SideObservation
+    from khala_bridge.observe import SideObservation
 
 RACES = {"protoss": common_pb2.Protoss, "terran": common_pb2.Terran, "zerg": common_pb2.Zerg}
 WORKERS = {"protoss": "Probe", "terran": "SCV", "zerg": "Drone"}

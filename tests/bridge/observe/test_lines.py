@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from s2clientprotocol import raw_pb2
 
-from bridge.functions import functions
-from bridge.observe import Feedback, Observer
-from bridge.observe.text.words import n, one_line, percent, point, whole
-from protocol.messages import Received
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.observe import Feedback, Observer
+from khala_bridge.observe.text.words import n, one_line, percent, point, whole
+from khala_protocol.messages import Received
 
 HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80 | total 100% | weapon ready"
 

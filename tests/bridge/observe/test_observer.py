@@ -6,14 +6,14 @@ import gc
 import weakref
 from typing import TYPE_CHECKING, Any
 
-from bridge.observe import Feedback, Observer
-from orchestrator.config import load_task
+from khala_bridge.observe import Feedback, Observer
+from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from bridge.observe import AgentObservation
-    from bridge.state import Snapshot
+    from khala_bridge.observe import AgentObservation
+    from khala_bridge.state import Snapshot
 
     Make = Callable[..., Any]
     Snap = Callable[..., Snapshot]

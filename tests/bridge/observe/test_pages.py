@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from bridge.observe import Feedback, Observer
-from bridge.observe.text import SECTIONS_OF
-from protocol.messages import Received, Rejection
+from khala_bridge.observe import Feedback, Observer
+from khala_bridge.observe.text import SECTIONS_OF
+from khala_protocol.messages import Received, Rejection
 
 FEEDBACK = {
     "Developer": Feedback(

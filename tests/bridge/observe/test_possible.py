@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.functions import functions, general
-from bridge.knowledge import abilities, upgrades
-from bridge.observe import Observer
-from bridge.task import TaskConfig
+from khala_bridge.catalogue.functions import functions, general
+from khala_bridge.knowledge import abilities, upgrades
+from khala_bridge.observe import Observer
+from khala_bridge.task.config import TaskConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from protocol.messages import TeamView
+    from khala_protocol.messages import TeamView
 
 ACTIONS = {
     "Stalker": ["Attack_Unit", "Stop", "No_Operation", "Ability_Blink_Screen"],

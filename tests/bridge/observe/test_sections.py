@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.observe import Observer
-from bridge.observe.text import SECTIONS, Page, find_sections, section, shorter
-from protocol.errors import ConfigError
+from khala_bridge.observe import Observer
+from khala_bridge.observe.text import SECTIONS, Page, find_sections, section, shorter
+from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from bridge.task import TaskConfig
+    from khala_bridge.task.config import TaskConfig
 
 
 @pytest.fixture
 def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is registered is forgotten after the test."""
-    monkeypatch.setattr("bridge.observe.text.page.SECTIONS", dict(SECTIONS))
+    monkeypatch.setattr("khala_bridge.observe.text.page.SECTIONS", dict(SECTIONS))
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_a_section_can_come_with_a_module_of_ones_own(
     told: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = (
-        "from bridge.observe.text import section",
+        "from khala_bridge.observe.text import section",
         "@section('creed')",
         "def creed(page):",
         "    yield 'Creed'",

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from bridge.observe import Observer
-from bridge.observe.stages import Stages
-from bridge.observe.teams import Team
-from bridge.task import Stage, TeamConfig
+from khala_bridge.observe import Observer
+from khala_bridge.observe.stages import Stages
+from khala_bridge.state.teams import Team
+from khala_bridge.task.config import Stage, TeamConfig
 
 GO, TAKE, HOLD = (
     Stage(task="go", at=(30, 30), within=4),

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.functions import functions
-from bridge.observe import Observer
-from protocol.messages import Alert, EnemyCount, Production, TypeCount
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.observe import Observer
+from khala_protocol.messages import Alert, EnemyCount, Production, TypeCount
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.state import Snapshot
-    from protocol.messages import View
+    from khala_bridge.state import Snapshot
+    from khala_protocol.messages import View
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bridge.state.grid import NO_GRID, Grid
+from khala_bridge.state.grid import NO_GRID, Grid
 
 
 def test_a_bit_grid_is_read_from_the_bottom_left_with_the_highest_bit_first() -> None:

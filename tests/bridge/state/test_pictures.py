@@ -3,7 +3,7 @@ from __future__ import annotations
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.state import Pictures
+from khala_bridge.state import Pictures
 
 SIZE = common_pb2.Size2DI(x=3, y=2)
 

@@ -7,8 +7,8 @@ import pytest
 from s2clientprotocol import common_pb2, error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from bridge.frames import WorldPoint
-from bridge.state import (
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state import (
     ActionError,
     Alliance,
     Display,
@@ -24,13 +24,13 @@ from bridge.state import (
     read_snapshot,
     read_unit,
 )
-from bridge.state.grid import NO_GRID, Grid
-from protocol.messages import Frames
+from khala_bridge.state.grid import NO_GRID, Grid
+from khala_protocol.messages import Frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.state import Snapshot
+    from khala_bridge.state import Snapshot
 
     Make = Callable[..., raw_pb2.Unit]
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.compat import units, upgrades
-from bridge.knowledge import VERSIONS
-from simulator.catalog import load_catalog
+from khala_bridge.compat import units, upgrades
+from khala_bridge.knowledge import VERSIONS
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.catalog import Catalog
+    from khala_simulator.tables.catalog import Catalog
 
 RACES = (units.Neutral, units.Protoss, units.Terran, units.Zerg)
 UNITS = {int(member): member.name for race in RACES for member in race}

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.functions import functions
-from bridge.knowledge import abilities, ability_of
-from simulator.abilities import AIMS
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import abilities, ability_of
+from khala_simulator.tables.abilities import AIMS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.knowledge import AbilityFacts
-    from simulator.abilities import Ability, Need
-    from simulator.catalog import Catalog
+    from khala_bridge.knowledge import AbilityFacts
+    from khala_simulator.tables.abilities import Ability, Need
+    from khala_simulator.tables.catalog import Catalog
 
 COMPARE: dict[str, Callable[[float, float], bool]] = {"==": operator.eq, "<": operator.lt}
 EVERYWHERE = 500  # of the tables: the whole map

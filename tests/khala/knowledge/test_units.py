@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bridge.knowledge import Weapon, knowledge
+from khala_bridge.knowledge import Weapon, knowledge
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.knowledge import UnitType
-    from simulator.catalog import Catalog
-    from simulator.records import UnitType as Row
-    from simulator.records import Weapon as WeaponRow
+    from khala_bridge.knowledge import UnitType
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.tables.records import UnitType as Row
+    from khala_simulator.tables.records import Weapon as WeaponRow
 
 FASTER = 22.4 / 16  # "normal" seconds in a second
 WEAPONS_OF_THEIR_OWN = {"Carrier", "Battlecruiser", "Baneling", "BroodlingEscort", "LocustFlying"}

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bridge.knowledge import abilities, buffs, knowledge, upgrades
-from simulator.stats import ATTRIBUTES, Stats
+from khala_bridge.knowledge import abilities, buffs, knowledge, upgrades
+from khala_simulator.tables.stats import ATTRIBUTES, Stats
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bridge.knowledge import UpgradeFacts
-    from simulator.catalog import Catalog
-    from simulator.records import UnitType
+    from khala_bridge.knowledge import UpgradeFacts
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.tables.records import UnitType
 
 WITHOUT, WITH = 0, 1
 """Two players, of whom one has the upgrade."""

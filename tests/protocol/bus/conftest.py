@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import ZenohBus, open_bus
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import ZenohBus, open_bus
 
-pytest.register_assert_rewrite("protocol.bus.testing")
+pytest.register_assert_rewrite("khala_protocol.bus.testing")
 
 OpenBus = Callable[[BusConfig], Awaitable[ZenohBus]]
 StartPeer = Callable[..., Awaitable[Process]]

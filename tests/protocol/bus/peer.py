@@ -8,9 +8,9 @@ from __future__ import annotations
 import asyncio
 import sys
 
-from protocol.bus import Delivery
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import open_bus
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
 
 
 async def agent(*endpoints: str) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import ValidationError
 
-from protocol.bus.config import BusConfig, TlsFiles, check, host_port_of, is_local, settings
-from protocol.errors import BusError
+from khala_protocol.bus.config import BusConfig, TlsFiles, check, host_port_of, is_local, settings
+from khala_protocol.errors import BusError
 
 if TYPE_CHECKING:
     from pathlib import Path

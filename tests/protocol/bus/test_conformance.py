@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus.config import BusConfig
-from protocol.bus.memory import MemoryBroker
-from protocol.bus.testing import BusConformance, Connect
-from protocol.bus.zenoh import open_bus
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.bus.testing import BusConformance, Connect
+from khala_protocol.bus.zenoh import open_bus
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from protocol.bus import Bus
+    from khala_protocol.bus import Bus
 
 
 class TestMemoryBus(BusConformance):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.bus import Delivery, Liveness, Sample
-from protocol.bus.memory import MemoryBroker
-from protocol.bus.testing import take
-from protocol.errors import BusClosed
+from khala_protocol.bus import Delivery, Liveness, Sample
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.bus.testing import take
+from khala_protocol.errors import BusClosed
 
 
 async def test_a_killed_session_is_silent_and_its_tokens_and_states_are_gone() -> None:

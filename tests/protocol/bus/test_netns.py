@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus import Delivery, Liveness
-from protocol.bus.config import BusConfig
-from protocol.bus.testing import take
+from khala_protocol.bus import Delivery, Liveness
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.testing import take
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

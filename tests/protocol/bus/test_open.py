@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from protocol.bus.config import BusConfig
-from protocol.bus.zenoh import open_bus, probe
-from protocol.errors import BusError
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus, probe
+from khala_protocol.errors import BusError
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus import Liveness
-from protocol.bus.audience import Audience
-from protocol.bus.config import BATCH_BYTES
-from protocol.bus.keyexpr import matches
-from protocol.bus.lane import WINDOW_BYTES, Lane, Shut, Stopwatch, Window
-from protocol.bus.mailbox import Mailbox
-from protocol.bus.sightings import Sightings
-from protocol.bus.testing import take
-from protocol.bus.threads import run_detached
+from khala_protocol.bus import Liveness
+from khala_protocol.bus.audience import Audience
+from khala_protocol.bus.config import BATCH_BYTES
+from khala_protocol.bus.keyexpr import matches
+from khala_protocol.bus.lane import WINDOW_BYTES, Lane, Shut, Stopwatch, Window
+from khala_protocol.bus.mailbox import Mailbox
+from khala_protocol.bus.sightings import Sightings
+from khala_protocol.bus.testing import take
+from khala_protocol.bus.threads import run_detached
 
 if TYPE_CHECKING:
     from collections.abc import Callable

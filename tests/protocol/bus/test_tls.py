@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus import Delivery, Sample
-from protocol.bus.config import BusConfig, TlsFiles
-from protocol.bus.testing import take
-from protocol.errors import BusError
+from khala_protocol.bus import Delivery, Sample
+from khala_protocol.bus.config import BusConfig, TlsFiles
+from khala_protocol.bus.testing import take
+from khala_protocol.errors import BusError
 
 if TYPE_CHECKING:
     from pathlib import Path

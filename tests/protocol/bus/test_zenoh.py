@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from protocol.bus import Delivery, Liveness, Sample
-from protocol.bus.config import BusConfig
-from protocol.bus.mailbox import Mailbox
-from protocol.bus.testing import take
-from protocol.bus.zenoh import probe
+from khala_protocol.bus import Delivery, Liveness, Sample
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.mailbox import Mailbox
+from khala_protocol.bus.testing import take
+from khala_protocol.bus.zenoh import probe
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

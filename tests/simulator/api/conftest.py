@@ -9,18 +9,18 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import lifecycle
-from simulator.api.game import Game, Setup
-from simulator.api.observation import observe
-from simulator.map_file import read_map
+from khala_simulator.api.game import Game, Setup
+from khala_simulator.api.observation import observe
+from khala_simulator.combat import lifecycle
+from khala_simulator.maps.map_file import read_map
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from simulator.api.seat import Seat
-    from simulator.world import World
+    from khala_simulator.api.seat import Seat
+    from khala_simulator.world.world import World
 
 BARE = """# A map of Khala's simulator
 name: bare

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, raw_pb2, spatial_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import casting
-from simulator.abilities import Ability
-from simulator.action_result import ActionResult
-from simulator.api import game
-from simulator.casting import is_modelled
-from simulator.catalog import load_catalog
-from simulator.client import Client, command, interface
-from simulator.status import Status
-from simulator.world import World
+from khala_simulator.abilities import casting
+from khala_simulator.abilities.casting import is_modelled
+from khala_simulator.api import game
+from khala_simulator.process.client import Client, command, interface
+from khala_simulator.process.status import Status
+from khala_simulator.tables.abilities import Ability
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.world.world import World
 
 OBSERVER, STALKER, ZEALOT, PROBE, PHOENIX, NEXUS = 82, 74, 73, 84, 78, 59
 BLINK, GENERAL_BLINK = 1442, 3687
@@ -539,7 +539,7 @@ def test_abilities_are_those_of_the_selection(three: Client) -> None:
 
 
 def test_what_requires_a_point_is_what_pysc2_expects() -> None:
-    pytest.importorskip("bridge.compat")
+    pytest.importorskip("khala_bridge.compat")
     from pysc2.lib import actions
 
     for ability in ABILITIES:

@@ -4,8 +4,8 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api import clock as clocks
-from simulator.client import Client, ResponseError, interface
+from khala_simulator.process import clock as clocks
+from khala_simulator.process.client import Client, ResponseError, interface
 
 
 class Wall:
@@ -25,7 +25,7 @@ class Wall:
 def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     wall = Wall()
     real = clocks.Clock
-    monkeypatch.setattr("simulator.api.joining.Clock", lambda game: real(game, wall.now, wall.sleep))
+    monkeypatch.setattr("khala_simulator.process.joining.Clock", lambda game: real(game, wall.now, wall.sleep))
     return wall
 
 

@@ -3,8 +3,8 @@
 import pytest
 from s2clientprotocol import data_pb2, sc2api_pb2
 
-from simulator.api import data
-from simulator.catalog import load_catalog
+from khala_simulator.api import data
+from khala_simulator.tables.catalog import load_catalog
 
 
 @pytest.fixture(scope="module")

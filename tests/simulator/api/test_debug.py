@@ -6,7 +6,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, command, interface
+from khala_simulator.process.client import Client, command, interface
 
 MARINE, STALKER, SENTRY = 48, 74, 77
 Value = debug_pb2.DebugSetUnitValue

@@ -5,7 +5,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, interface
+from khala_simulator.process.client import Client, interface
 
 PYLON, PROBE = 60, 84
 OPEN = b"""# A map of Khala's simulator

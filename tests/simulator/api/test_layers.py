@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import buffs
-from simulator.api import layers
-from simulator.api.layers import Frame
-from simulator.api.sight import Display
-from simulator.area_effects import AreaEffect
+from khala_simulator.api import layers
+from khala_simulator.api.layers import Frame
+from khala_simulator.api.sight import Display
+from khala_simulator.combat import buffs
+from khala_simulator.world.area_effects import AreaEffect
 
 SCREEN = {
     1: "creep power selected hallucinations cloaked blip active buildable pathable placeholder",

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.game import Entry, Game, Setup
-from simulator.api.lockstep import Commit, Leave, Lockstep, LockstepError, decode
-from simulator.client import command, interface
-from simulator.maps import load_map
+from khala_simulator.api.game import Entry, Game, Setup
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.process.client import command, interface
+from khala_simulator.process.lockstep import Commit, Leave, Lockstep, LockstepError, decode
 
 MEMBERS = frozenset({1, 2, 3})
 

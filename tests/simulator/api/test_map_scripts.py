@@ -8,7 +8,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, score_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, interface
+from khala_simulator.process.client import Client, interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, debug_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api.layers import MINIMAP_BITS, SCREEN_BITS
-from simulator.client import Client, command, interface
+from khala_simulator.api.layers import MINIMAP_BITS, SCREEN_BITS
+from khala_simulator.process.client import Client, command, interface
 
 STALKER, ZEALOT, NEXUS, OBSERVER, DARK_TEMPLAR, MINERALS = 74, 73, 59, 82, 76, 341
 DTYPES: dict[int, np.dtype[Any]] = {8: np.dtype(np.uint8), 32: np.dtype("<i4")}

@@ -8,12 +8,13 @@ import pytest
 from s2clientprotocol import raw_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import buffs, casting
-from simulator.action_result import ActionResult
-from simulator.api.sight import Display
-from simulator.client import command
-from simulator.tick import advance
-from simulator.world import Mishap
+from khala_simulator.abilities import casting
+from khala_simulator.api.sight import Display
+from khala_simulator.combat import buffs
+from khala_simulator.process.client import command
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tick import advance
+from khala_simulator.world.world import Mishap
 
 RAW = sc.InterfaceOptions(raw=True, raw_affects_selection=True)
 FEATURES = sc.InterfaceOptions(raw=True, raw_affects_selection=True)

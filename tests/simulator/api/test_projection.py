@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulator.api.projection import Minimap, Rect, Screen
+from khala_simulator.api.projection import Minimap, Rect, Screen
 
 SQUARE = Screen(128, 128, 24.0)
 WIDE = Screen(84, 64, 24.0)

@@ -6,7 +6,7 @@ import pytest
 from s2clientprotocol import common_pb2, error_pb2, query_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, interface
+from khala_simulator.process.client import Client, interface
 
 PYLON, GATEWAY, NEXUS, WARP_ZEALOT, REFINERY, SPAWNING_POOL = 881, 883, 880, 1413, 320, 1155
 SPINE_CRAWLER = 1166

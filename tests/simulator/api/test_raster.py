@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, spatial_pb2
 
-from simulator.api.raster import Discs, Layer, draw_discs, sample
+from khala_simulator.api.raster import Discs, Layer, draw_discs, sample
 
 
 def discs(*circles: tuple[float, float, float], size: int = 8) -> Discs:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import buffs
-from simulator.api.painting import palette, sprites
-from simulator.api.painting.silhouettes import CODES, OUTLINES, code_of, outline_of
-from simulator.api.sight import OBSERVER, Alliance
-from simulator.api.viewer import Viewer
-from simulator.area_effects import AreaEffect
-from simulator.catalog import VERSION_OF_BUILD, load_catalog
-from simulator.client import Client, command, interface
+from khala_simulator.api.painting import palette, sprites
+from khala_simulator.api.painting.silhouettes import CODES, OUTLINES, code_of, outline_of
+from khala_simulator.api.sight import OBSERVER, Alliance
+from khala_simulator.api.viewer import Viewer
+from khala_simulator.combat import buffs
+from khala_simulator.process.client import Client, command, interface
+from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
+from khala_simulator.world.area_effects import AreaEffect
 
 Image = NDArray[Any]
 
@@ -80,7 +80,9 @@ def test_what_was_asked_for_is_told_back_and_no_more_is_sent(layers: int) -> Non
 
 
 def test_a_game_without_rendered_images_does_not_load_opencv() -> None:
-    code = "import sys; from simulator.client import Client; Client().play(); sys.exit('cv2' in sys.modules)"
+    code = (
+        "import sys; from khala_simulator.process.client import Client; Client().play(); sys.exit('cv2' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

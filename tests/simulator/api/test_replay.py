@@ -7,9 +7,9 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, raw_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import mpq
-from simulator.client import Client, ResponseError, command, interface
-from simulator.status import Status
+from khala_simulator.process import mpq
+from khala_simulator.process.client import Client, ResponseError, command, interface
+from khala_simulator.process.status import Status
 
 LOOPS = 120
 

@@ -8,11 +8,12 @@ import pytest
 from s2clientprotocol import debug_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator import casting, commands, harvesting
-from simulator.api import debug
-from simulator.api.actions import judge, perform
-from simulator.client import interface
-from simulator.tick import advance
+from khala_simulator.abilities import casting, commands
+from khala_simulator.api import debug
+from khala_simulator.api.actions import judge, perform
+from khala_simulator.economy import harvesting
+from khala_simulator.process.client import interface
+from khala_simulator.tick import advance
 
 if TYPE_CHECKING:
     from collections.abc import Callable

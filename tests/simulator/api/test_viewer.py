@@ -6,7 +6,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import Client, command, interface
+from khala_simulator.process.client import Client, command, interface
 
 FOGGY = b"""# A map of Khala's simulator
 name: foggy

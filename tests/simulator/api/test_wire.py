@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.api import wire
+from khala_simulator.api import wire
 
 
 @given(st.integers(0, 2**32 - 1))

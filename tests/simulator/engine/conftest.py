@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting, commands, lifecycle
-from simulator.action_result import ActionResult
-from simulator.casts import Cast
-from simulator.catalog import DEFAULT_VERSION, load_catalog
-from simulator.columns import NOBODY
-from simulator.maps import GameMap, map_from
-from simulator.players import PlayerSetup
-from simulator.scenario_file import parse_scenario
-from simulator.tick import advance
-from simulator.world import World
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import buffs, lifecycle
+from khala_simulator.maps.game_map import GameMap, map_from
+from khala_simulator.maps.scenario_file import parse_scenario
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import DEFAULT_VERSION, load_catalog
+from khala_simulator.tick import advance
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.players import PlayerSetup
+from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

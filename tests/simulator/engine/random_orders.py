@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simulator.abilities import Aim
-from simulator.api import abilities
-from simulator.maps import load_map
-from simulator.tick import advance, new_game
+from khala_simulator.api import abilities
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tables.abilities import Aim
+from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 EVERY = 8
 ORDERS = 6

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
-from simulator.mechanics import MECHANICS
-from simulator.orders import OrderKind
+from khala_simulator.abilities import commands
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.orders import OrderKind
 
 
 def test_an_idle_unit_engages_an_enemy_within_its_scan_range(field: Any) -> None:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands
-from simulator.maps import load_map, map_names
-from simulator.players import GameResult
-from simulator.tick import advance, new_game
-from simulator.world import World
+from khala_simulator.abilities import commands
+from khala_simulator.maps.game_map import load_map, map_names
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.players import GameResult
+from khala_simulator.world.world import World
 
 Policy = Callable[[World], None]
 STEP_LOOPS = 8

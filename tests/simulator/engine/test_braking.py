@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
+from khala_simulator.abilities import commands
 
 
 @pytest.mark.parametrize("name", ["Marine", "Zergling", "Thor", "SCV", "VoidRay", "Mutalisk", "Tempest", "Colossus"])

@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, casting, commands
-from simulator.abilities import Aim, Filter, Need
-from simulator.action_result import ActionResult
-from simulator.casts import Cast
-from simulator.columns import NOBODY
-from simulator.skills.registry import SKILLS
-from simulator.skills.skill import Skill
+from khala_simulator.abilities import casting, commands
+from khala_simulator.abilities.registry import SKILLS
+from khala_simulator.abilities.skill import Skill
+from khala_simulator.combat import buffs
+from khala_simulator.tables.abilities import Aim, Filter, Need
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
-    from simulator.abilities import Ability
-    from simulator.world import World
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.world.world import World
 
 SIEGE_MODE, UNSIEGE = 388, 390
 

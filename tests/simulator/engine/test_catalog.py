@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from simulator.catalog import Catalog, CatalogError, load_catalog
-from simulator.mechanics import MECHANICS, entries
-from simulator.stats import ATTRIBUTES, LAYERS
-from simulator.systems.weapons import CONDITIONS
+from khala_simulator.systems.weapons import CONDITIONS
+from khala_simulator.tables.catalog import Catalog, CatalogError, load_catalog
+from khala_simulator.tables.mechanics import MECHANICS, entries
+from khala_simulator.tables.stats import ATTRIBUTES, LAYERS
 
 # read off the 4.10 game: life, shields, armor, speed per normal second, sight, supply, minerals, vespene
 UNITS_4_10 = {

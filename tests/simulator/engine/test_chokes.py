@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from simulator import commands, lifecycle, pathfinding
-from simulator.layers import Layer
-from simulator.placement import free_places
+from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.movement import pathfinding
+from khala_simulator.movement.placement import free_places
+from khala_simulator.tables.layers import Layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 WALL_X, WALL_Y = 48, 24
 NOBODY_S_SLOT = 9999

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
-from simulator.orders import Order, OrderKind
-from simulator.players import GameResult
-from simulator.tick import advance
+from khala_simulator.abilities import commands
+from khala_simulator.tick import advance
+from khala_simulator.world.orders import Order, OrderKind
+from khala_simulator.world.players import GameResult
 
 
 def test_smart_attacks_enemies_follows_friends_and_walks_to_points(field: Any) -> None:

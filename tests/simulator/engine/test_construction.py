@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import building_sites, casting, commands, supply
-from simulator.action_result import ActionResult
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import casting, commands
+from khala_simulator.economy import building_sites, supply
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands, contacts
-from simulator.contacts import Bodies, within
+from khala_simulator.abilities import commands
+from khala_simulator.movement import contacts
+from khala_simulator.movement.contacts import Bodies, within
 
 SIXTEENTHS = st.integers(0, 480).map(lambda n: n / 16)  # so that differences are exact
 POINTS = st.lists(st.tuples(SIXTEENTHS, SIXTEENTHS), min_size=1, max_size=60)

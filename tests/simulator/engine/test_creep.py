@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import casting, commands, lifecycle
-from simulator.action_result import ActionResult
-from simulator.catalog import load_catalog
-from simulator.mechanics import MECHANICS
-from simulator.systems.creep import makers, needy
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.systems.creep import makers, needy
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,7 @@ FLAT = "{flat: [64, 64]}"
 
 
 def table(version: str) -> Any:
-    path = resources.files("simulator.data") / "tables" / version / "creep.json"
+    path = resources.files("khala_simulator.data") / "tables" / version / "creep.json"
     return json.loads(path.read_text(encoding="utf-8"))
 
 

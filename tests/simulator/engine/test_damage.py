@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands, damage
-from simulator.catalog import load_catalog
-from simulator.stats import ATTRIBUTES, Stats, bit_set
+from khala_simulator.abilities import commands
+from khala_simulator.combat import damage
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.stats import ATTRIBUTES, Stats, bit_set
 
 if TYPE_CHECKING:
     from collections.abc import Callable

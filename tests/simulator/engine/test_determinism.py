@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator import commands
-from simulator.columns import COLUMNS
-from simulator.maps import load_map
-from simulator.tick import advance, new_game
+from khala_simulator.abilities import commands
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.columns import COLUMNS
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 PLAYED = """
 import sys
 from simulator import commands
-from simulator.maps import load_map
-from simulator.tick import advance, new_game
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tick import advance, new_game
 world = new_game(load_map(sys.argv[1]), seed=int(sys.argv[2]))
 commands.attack_move(world, world.units_of(1).tolist(), (20.0, 14.0))
 advance(world, 300)

@@ -12,25 +12,27 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, casting, commands, harvesting, lifecycle, production, targets
-from simulator.abilities import Aim
-from simulator.action_result import ActionResult
-from simulator.casts import Cast
-from simulator.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
-from simulator.columns import NOBODY
-from simulator.maps import load_map
-from simulator.players import PlayerSetup
-from simulator.skills.registry import SKILLS
-from simulator.systems import creep
-from simulator.tick import advance
-from simulator.traits import refresh
-from simulator.world import World
+from khala_simulator.abilities import casting, commands
+from khala_simulator.abilities.registry import SKILLS
+from khala_simulator.combat import buffs, lifecycle, targets
+from khala_simulator.combat.traits import refresh
+from khala_simulator.economy import harvesting, production
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.systems import creep
+from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
+from khala_simulator.tick import advance
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.players import PlayerSetup
+from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from simulator.abilities import Ability
-    from simulator.casts import Point
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.world.casts import Point
 
 LONGEST = 2500  # loops, for what takes its time before it begins
 CENTRE = (32.0, 32.0)

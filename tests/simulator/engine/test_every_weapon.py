@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from simulator import commands
-from simulator.catalog import load_catalog
-from simulator.players import PlayerSetup
-from simulator.traits import set_weapon
-from simulator.world import World
+from khala_simulator.abilities import commands
+from khala_simulator.combat.traits import set_weapon
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.world.players import PlayerSetup
+from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.records import Hit, UnitType, Weapon
+    from khala_simulator.tables.records import Hit, UnitType, Weapon
 
 VERSIONS = ("4.10", "5.0.13")
 LIFE, SHIELDS = 60.0, 30.0

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import buffs, casting, commands, harvesting
-from simulator.action_result import ActionResult
-from simulator.casts import Cast
-from simulator.maps import load_map
-from simulator.players import PlayerSetup
-from simulator.tick import advance, new_game
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import buffs
+from khala_simulator.economy import harvesting
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.players import PlayerSetup
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import commands
+from khala_simulator.tables.catalog import load_catalog
 
 CATALOG = load_catalog()
 MELEE = [u.name for u in CATALOG.units if any(w.range <= 0.1 and w.hits for w in u.weapons) and u.speed_n and u.army]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands
+from khala_simulator.abilities import commands
 
 # speed per normal second of 16 loops, as the tables say
 SPEEDS = {

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import lifecycle, supply
-from simulator.maps import load_map
-from simulator.opponent.levels import LEVELS, level_of
-from simulator.players import GameResult, PlayerSetup
-from simulator.tick import advance, new_game
+from khala_simulator.combat import lifecycle
+from khala_simulator.economy import supply
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.opponent.levels import LEVELS, level_of
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.players import GameResult, PlayerSetup
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 
 def game(

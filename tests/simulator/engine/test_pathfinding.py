@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import pathfinding
-from simulator.ground import Ground
-from simulator.layers import Layer
-from simulator.maps import load_map
-from simulator.pathfinding import NEIGHBOURS, Surface
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.movement import pathfinding
+from khala_simulator.movement.pathfinding import NEIGHBOURS, Surface
+from khala_simulator.tables.layers import Layer
+from khala_simulator.world.ground import Ground
 
 ROOM = """
 ..........

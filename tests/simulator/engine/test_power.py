@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, power
-from simulator.action_result import ActionResult
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import casting
+from khala_simulator.economy import power
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, supply
-from simulator.action_result import ActionResult
-from simulator.buffs import apply
-from simulator.catalog import load_catalog
-from simulator.columns import NOBODY
-from simulator.production import QUEUE, REACTOR_QUEUE
-from simulator.skills import production as skills
+from khala_simulator.abilities import casting
+from khala_simulator.abilities.shared import production as skills
+from khala_simulator.combat.buffs import apply
+from khala_simulator.economy import supply
+from khala_simulator.economy.production import QUEUE, REACTOR_QUEUE
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from tests.simulator.engine.conftest import Field

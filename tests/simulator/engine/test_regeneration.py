@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from simulator import commands, damage
+from khala_simulator.abilities import commands
+from khala_simulator.combat import damage
 
 
 def hit_once(field: Any, attacker: str, victim: int) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from simulator import casting
-from simulator.action_result import ActionResult
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import casting
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     import pytest

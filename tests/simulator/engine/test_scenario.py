@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator.maps import MapError, find_map, load_map, map_from, map_names
-from simulator.scenario_file import ScenarioError, parse_scenario, read_scenario
-from simulator.tick import advance, new_game
+from khala_simulator.maps.game_map import MapError, find_map, load_map, map_from, map_names
+from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario, read_scenario
+from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator import lifecycle
-from simulator.maps import MapError, map_from
-from simulator.orders import OrderKind
-from simulator.places import Grid, Region, Span
-from simulator.players import GameResult
-from simulator.scenario_file import ScenarioError, parse_scenario, sheets
-from simulator.script import Comparison
-from simulator.tick import advance, new_game
+from khala_simulator.combat import lifecycle
+from khala_simulator.maps.game_map import MapError, map_from
+from khala_simulator.maps.places import Grid, Region, Span
+from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario, sheets
+from khala_simulator.maps.script import Comparison
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.orders import OrderKind
+from khala_simulator.world.players import GameResult
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 HEAD = """\
 name: try_out

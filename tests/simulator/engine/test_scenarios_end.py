@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator import commands, lifecycle
-from simulator.maps import load_map
-from simulator.players import NEUTRAL, GameResult
-from simulator.tick import advance, new_game
-from simulator.traits import refresh
+from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.combat.traits import refresh
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.players import NEUTRAL, GameResult
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 VICTORY, DEFEAT, TIE, UNDECIDED = GameResult.VICTORY, GameResult.DEFEAT, GameResult.TIE, GameResult.UNDECIDED
 

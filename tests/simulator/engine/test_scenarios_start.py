@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator.layers import Layer
-from simulator.maps import load_map, map_names
-from simulator.players import NEUTRAL
-from simulator.tick import advance, new_game
+from khala_simulator.maps.game_map import load_map, map_names
+from khala_simulator.tables.layers import Layer
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.players import NEUTRAL
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 MELEE_1 = {"Nexus": 1, "Probe": 12}
 MELEE_2 = {"Hatchery": 1, "Drone": 12, "Overlord": 1, "Larva": 3}

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from simulator import commands
-from simulator.action_result import ActionResult
-from simulator.skills import carrier as carriers
+from khala_simulator.abilities import commands
+from khala_simulator.abilities.protoss import carrier as carriers
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 ARM = 1042

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 BLINK, STRIDE, CHARGE, SHIFT, CANCEL_SHIFT, CANCEL_SHADE = 1442, 2700, 1819, 2544, 2594, 2596

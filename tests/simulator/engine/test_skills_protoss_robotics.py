@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
-from simulator.damage import apply_damage
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.combat.damage import apply_damage
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 NOVA, SURVEY, OBSERVE, PHASE, TRANSPORT = 2346, 3741, 3739, 1528, 1530

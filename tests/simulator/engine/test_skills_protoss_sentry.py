@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.columns import NOBODY
 
 VERSIONS = ("4.10", "5.0.13")
 GUARDIAN_SHIELD, FORCE_FIELD, ARCHON_IMAGE = 76, 1526, 146

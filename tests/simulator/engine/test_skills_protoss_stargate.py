@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
-from simulator.stats import AIR_PLANE, GROUND_PLANE
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
+from khala_simulator.world.columns import NOBODY
 
 VERSIONS = ("4.10", "5.0.13")
 LIFT, LET_GO, PULSE, NO_PULSE, REVEAL, TRAP, ALIGN, UNALIGN = 173, 174, 2375, 2376, 2146, 2505, 2393, 3707

@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, casting, commands
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
-from simulator.skills.buildings import Radar, radars
+from khala_simulator.abilities import casting, commands
+from khala_simulator.abilities.terran.buildings import Radar, radars
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.columns import NOBODY
 
 VERSIONS = ("4.10", "5.0.13")
 SCAN, MULE, SUPPLIES, REPAIR, MULE_REPAIR, SALVAGE = 399, 171, 255, 316, 78, 32

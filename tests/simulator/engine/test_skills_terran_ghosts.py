@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
-from simulator.mechanics import MECHANICS
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
 
 VERSIONS = ("4.10", "5.0.13")
 SNIPE, EMP, CLOAK, UNCLOAK, HOLD_FIRE, FREE, NUKE, CANCEL_NUKE = 2714, 1628, 382, 383, 36, 38, 1622, 1623

@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, commands
-from simulator.action_result import ActionResult
-from simulator.catalog import load_catalog
-from simulator.mechanics import MECHANICS
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.mechanics import MECHANICS
 
 VERSIONS = ("4.10", "5.0.13")
 STIM, STIM_MARAUDER, KD8 = 380, 253, 2588

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, casting, commands
-from simulator.action_result import ActionResult
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 SIEGE, UNSIEGE, ASSAULT, FIGHTER, HELLBAT, HELLION, HIGH_IMPACT, EXPLOSIVE = 388, 390, 403, 405, 1998, 1978, 2362, 2364

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
-from simulator.mechanics import MECHANICS
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
 
 VERSIONS = ("4.10", "5.0.13")
 TURRET, MATRIX, SHREDDER = 1764, 3747, 3753

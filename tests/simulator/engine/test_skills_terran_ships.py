@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from simulator import buffs, casting, commands
-from simulator.action_result import ActionResult
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 YAMATO, JUMP, GUARD, LEAVE, HEAL, BOOST = 401, 2358, 2558, 2560, 386, 2116

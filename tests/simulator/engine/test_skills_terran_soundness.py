@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import casting, commands
-from simulator.abilities import Aim
+from khala_simulator.abilities import casting, commands
+from khala_simulator.tables.abilities import Aim
 
 VERSIONS = ("4.10", "5.0.13")
 ARMY = (

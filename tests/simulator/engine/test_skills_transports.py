@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import buffs, casting, commands
-from simulator.action_result import ActionResult
+from khala_simulator.abilities import casting, commands
+from khala_simulator.combat import buffs
+from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
 LOAD = {"Medivac": 394, "WarpPrism": 911, "OverlordTransport": 1406, "Bunker": 407, "NydusNetwork": 1437}

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, commands, tick
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
-from simulator.damage import apply_damage
-from simulator.systems import acquire
+from khala_simulator import tick
+from khala_simulator.abilities import commands
+from khala_simulator.combat import buffs
+from khala_simulator.combat.damage import apply_damage
+from khala_simulator.systems import acquire
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from collections.abc import Callable

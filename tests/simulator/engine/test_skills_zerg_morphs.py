@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import casting, commands, supply
-from simulator.action_result import ActionResult
-from simulator.catalog import LOOPS_PER_NORMAL_SECOND, load_catalog
-from simulator.columns import NOBODY
-from simulator.orders import MOVE, OrderKind
+from khala_simulator.abilities import casting, commands
+from khala_simulator.economy import supply
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND, load_catalog
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import MOVE, OrderKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from simulator.abilities import Ability
+    from khala_simulator.tables.abilities import Ability
 
 VERSIONS = ("4.10", "5.0.13")
 FLAT = "{flat: [64, 64]}"

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simulator import buffs, commands, lifecycle, tick
-from simulator.action_result import ActionResult
-from simulator.columns import NOBODY
-from simulator.mechanics import MECHANICS
-from simulator.skills import larvae
-from simulator.systems import acquire
+from khala_simulator import tick
+from khala_simulator.abilities import commands
+from khala_simulator.abilities.zerg import larvae
+from khala_simulator.combat import buffs, lifecycle
+from khala_simulator.systems import acquire
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, supply
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import casting
+from khala_simulator.economy import supply
+from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from tests.simulator.engine.conftest import Field

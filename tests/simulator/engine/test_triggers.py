@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from simulator import commands
-from simulator.maps import load_map
-from simulator.orders import OrderKind
-from simulator.players import GameResult
-from simulator.tick import advance, new_game
+from khala_simulator.abilities import commands
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tick import advance, new_game
+from khala_simulator.world.orders import OrderKind
+from khala_simulator.world.players import GameResult
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 ARMIES = {
     "llm_smac/1c3s5z": ({"Colossus": 1, "Stalker": 3, "Zealot": 5}, {"Colossus": 1, "Stalker": 3, "Zealot": 5}),

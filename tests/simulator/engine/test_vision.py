@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands
+from khala_simulator.abilities import commands
 
 
 def test_without_fog_everybody_sees_everything(field: Any) -> None:

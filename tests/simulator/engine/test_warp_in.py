@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from simulator import casting, supply
-from simulator.action_result import ActionResult
-from simulator.buffs import apply
-from simulator.casts import Cast
-from simulator.catalog import load_catalog
+from khala_simulator.abilities import casting
+from khala_simulator.combat.buffs import apply
+from khala_simulator.economy import supply
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.world.casts import Cast
 
 if TYPE_CHECKING:
     from collections.abc import Callable

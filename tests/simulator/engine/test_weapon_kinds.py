@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands, lifecycle
-from simulator.launchers import LAUNCHERS
-from simulator.traits import set_weapon
+from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.combat.launchers import LAUNCHERS
+from khala_simulator.combat.traits import set_weapon
 
 
 def dummy(field: Any, name: str, x: float, y: float, owner: int = 2) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import commands
+from khala_simulator.abilities import commands
 
 PERIODS = [  # attacker, target, distance between centres, period in loops as 16 x the catalog's normal seconds
     ("Zealot", "SpineCrawler", 1.4, 1.2 * 16),

@@ -10,14 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator import commands, lifecycle, pathfinding
-from simulator.layers import Layer
-from simulator.maps import load_map
-from simulator.placement import free_places
-from simulator.tick import advance, new_game
+from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.movement import pathfinding
+from khala_simulator.movement.placement import free_places
+from khala_simulator.tables.layers import Layer
+from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
-    from simulator.world import World
+    from khala_simulator.world.world import World
 
 
 def deepest_overlap(world: World) -> float:

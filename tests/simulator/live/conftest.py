@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from absl import flags
 
-from bridge.compat import maps, sc2_env
-from simulator.install import install
+from khala_bridge.compat import maps, sc2_env
+from khala_simulator.process.install import install
 
 if not flags.FLAGS.is_parsed():
     flags.FLAGS(["pytest"])

@@ -14,7 +14,7 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from simulator.client import interface
+from khala_simulator.process.client import interface
 
 pytestmark = pytest.mark.game
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc
 
-from bridge.compat import actions, features, sc2_env
-from simulator.client import command
+from khala_bridge.compat import actions, features, sc2_env
+from khala_simulator.process.client import command
 
 pytestmark = pytest.mark.game
 

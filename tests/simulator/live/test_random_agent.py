@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from absl import logging
 
-from bridge.compat import features, maps, sc2_env
+from khala_bridge.compat import features, maps, sc2_env
 
 if TYPE_CHECKING:
     from collections.abc import Callable

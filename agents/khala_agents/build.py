@@ -1,0 +1,182 @@
+"""Configuration → clients and policies: the place of this package that knows all its parts.
+
+What is shared within a process is shared here: the limits of an endpoint by all agents that use the same model
+file, the budget by all. Each agent has a client, and so a connection, of its own.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from khala_agents.config import ModelConfig, WorkerSpec, load_model
+from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.limits import Budget, Limits
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.profiles import PROFILES
+from khala_agents.llm.replay import ReplayClient
+from khala_agents.llm.retry import RetryRule
+from khala_agents.llm.vision import Vision
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.memory import LastSteps
+from khala_agents.policy import Policy, as_policy
+from khala_agents.scripted.policies import Silent
+from khala_agents.secret import read_key
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from khala_agents.llm.client import LLMClient
+    from khala_protocol.messages import Exchange
+
+
+def client_for(config: ModelConfig) -> LLMClient:
+    """A client for one agent.
+
+    Raises:
+        ConfigError: the key that the model file names is not there.
+    """
+    key = read_key(config.api_key_env) if config.api_key_env else None
+    if config.profile == "anthropic":
+        return Anthropic(
+            model=config.model,
+            prices=config.prices,
+            key=key,
+            base_url=config.base_url,
+            max_tokens=config.max_tokens or 1024,
+            temperature=config.temperature,
+            extra=config.extra,
+        )
+    return OpenAICompatible(
+        PROFILES[config.profile],
+        model=config.model,
+        base_url=config.base_url,
+        prices=config.prices,
+        key=key,
+        max_tokens=config.max_tokens,
+        temperature=config.temperature,
+        seed=config.seed,
+        extra=config.extra,
+        detail=config.images.detail if config.images else "auto",
+    )
+
+
+class Workshop:
+    """Makes the policies of one process.
+
+    Args:
+        budget_usd: what all agents of the process together may spend.
+        overrides: fields of every model file that are given on the command line.
+    """
+
+    def __init__(
+        self, *, budget_usd: float | None = None, overrides: Mapping[str, str | float | None] | None = None
+    ) -> None:
+        self._budget = Budget(budget_usd, source="the budget of this process")
+        self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
+        self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+
+    def policy(self, spec: WorkerSpec) -> Policy:
+        """The policy of one agent.
+
+        Raises:
+            ConfigError: a file, a key or a module is missing or wrong.
+        """
+        if spec.policy is not None:
+            return load_policy(spec.policy)
+        assert spec.model is not None
+        config, limits = self._model(spec.model)
+        return LLMPolicy(
+            client_for(config),
+            memory=LastSteps(spec.memory) if spec.memory else None,
+            retry=config.retry,
+            limits=limits,
+            try_timeout_s=config.try_timeout_s,
+            vision=config.vision,
+        )
+
+    def _model(self, name: str) -> tuple[ModelConfig, Limits]:
+        if name not in self._models:
+            config = _changed(_located(load_model(name)), self._overrides, source="command line")
+            if self._budget.limit_usd is not None and not config.prices.known:
+                raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
+            limits = Limits(config.limits, prices=config.prices, budget=self._budget, source=f"model file {name}")
+            self._models[name] = config, limits
+        return self._models[name]
+
+
+def _located(config: ModelConfig) -> ModelConfig:
+    """The model at the address that the environment says, if it says one."""
+    variable = config.base_url_env
+    address = os.environ.get(variable) if variable else None
+    return _changed(config, {"base_url": address}, source=variable) if address else config
+
+
+def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
+    try:
+        return ModelConfig.model_validate({**config.model_dump(), **changes})
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in fault["loc"])
+        raise ConfigError(fault["msg"].removeprefix("Value error, "), source=source, field=field) from None
+
+
+def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[str, LLMPolicy]:
+    """A policy for each agent that made the recorded requests; it gets the recorded answers, and waits for none.
+
+    Args:
+        exchanges: of one run, in any order.
+        memory: as the recorded agents had it.
+    """
+    by_agent: dict[str, list[Exchange]] = {}
+    for exchange in exchanges:
+        by_agent.setdefault(exchange.agent, []).append(exchange)
+    at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
+    return {
+        agent: LLMPolicy(
+            ReplayClient(made), memory=LastSteps(memory) if memory else None, retry=at_once, vision=_vision_of(made)
+        )
+        for agent, made in by_agent.items()
+    }
+
+
+def _vision_of(exchanges: Iterable[Exchange]) -> Vision | None:
+    """Whether the model of these requests was shown pictures."""
+    shown = [len(message.images) for exchange in exchanges for message in exchange.prompt]
+    return Vision(max_images=max(shown)) if any(shown) else None
+
+
+def load_policy(name: str) -> Policy:
+    """The policy called `silent`, or the function, class or policy at `module:name`.
+
+    Modules are looked for in the current directory, too.
+
+    Raises:
+        ConfigError: there is none, or importing it failed.
+    """
+    if name == "silent":
+        return Silent()
+    module_name, _, attribute = name.partition(":")
+    if not module_name or not attribute:
+        raise ConfigError(f"'{name}' is no policy: write 'silent' or module:name, such as my_agent:decide")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"there is no module '{error.name}'", source=f"policy {name}") from None
+    except Exception as error:  # an import runs the user's code, which may raise anything
+        raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=f"policy {name}") from error
+    found = getattr(module, attribute, None)
+    if found is None:
+        raise ConfigError(f"the module {module_name} has no '{attribute}'", source=f"policy {name}")
+    try:
+        return as_policy(found() if isinstance(found, type) else found)
+    except TypeError as error:
+        raise ConfigError(str(error), source=f"policy {name}") from None

@@ -1,0 +1,122 @@
+"""The commands `khala agent` and `khala llm`, as plain functions that `khala.cli` mounts.
+
+They read options, put things together and run until they are told to end. What goes wrong on the user's side is
+raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the front door's part.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+DEFAULT_LLM_PORT = 8765
+
+AGENT_EPILOG = """
+Examples:\n
+    khala agent CombatGroupSmac --run demo\n
+    khala agent CombatGroup1 CombatGroup2 --run demo --model openai --budget-usd 0.50\n
+    khala agent CombatGroup1 --run demo --policy my_agent:decide --connect tcp/10.0.0.5:7447\n
+    khala agent --agents configs/agents/mixed.yaml --run demo
+"""
+LLM_EPILOG = """
+Examples:\n
+    khala llm\n
+    khala llm --latency 1 --fault 429=0.1 --fault stall=0.01 --seed 7\n
+    khala llm --port 0 --ready-file llm.json\n
+    curl http://127.0.0.1:8765/v1/models
+"""
+
+
+def agent(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            envvar="KHALA_AGENTS", help="Agents to play, as the task file names them. Several share this process."
+        ),
+    ] = None,
+    *,
+    run: Annotated[str, typer.Option(envvar="KHALA_RUN", help="Name of the run; the host prints it.", metavar="NAME")],
+    side: Annotated[str, typer.Option(help="Side of the agents, as the task file names it.")] = "blue",
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(help="Endpoint of the router, may be given several times.", show_default="tcp/127.0.0.1:7447"),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(help="Model to ask: a shipped one (scripted, openai, ollama, …) or a YAML file.", metavar="NAME"),
+    ] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(help="Decide without a model: module:function, or silent.", metavar="MODULE:NAME"),
+    ] = None,
+    agents: Annotated[
+        Path | None, typer.Option(help="YAML file that says how each agent decides, instead of NAMES.")
+    ] = None,
+    base_url: Annotated[str | None, typer.Option(help="Use the model at this address instead of its file's.")] = None,
+    model_name: Annotated[str | None, typer.Option(help="Use this model instead of its file's.")] = None,
+    memory: Annotated[int, typer.Option(min=0, help="Past steps that stand in the prompt, word for word.")] = 0,
+    budget_usd: Annotated[
+        float | None, typer.Option(min=0.0, help="What this process may spend; then its agents hold still.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was done as one JSON object.")] = False,
+) -> None:
+    """Play one or more agents of a run.
+
+    An agent gets observations from the host, asks its model or policy, and answers before the deadline. It may
+    start before or after the host, and be started again in the middle of a run.
+
+    Keys of models are taken from the environment only; the model file says which variable.
+    """
+    from khala_agents import commands  # noqa: PLC0415  # see there
+
+    commands.play(
+        commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents),
+        run,
+        side,
+        connect or [],
+        budget_usd=budget_usd,
+        overrides={"base_url": base_url, "model": model_name},
+        as_json=as_json,
+    )
+
+
+def llm(
+    *,
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes a free one.")] = (
+        DEFAULT_LLM_PORT
+    ),
+    latency: Annotated[float, typer.Option(min=0.0, help="Seconds until a request is answered.")] = 0.0,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Part of the requests that goes wrong: an HTTP status, or quota, garbage, nonsense, half, reset, "
+            "drip, stall. May be given several times.",
+            metavar="KIND=RATE",
+        ),
+    ] = None,
+    retry_after: Annotated[float, typer.Option(min=0.0, help="Seconds in Retry-After of 429 and 503.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Of faults and of players that roll dice.")] = 0,
+    ready_file: Annotated[
+        Path | None, typer.Option(help="File to write the base URL to, as JSON, once it listens.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the base URL as a JSON object on stdout.")] = False,
+) -> None:
+    """Serve the scripted model over HTTP, in the form of OpenAI's chat completions.
+
+    It plays from the text of the prompt alone. The model's name selects the player: skilled uses skills, keeps its
+    distance, raids and builds; focus-fire fires with all teams on the weakest enemy, random-legal does anything that
+    is allowed, silent orders nothing.
+    """
+    from khala_agents import commands  # noqa: PLC0415  # see there
+
+    commands.serve(
+        host=host,
+        port=port,
+        latency_s=latency,
+        faults=fault or [],
+        retry_after_s=retry_after,
+        seed=seed,
+        ready_file=ready_file,
+        as_json=as_json,
+    )

@@ -1,0 +1,204 @@
+"""What `khala agent` and `khala llm` do: put things together and run until the run or a signal ends them.
+
+`khala_agents.cli` above has the options; it imports this module only when a command is run, since HTTP clients and servers
+take half a second that `--help` need not wait for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import json
+import os
+import signal
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import typer
+
+from khala_agents.build import Workshop
+from khala_agents.config import AgentsFile, WorkerSpec, load_agents
+from khala_agents.scripted.endpoint import Behaviour, Endpoint
+from khala_agents.scripted.faults import Faults, parse_faults
+from khala_agents.scripted.players import PLAYERS
+from khala_agents.worker import run_workers
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import check_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from khala_agents.policy import Policy
+    from khala_agents.worker import Tally
+    from khala_protocol.messages import Usage
+
+T = TypeVar("T")
+
+
+def play(
+    file: AgentsFile,
+    run: str,
+    side: str,
+    connect: Sequence[str],
+    *,
+    budget_usd: float | None,
+    overrides: Mapping[str, str | float | None],
+    as_json: bool,
+) -> None:
+    """Plays the agents of a file until the run is over or a signal comes, and prints what they did."""
+    budget = budget_usd if budget_usd is not None else file.budget_usd
+    workshop = Workshop(budget_usd=budget, overrides=overrides)
+    check_name(run, "run")
+    check_name(side, "side")
+    policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
+    config = BusConfig(connect=tuple(connect))
+    tallies = _until_signal(lambda stop: _play(config, run, side, policies, stop))
+    if as_json:
+        typer.echo(json.dumps({"run": run, "agents": {name: _plain(tally) for name, tally in tallies.items()}}))
+    else:
+        for name, tally in tallies.items():
+            _say(_sentence(name, tally))
+
+
+def serve(
+    *,
+    host: str,
+    port: int,
+    latency_s: float,
+    faults: Sequence[str],
+    retry_after_s: float,
+    seed: int,
+    ready_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Serves the scripted model until a signal comes."""
+    dice = Faults(parse_faults(faults), seed=seed)
+    behaviour = Behaviour(latency_s=latency_s, faults=dice, retry_after_s=retry_after_s, seed=seed)
+    _until_signal(lambda stop: _serve(Endpoint(behaviour, host=host, port=port), stop, ready_file, as_json=as_json))
+
+
+# --- agent ------------------------------------------------------------------------------------------
+
+
+def specs(names: Sequence[str], *, model: str | None, policy: str | None, memory: int, path: Path | None) -> AgentsFile:
+    """The agents that the command line describes, by a file or one by one.
+
+    Raises:
+        ConfigError: it says both, or nothing, or the file is wrong.
+    """
+    if path is not None:
+        if names or model or policy:
+            raise ConfigError("a file of agents says all: leave out NAMES, --model and --policy", source="--agents")
+        return load_agents(path)
+    if not names:
+        raise ConfigError("say which agents to play, or give a file with --agents: khala agent NAME… --run RUN")
+    if model and policy:
+        raise ConfigError("an agent decides with a model or with a policy: give --model or --policy, not both")
+    spec = WorkerSpec(policy=policy) if policy else WorkerSpec(model=model or "scripted", memory=memory)
+    return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
+
+
+def _settle_memory() -> None:
+    """Takes what was imported out of garbage collection: going through it stops every agent for 40 ms."""
+    gc.collect()
+    gc.freeze()
+
+
+async def _play(
+    config: BusConfig, run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
+) -> dict[str, Tally]:
+    await _check(policies.values())
+    bus = await open_bus(config)
+    try:
+        _say(
+            f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {', '.join(config.connect_to)}"
+        )
+        _settle_memory()
+        return await run_workers(bus, run, side, policies, stop=stop)
+    finally:
+        await bus.close()
+
+
+async def _check(policies: Iterable[Policy]) -> None:
+    """Let policies look for what is wrong with them, before a host counts on them."""
+    async with asyncio.TaskGroup() as group:
+        for policy in policies:
+            group.create_task(policy.check())
+
+
+def _sentence(name: str, tally: Tally) -> str:
+    fallbacks = ", ".join(f"{count} {why}" for why, count in tally.fallbacks.most_common())
+    text = f"{name}: {tally.replies['ok']} replies, {tally.replies['fallback']} fallbacks"
+    text += f" ({fallbacks})" if fallbacks else ""
+    if tally.usage.requests:
+        text += f", {tally.usage.prompt_tokens} + {tally.usage.completion_tokens} tokens, {_price(tally.usage)}"
+    return f"{text}; ended: {tally.ended}"
+
+
+def _price(usage: Usage) -> str:
+    return "price unknown" if usage.cost_usd is None else f"{usage.cost_usd:.4f} USD"
+
+
+def _plain(tally: Tally) -> dict[str, Any]:
+    return {
+        "replies": dict(tally.replies),
+        "fallbacks": dict(tally.fallbacks),
+        "superseded": tally.superseded,
+        "usage": tally.usage.model_dump(),
+        "ended": tally.ended,
+    }
+
+
+# --- llm --------------------------------------------------------------------------------------------
+
+
+async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | None, *, as_json: bool) -> None:
+    async with endpoint:
+        _settle_memory()
+        ready = json.dumps({"base_url": endpoint.base_url, "pid": os.getpid(), "models": list(PLAYERS)})
+        _say(f"scripted models {', '.join(PLAYERS)} at {endpoint.base_url}")
+        if ready_file is not None:
+            _write_whole(ready_file, ready)
+        if as_json:
+            typer.echo(ready)
+        await stop.wait()
+        _say(f"{endpoint.requests} requests were answered")
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Writes a file that nobody can see half of."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        part.write_text(text + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise ConfigError(f"cannot be written: {error.strerror}", source=str(path)) from None
+
+
+# --- both -------------------------------------------------------------------------------------------
+
+
+def _until_signal(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
+    """Runs `work` with an event that SIGINT and SIGTERM set; a second signal ends the process at once."""
+
+    async def main() -> T:
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        signals = (signal.SIGINT, signal.SIGTERM)
+
+        def tell() -> None:
+            stop.set()
+            for number in signals:
+                loop.remove_signal_handler(number)
+
+        for number in signals:
+            loop.add_signal_handler(number, tell)
+        return await work(stop)
+
+    return asyncio.run(main())
+
+
+def _say(text: str) -> None:
+    typer.echo(text, err=True)

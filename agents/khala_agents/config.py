@@ -1,0 +1,180 @@
+"""What agents are configured with: model files, and files that say which agent uses which model or policy.
+
+Model files are found by their name below `configs/models/`, or by a path. Keys never stand in a file: a file
+names the environment variable that holds one. `khala_agents.build` makes clients and policies of what is read here.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, JsonValue, field_validator, model_validator
+
+from khala_agents.llm.address import checked_address
+from khala_agents.llm.limits import LimitRules
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.profiles import PROFILES, ProfileName
+from khala_agents.llm.retry import RetryRule
+from khala_agents.llm.vision import ANTHROPIC, Vision
+from khala_protocol.configfile import load
+from khala_protocol.errors import ConfigError, WrongKey
+from khala_protocol.keys import check_name
+from khala_protocol.messages import Frozen
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+"""The shipped configuration: beside the packages in a checkout and in an installed wheel alike."""
+
+_VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
+_KEY_LIKE = re.compile(r"key|token$|secret|password|authorization", re.IGNORECASE)
+
+
+class ModelConfig(Frozen):
+    """One model at one endpoint."""
+
+    profile: ProfileName | Literal["anthropic"]
+    """What kind of endpoint it is; `compatible` for one that speaks OpenAI's chat completions and has no row."""
+    model: str = Field(min_length=1)
+    """As the endpoint calls it."""
+    base_url: str
+    """Usually ends in `/v1`."""
+    base_url_env: str | None = None
+    """Name of the environment variable whose value takes the place of `base_url` where it is set."""
+    api_key_env: str | None = None
+    """Name of the environment variable with the key; with `_FILE` appended, of one with the path of a file."""
+    max_tokens: int | None = Field(default=None, ge=1)
+    """Limit of generated tokens."""
+    temperature: float | None = Field(default=None, ge=0)
+    seed: int | None = None
+    extra: dict[str, JsonValue] = Field(default_factory=dict)
+    """Fields of the request body, as they are."""
+    try_timeout_s: float = Field(default=45.0, gt=0)
+    """Time for one try; the time to the step's deadline if that is shorter."""
+    retry: RetryRule = RetryRule()
+    limits: LimitRules = LimitRules()
+    prices: Prices = Prices()
+    images: Vision | None = None
+    """Whether the model sees: `true`, or how finely it looks and how its pictures are counted. A model that does not is
+    sent no pictures."""
+
+    @field_validator("images", mode="before")
+    @classmethod
+    def _sees(cls, value: object) -> object:
+        return {} if value is True else None if value is False else value
+
+    @field_validator("base_url")
+    @classmethod
+    def _address(cls, value: str) -> str:
+        return checked_address(value)
+
+    @field_validator("base_url_env")
+    @classmethod
+    def _address_variable(cls, value: str | None) -> str | None:
+        if value is not None and not _VARIABLE.fullmatch(value):
+            raise ValueError("the name of an environment variable is wanted here, such as VLLM_BASE_URL")
+        return value
+
+    @field_validator("api_key_env", mode="before")
+    @classmethod
+    def _variable(cls, value: object) -> object:
+        if isinstance(value, str) and not _VARIABLE.fullmatch(value):  # not quoted: it may be the key itself
+            raise ValueError("the name of an environment variable is wanted here, such as OPENAI_API_KEY, not a key")
+        return value
+
+    @field_validator("extra")
+    @classmethod
+    def _no_keys(cls, value: dict[str, JsonValue]) -> dict[str, JsonValue]:
+        for name in value:
+            if _KEY_LIKE.search(name):
+                raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
+        return value
+
+    @model_validator(mode="after")
+    def _has_what_it_needs(self) -> Self:
+        needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
+        if needs_key and self.api_key_env is None:
+            raise ValueError(f"{self.profile} wants a key: name the environment variable that holds it in api_key_env")
+        return self
+
+    @property
+    def vision(self) -> Vision | None:
+        """How the model sees, with a rule to count by; None if it does not."""
+        rule = ANTHROPIC if self.profile == "anthropic" else PROFILES[self.profile].image_tokens
+        return self.images.counted_by(rule) if self.images else None
+
+
+class WorkerSpec(Frozen):
+    """How one agent decides: with a model, or with a policy."""
+
+    model: str | None = None
+    """Name of a shipped model file, or path of one, relative to the file that it stands in."""
+    policy: str | None = None
+    """`module:name` of a function or a policy, or `silent`."""
+    memory: int = Field(default=0, ge=0)
+    """Steps that stand in the prompt beside the observation, word for word; with a model only."""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.model is None) == (self.policy is None):
+            raise ValueError("either a model or a policy is wanted")
+        return self
+
+
+class AgentsFile(Frozen):
+    """A file that says how each of several agents decides."""
+
+    ELSEWHERE: ClassVar[dict[str, str]] = {"default_reply": "belongs in the task file: the host says it for all agents"}
+
+    agents: dict[str, WorkerSpec] = Field(min_length=1)
+    """By name of the agent."""
+    budget_usd: float | None = Field(default=None, gt=0)
+    """What all of them together may spend; then the host takes the default reply of the task for them."""
+
+    @field_validator("agents")
+    @classmethod
+    def _names(cls, value: dict[str, WorkerSpec]) -> dict[str, WorkerSpec]:
+        for name in value:
+            try:
+                check_name(name, "agent")
+            except WrongKey as error:
+                raise ValueError(str(error)) from None
+        return value
+
+
+def model_files() -> dict[str, Path]:
+    """The shipped model files by name."""
+    return {path.stem: path for path in sorted((CONFIGS / "models").glob("*.yaml"))}
+
+
+def load_model(name: str, *, relative_to: Path | None = None) -> ModelConfig:
+    """The model file of this name, or at this path.
+
+    Raises:
+        ConfigError: there is none, or it is wrong; the text says what and where.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return load((relative_to or Path()) / name, ModelConfig)
+    files = model_files()
+    if name not in files:
+        close = difflib.get_close_matches(name, files, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(files)}"
+        raise ConfigError(f"there is no model file '{name}': {hint}; a path to a .yaml file works too")
+    return load(files[name], ModelConfig)
+
+
+def load_agents(path: Path) -> AgentsFile:
+    """The file at `path`, with the paths of its model files made relative to where we are.
+
+    Raises:
+        ConfigError: there is none, or it is wrong; the text says what and where.
+    """
+    file = load(path, AgentsFile)
+    specs = {
+        name: spec.model_copy(update={"model": str(path.parent / spec.model)})
+        if spec.model and spec.model.endswith((".yaml", ".yml"))
+        else spec
+        for name, spec in file.agents.items()
+    }
+    return file.model_copy(update={"agents": specs})

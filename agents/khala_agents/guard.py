@@ -1,0 +1,123 @@
+"""Ask a policy, and have a reply in time whatever the policy does.
+
+A policy is somebody else's code: it may raise, return nonsense, take too long, or not care that it is cancelled.
+Each of these is a `Decision` with status `fallback` and no words here; the host then takes the default reply of the
+task. Above it: `khala_agents.worker`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import traceback
+from typing import TYPE_CHECKING, ParamSpec
+
+from khala_agents.llm.client import LLMError
+from khala_agents.policy import Decision, Said
+from khala_agents.secret import scrub
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Coroutine
+    from typing import Any
+
+P = ParamSpec("P")
+log = logging.getLogger(__name__)
+
+UNWIND_S = 0.02
+"""A policy that is cancelled gets so long to tell what it has spent, before the fallback is sent."""
+MAX_REPLY_CHARACTERS = 65_536
+"""Longer replies are cut: a model that repeats itself without end must not fill the bus."""
+
+
+class Guard:
+    """Stands between a worker and the policy of one agent.
+
+    Args:
+        agent: name of the agent, for the log.
+    """
+
+    def __init__(self, agent: str) -> None:
+        self._agent = agent
+        self._complaints: set[str] = set()
+        self._abandoned: set[asyncio.Task[Said]] = set()
+
+    async def within(self, time_s: float | None, deciding: Coroutine[Any, Any, Said]) -> Decision:
+        """The decision, or a fallback after `time_s` seconds. Raises only what a cancelled or ending process raises."""
+        task = asyncio.create_task(deciding, name=f"decide {self._agent}")
+        try:
+            done, _ = await asyncio.wait({task}, timeout=time_s)
+            if not done:
+                task.cancel()
+                await asyncio.wait({task}, timeout=UNWIND_S)
+                return _fallback("timeout")
+        finally:
+            self._let_go(task)
+        return self._outcome(task)
+
+    async def safely(
+        self, what: str, function: Callable[P, Awaitable[None]], *args: P.args, **kwargs: P.kwargs
+    ) -> None:
+        """Runs a part of a policy that need not succeed."""
+        try:
+            await function(*args, **kwargs)
+        except Exception as error:  # noqa: BLE001 - a policy is the user's code; it is logged, and the agent lives on
+            self._complain(f"{what} failed", error)
+
+    async def settle(self, timeout_s: float) -> None:
+        """Waits until cancelled decisions have ended, or gives them up."""
+        if self._abandoned:
+            _, pending = await asyncio.wait(self._abandoned, timeout=timeout_s)
+            if pending:
+                log.warning("agent %s: %d decision(s) ignored that they were cancelled", self._agent, len(pending))
+
+    def _outcome(self, task: asyncio.Task[Said]) -> Decision:
+        if task.cancelled():
+            return _fallback("cancelled")
+        error = task.exception()
+        if isinstance(error, LLMError):
+            self._complain_of_model(error)
+            return _fallback(error.status)
+        if isinstance(error, Exception):
+            self._complain("the policy failed", error)
+            return _fallback(type(error).__name__)
+        return self._checked(task.result())
+
+    def _checked(self, answer: object) -> Decision:
+        if isinstance(answer, str):
+            answer = Decision(answer)
+        if not isinstance(answer, Decision):
+            kind = type(answer).__name__
+            self._once(f"the policy returned {kind}, a reply is a str or an khala_agents.policy.Decision")
+            return _fallback(f"returned {kind}")
+        text = answer.text[:MAX_REPLY_CHARACTERS]
+        if not text.isascii():  # lone surrogates cannot be sent
+            text = text.encode("utf-8", "replace").decode("utf-8")
+        return Decision(text, answer.status, answer.detail, answer.attempts, answer.usage)
+
+    def _let_go(self, task: asyncio.Task[Said]) -> None:
+        if not task.done():
+            task.cancel()
+            self._abandoned.add(task)
+            task.add_done_callback(self._forget)
+
+    def _forget(self, task: asyncio.Task[Said]) -> None:
+        self._abandoned.discard(task)
+        if not task.cancelled():
+            task.exception()  # asked for, so that asyncio does not report it as never retrieved
+
+    def _complain_of_model(self, error: LLMError) -> None:
+        self._once(f"no reply of the model: {error} (further errors '{error.status}' are not logged)")
+
+    def _complain(self, what: str, error: Exception) -> None:
+        frames = traceback.extract_tb(error.__traceback__)
+        where = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
+        self._once(f"{what}: {type(error).__name__}: {scrub(str(error))}{where}", key=what + type(error).__name__)
+
+    def _once(self, text: str, key: str | None = None) -> None:
+        if (key or text) not in self._complaints:
+            self._complaints.add(key or text)
+            log.error("agent %s: %s", self._agent, text)
+
+
+def _fallback(detail: str) -> Decision:
+    return Decision("", "fallback", detail)

@@ -1,0 +1,213 @@
+"""One request to a language model, and what can come of it: the interface that every client implements.
+
+A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_agents.llm.limits` holds back, and
+`khala_agents.policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
+
+    LLMError                    .status as recorded in an `Exchange`, .retryable
+    ├── Refused                 ours: the request is wrong, and stays wrong (400, 404, 413, 422, …)
+    │   └── Unauthorized        the user's: the key (401, 403)
+    ├── OutOfMoney              the account is empty or its quota used up (402, some 429)
+    ├── Unavailable             the provider's, for now (408, 409, 429, 5xx); may say when to come back
+    ├── Unreachable             the link's: refused, reset, torn off in the middle
+    ├── TryTimeout              the time of this one try is over
+    ├── MalformedCompletion     the provider's: "200 OK" without a completion in it
+    └── limits.LimitExceeded    ours: a limit that this process was given
+
+No text of an error holds a key: what a server said is passed through `khala_agents.secret.scrub`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+from khala_protocol.errors import KhalaError
+from khala_protocol.messages import ChatMessage, Usage
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from khala_agents.llm.vision import Vision
+
+Scalar = str | int | float | bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """The decision that a request belongs to; recordings are looked up by it."""
+
+    agent: str
+    episode: int
+    step: int
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One request.
+
+    Attributes:
+        messages: the prompt, in order; a system message can stand at the front only.
+        timeout_s: time this try may take, from the start of sending to the last byte of the answer.
+        origin: the decision it belongs to, if any.
+        attempt: number of this try for this decision, from 1.
+        pictures: bytes of the images that the messages name, by their hashes; all of them.
+    """
+
+    messages: tuple[ChatMessage, ...]
+    timeout_s: float | None = None
+    origin: Origin | None = None
+    attempt: int = 1
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Completion:
+    """What a model answered.
+
+    Attributes:
+        text: its words, without what it thought.
+        usage: tokens and price; `unknown_requests=1` if the endpoint did not say.
+        finish: why it stopped, in the endpoint's words: `stop`, `length`, …
+    """
+
+    text: str
+    usage: Usage = field(default_factory=lambda: Usage(requests=1, unknown_requests=1))
+    finish: str = "stop"
+
+
+class LLMClient(Protocol):
+    """A model at an endpoint. Safe to cancel at any moment; not safe for use by several agents at once.
+
+    Attributes:
+        model: its name, as the endpoint calls it.
+        endpoint: base URL without credentials or query.
+        params: what else is asked of the model, as recorded.
+    """
+
+    model: str
+    endpoint: str
+    params: Mapping[str, Scalar]
+
+    async def complete(self, request: Request) -> Completion:
+        """Makes one try.
+
+        Raises:
+            LLMError: no completion came; the type says why.
+        """
+        ...
+
+    async def check(self) -> None:
+        """Finds out, without cost, what can be known to be wrong before the first request.
+
+        Raises:
+            Unauthorized: the endpoint refuses the key.
+        """
+        ...
+
+    async def refresh(self) -> None:
+        """Drops old connections and makes a new one, between episodes. Raises nothing."""
+        ...
+
+    async def close(self) -> None:
+        """Closes its connections. May be called twice."""
+        ...
+
+
+class LLMError(KhalaError):
+    """No completion came.
+
+    Attributes:
+        status: as in `Exchange.status`: `http 429`, `timeout`, `connection`, …
+        retryable: whether the same request may succeed a little later.
+        may_be_billed: whether an answer may have been generated; False if the endpoint refused to.
+    """
+
+    retryable: ClassVar[bool] = False
+    may_be_billed: ClassVar[bool] = True
+
+    def __init__(self, message: str, *, status: str) -> None:
+        self.status = status
+        super().__init__(message)
+
+
+class Refused(LLMError):
+    """The endpoint will never accept this request."""
+
+    may_be_billed = False
+
+
+class Unauthorized(Refused):
+    """The endpoint does not accept the key."""
+
+
+class OutOfMoney(LLMError):
+    """The account at the endpoint has no money or no quota left."""
+
+    may_be_billed = False
+
+
+class Unavailable(LLMError):
+    """The endpoint cannot answer now.
+
+    Attributes:
+        retry_after_s: the earliest time for the next try, if it said so.
+    """
+
+    retryable = True
+    may_be_billed = False
+
+    def __init__(self, message: str, *, status: str, retry_after_s: float | None = None) -> None:
+        self.retry_after_s = retry_after_s
+        super().__init__(message, status=status)
+
+
+class Unreachable(LLMError):
+    """No connection, or one that broke before the answer was complete."""
+
+    retryable = True
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, status="connection")
+
+
+class TryTimeout(LLMError):
+    """The try took longer than it may."""
+
+    retryable = True
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, status="timeout")
+
+
+class MalformedCompletion(LLMError):
+    """The endpoint answered with something that is no completion."""
+
+    retryable = True
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, status="malformed")
+
+
+def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
+    """Hash of a prompt: of roles, contents and hashes of pictures, with their boundaries."""
+    digest = hashlib.sha256()
+    for message in messages:
+        content = message.content.encode("utf-8", "surrogatepass")
+        digest.update(f"{message.role} {len(content)}\n".encode())
+        digest.update(content)
+        for image in message.images:
+            digest.update(f"\n{image.sha256} {image.title}\n".encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()
+
+
+def estimated_tokens(messages: Sequence[ChatMessage], vision: Vision | None = None) -> int:
+    """Tokens of a prompt: of texts by the rule of thumb of four characters a token, of pictures by the model's rule."""
+    texts = (text for message in messages for text in (message.content, *(image.title for image in message.images)))
+    words = sum(-(-len(text) // 4) for text in texts)
+    return words + (estimated_image_tokens(messages, vision) if vision else 0)
+
+
+def estimated_image_tokens(messages: Iterable[ChatMessage], vision: Vision) -> int:
+    """Tokens of the pictures of a prompt."""
+    return sum(vision.image_tokens(image) for message in messages for image in message.images)

@@ -1,0 +1,193 @@
+"""HTTP to one model endpoint: with `khala_agents.llm.transport` below it, the only module that knows httpx.
+
+Each agent has a client, and so connections, of its own: what is cancelled for one disturbs no other. There is no
+limit on connections, `khala_agents.llm.limits` holds requests back; and `refresh` throws the client away between
+episodes, with whatever is left of cancelled calls. HTTP/2 stays off: nothing is won for few long calls.
+
+Above it are `openai_compatible` and `anthropic`, which know what the bytes mean.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from contextlib import suppress
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from functools import cache
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import httpx
+from pydantic_core import from_json
+
+from khala_agents.llm.address import checked_address
+from khala_agents.llm.client import (
+    LLMError,
+    MalformedCompletion,
+    OutOfMoney,
+    Refused,
+    TryTimeout,
+    Unauthorized,
+    Unavailable,
+    Unreachable,
+)
+from khala_agents.llm.retry import is_retried
+from khala_agents.llm.transport import CONNECT_S, AiohttpTransport
+from khala_agents.secret import scrub
+
+if TYPE_CHECKING:
+    import ssl
+    from collections.abc import Mapping
+
+    from pydantic import SecretStr
+
+log = logging.getLogger(__name__)
+
+_TIMEOUT = httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None)  # a whole try has a limit of its own
+_WARM_TIMEOUT_S = 5.0
+_SPENT_CODES = frozenset(
+    {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
+)
+"""Codes under which "429 Too Many Requests" means that the money is used up."""
+_LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+
+
+class HttpEndpoint:
+    """POSTs JSON to an endpoint over a connection of its own.
+
+    Args:
+        base_url: `https://host/v1`; paths are appended to it.
+        headers: sent with each request.
+        key_header: name and prefix of the header that carries the key.
+        key: None sends none.
+    """
+
+    def __init__(
+        self,
+        base_url: str,
+        *,
+        headers: Mapping[str, str] | None = None,
+        key_header: tuple[str, str] = ("Authorization", "Bearer "),
+        key: SecretStr | None = None,
+    ) -> None:
+        self.address = checked_address(base_url)
+        self._headers = {"Content-Type": "application/json", "Accept": "application/json", **(headers or {})}
+        if key is not None:
+            name, prefix = key_header
+            self._headers[name] = prefix + key.get_secret_value()
+        self._client: httpx.AsyncClient | None = None
+
+    async def post(self, path: str, body: bytes, timeout_s: float | None) -> bytes:
+        """The body of the answer.
+
+        Raises:
+            LLMError: there was none within `timeout_s` seconds, or its status says that it is none.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                response = await self._connected().post(self.address + path, content=body)
+        except TimeoutError:
+            raise TryTimeout(f"{self.address} gave no answer within {timeout_s:g} s") from None
+        except httpx.DecodingError:
+            raise MalformedCompletion(f"{self.address} sent a body that cannot be unpacked") from None
+        except httpx.TransportError as error:
+            raise Unreachable(f"{self.address} cannot be reached: {_words(error)}") from None
+        if response.status_code != httpx.codes.OK:
+            raise error_for(self.address, response.status_code, response.headers, response.content)
+        return response.content
+
+    async def refresh(self) -> None:
+        """Throws the connections away and opens a new one, so that the first request of an episode finds it warm."""
+        await self.close()
+        with suppress(LLMError):
+            await self.check()
+
+    async def check(self) -> None:
+        """Asks for the list of models, which costs nothing, to see whether the key is taken.
+
+        Only a key that is refused is an error: an endpoint may come up later, or know no such list. (403 is none:
+        keys may be restricted to completions.)
+
+        Raises:
+            Unauthorized: the endpoint refuses the key.
+        """
+        with suppress(httpx.HTTPError, TimeoutError):
+            async with asyncio.timeout(_WARM_TIMEOUT_S):
+                response = await self._connected().get(self.address + "/models")
+            if response.status_code == httpx.codes.UNAUTHORIZED:
+                raise error_for(self.address, response.status_code, response.headers, response.content)
+
+    async def close(self) -> None:
+        """Closes the connections; the next request opens new ones."""
+        client, self._client = self._client, None
+        if client is not None:
+            await client.aclose()
+
+    def _connected(self) -> httpx.AsyncClient:
+        if self._client is None:
+            self._client = httpx.AsyncClient(
+                headers=self._headers,
+                transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in _LOOPBACK),
+                timeout=_TIMEOUT,
+                trust_env=False,  # what is to be had from the environment, the transport has
+            )
+        return self._client
+
+
+def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes) -> LLMError:
+    """The error that an answer with this status is. What the server says is quoted shortly, without keys."""
+    code, message = _said(body)
+    name = f"http {status}"
+    said = f"{address} answered {name}" + (f": {message}" if message else "")
+    if status in {401, 403}:
+        return Unauthorized(f"{said}; is the key right, and may it use this model?", status=name)
+    if status == 402 or code in _SPENT_CODES:
+        return OutOfMoney(f"{said}; the account has no money or quota left", status=name)
+    if is_retried(status):
+        return Unavailable(said, status=name, retry_after_s=retry_after_s(headers))
+    return Refused(said, status=name)
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Seconds that the headers `Retry-After-Ms` or `Retry-After` (seconds, or a date) ask to wait."""
+    with suppress(KeyError, ValueError):
+        return max(float(headers["retry-after-ms"]) / 1000, 0.0)
+    value = headers.get("retry-after")
+    if value is None:
+        return None
+    with suppress(ValueError):
+        return max(float(value), 0.0)
+    try:
+        until = parsedate_to_datetime(value)
+        # the server's own clock, if it says what it shows: ours may differ
+        now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
+        return max((until - now).total_seconds(), 0.0)
+    except (ValueError, TypeError):
+        return None
+
+
+def _said(body: bytes) -> tuple[str, str]:
+    """Code and message of an error body in the forms that are in use; ("", beginning of the text) otherwise."""
+    try:
+        error = from_json(body)["error"]
+    except (ValueError, KeyError, TypeError):
+        return "", _one_line(body.decode("utf-8", "replace"))
+    if not isinstance(error, dict):
+        return "", _one_line(str(error))
+    return str(error.get("code") or error.get("type") or ""), _one_line(str(error.get("message") or ""))
+
+
+def _one_line(text: str) -> str:
+    text = " ".join(scrub(text).split())
+    return text if len(text) <= 200 else f"{text[:199]}…"
+
+
+def _words(error: httpx.TransportError) -> str:
+    text = _one_line(str(error))
+    return f"{text} ({type(error).__name__})" if text else type(error).__name__
+
+
+@cache
+def _tls() -> ssl.SSLContext:
+    return httpx.create_ssl_context()  # 28 ms: once a process, not once an agent

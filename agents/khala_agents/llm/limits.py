@@ -1,0 +1,207 @@
+"""Limits that the agents of a process share: requests in flight, requests and tokens a minute, money.
+
+    async with limits.admit(tokens=900, deadline=…) as ticket:
+        completion = await client.complete(request)
+        ticket.settle(completion.usage)
+
+`admit` waits for its turn, first come first served, and raises `LimitExceeded` where waiting is no use: the
+money is used up, or the turn would come after the deadline. It knows no model and no HTTP. A provider's own
+limits are met by `khala_agents.llm.retry`; these keep an experiment below them, and below its budget.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from khala_agents.llm.client import LLMError
+from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+    from khala_agents.llm.pricing import Prices
+    from khala_protocol.messages import Usage
+
+LimitType = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
+
+
+class LimitRules(Frozen):
+    """Limits for one endpoint, shared by all agents of a process that use it; None is no limit."""
+
+    in_flight: int | None = Field(default=None, ge=1)
+    """Requests at the same time."""
+    requests_per_minute: float | None = Field(default=None, gt=0)
+    tokens_per_minute: float | None = Field(default=None, gt=0)
+    """Prompt and completion together; the prompt's are estimated before, and corrected after."""
+
+
+class LimitExceeded(LLMError):
+    """A limit of this process stands in the way.
+
+    Attributes:
+        type: which one.
+        value: what it stands at, with this request.
+        limit: what it may not pass.
+        source: where it was set.
+    """
+
+    def __init__(self, kind: LimitType, *, value: float, limit: float, source: str) -> None:
+        self.type, self.value, self.limit, self.source = kind, value, limit, source
+        text = f"the limit {kind} = {limit:g} of {source} is reached ({value:.4g})"
+        super().__init__(text, status="budget" if kind == "budget_usd" else "limit")
+
+
+class Budget:
+    """Money that may be spent, in US dollars. Requests in flight when it is used up are still paid for."""
+
+    def __init__(self, limit_usd: float | None, *, source: str = "budget") -> None:
+        self.limit_usd = limit_usd
+        self.spent_usd = 0.0
+        self.source = source
+
+    def check(self) -> None:
+        """Raises `LimitExceeded` if nothing is left."""
+        if self.limit_usd is not None and self.spent_usd >= self.limit_usd:
+            raise LimitExceeded("budget_usd", value=self.spent_usd, limit=self.limit_usd, source=self.source)
+
+    def spend(self, usd: float) -> None:
+        """Notes what a request cost."""
+        self.spent_usd += usd
+
+
+class Bucket:
+    """So many units a minute, of which a minute's worth may be taken at once after a pause.
+
+    Turns are given out in the order of the calls: who comes reserves its units at once, and then waits until
+    they have flowed in.
+    """
+
+    def __init__(self, kind: LimitType, per_minute: float, *, source: str) -> None:
+        self._kind = kind
+        self._capacity = per_minute
+        self._rate = per_minute / 60.0
+        self._level = per_minute
+        self._filled_at: float | None = None
+        self._source = source
+
+    async def take(self, units: float, deadline: float | None) -> None:
+        """Takes `units` as soon as they are there; gives them back if cancelled.
+
+        Raises:
+            LimitExceeded: they will not be there before `deadline`.
+        """
+        now = self._fill()
+        wait_s = max(units - self._level, 0.0) / self._rate
+        if deadline is not None and now + wait_s >= deadline:
+            value = self._capacity - self._level + units
+            raise LimitExceeded(self._kind, value=value, limit=self._capacity, source=self._source)
+        self._level -= units
+        if wait_s:
+            try:
+                await asyncio.sleep(wait_s)
+            except asyncio.CancelledError:
+                self._level += units
+                raise
+
+    def correct(self, units: float) -> None:
+        """Takes `units` more (or gives them back, if negative) without waiting."""
+        self._level = min(self._level - units, self._capacity)
+
+    def _fill(self) -> float:
+        now = asyncio.get_running_loop().time()
+        if self._filled_at is not None:
+            self._level = min(self._level + (now - self._filled_at) * self._rate, self._capacity)
+        self._filled_at = now
+        return now
+
+
+@dataclass(slots=True)
+class Ticket:
+    """The right to make one request.
+
+    Attributes:
+        waited_s: how long its turn took to come.
+        usage: what the request took, once settled; None for one that failed or was cancelled.
+    """
+
+    waited_s: float
+    usage: Usage | None = None
+
+    def settle(self, usage: Usage) -> None:
+        """Notes what the request took."""
+        self.usage = usage
+
+
+class Limits:
+    """The limits of one endpoint in this process."""
+
+    def __init__(
+        self,
+        rules: LimitRules | None = None,
+        *,
+        prices: Prices | None = None,
+        budget: Budget | None = None,
+        source: str = "the model file",
+    ) -> None:
+        rules = rules or LimitRules()
+        self.budget = budget or Budget(None)
+        self._prices = prices
+        self._in_flight = asyncio.Semaphore(rules.in_flight) if rules.in_flight else None
+        self._requests = _bucket("requests_per_minute", rules.requests_per_minute, source)
+        self._tokens = _bucket("tokens_per_minute", rules.tokens_per_minute, source)
+
+    @asynccontextmanager
+    async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
+        """Waits until one request with a prompt of about `tokens` may be made, and counts it afterwards.
+
+        A request that is not settled (failed, cancelled) is counted with its prompt: its answer may have been
+        generated and billed, and nobody told us.
+
+        Raises:
+            LimitExceeded: it may not be made, or not before `deadline`.
+        """
+        clock = asyncio.get_running_loop().time
+        arrived = clock()
+        self.budget.check()
+        if self._in_flight:
+            await self._in_flight.acquire()
+        try:
+            await self._take_turn(tokens, deadline)
+            self.budget.check()  # it may have been spent while this one waited
+            ticket = Ticket(waited_s=clock() - arrived)
+            try:
+                yield ticket
+            finally:
+                self._settle(ticket.usage, tokens)
+        finally:
+            if self._in_flight:
+                self._in_flight.release()
+
+    async def _take_turn(self, tokens: int, deadline: float | None) -> None:
+        if self._requests:
+            await self._requests.take(1, deadline)
+        if self._tokens:
+            try:
+                await self._tokens.take(tokens, deadline)
+            except BaseException:
+                if self._requests:
+                    self._requests.correct(-1)
+                raise
+
+    def _settle(self, usage: Usage | None, estimated: int) -> None:
+        known = usage is not None and not usage.unknown_requests
+        if usage is not None and known:
+            if self._tokens:
+                self._tokens.correct(usage.prompt_tokens + usage.completion_tokens - estimated)
+            self.budget.spend(usage.cost_usd or 0.0)
+        elif self._prices:
+            self.budget.spend(self._prices.cost_usd(prompt=estimated, completion=0) or 0.0)
+
+
+def _bucket(kind: LimitType, per_minute: float | None, source: str) -> Bucket | None:
+    return None if per_minute is None else Bucket(kind, per_minute, source=source)

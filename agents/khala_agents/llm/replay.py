@@ -1,0 +1,137 @@
+"""Recorded completions in place of a model: the same prompts get the same answers, and the same failures.
+
+A request is looked up by its agent, episode, step and attempt, and its prompt must be the recorded one to the
+letter: what differs is said, for an answer to another question would prove nothing. Nothing is waited for; a
+request that was cut off by the deadline fails at once, so that the agent falls back as it did then.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from khala_agents.llm.client import (
+    Completion,
+    LLMError,
+    MalformedCompletion,
+    Request,
+    Scalar,
+    TryTimeout,
+    Unavailable,
+    Unreachable,
+    prompt_sha256,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from khala_protocol.messages import ChatMessage, Exchange
+
+Key = tuple[str, int, int, int]
+
+
+class NotRecorded(LLMError):
+    """The recording has no such request, or one with another prompt."""
+
+    may_be_billed: ClassVar[bool] = False
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, status="replay")
+
+
+class ReplayClient:
+    """An `LLMClient` that answers from recorded exchanges, of one agent or of several."""
+
+    def __init__(self, exchanges: Iterable[Exchange]) -> None:
+        self._recorded: dict[Key, Exchange] = {(e.agent, e.episode, e.step, e.attempt): e for e in exchanges}
+        first = next(iter(self._recorded.values()), None)
+        self.model = first.model if first else "replay"
+        self.endpoint = first.endpoint if first else "recording"
+        self.params: Mapping[str, Scalar] = dict(first.params) if first else {}
+
+    async def complete(self, request: Request) -> Completion:
+        """The recorded completion, or the recorded failure as an error.
+
+        Raises:
+            NotRecorded: the request is not in the recording.
+            LLMError: it is, and failed.
+        """
+        exchange = self._look_up(request)
+        if exchange.completion is not None:
+            return Completion(exchange.completion, exchange.usage)
+        agent, episode, step, attempt = _key(request)
+        was_repeated = (agent, episode, step, attempt + 1) in self._recorded
+        raise _passing(exchange) if was_repeated else _Final.of(exchange)
+
+    async def check(self) -> None:
+        """Finds nothing wrong."""
+
+    async def refresh(self) -> None:
+        """Does nothing."""
+
+    async def close(self) -> None:
+        """Does nothing."""
+
+    def _look_up(self, request: Request) -> Exchange:
+        agent, episode, step, attempt = key = _key(request)
+        exchange = self._recorded.get(key)
+        if exchange is None:
+            raise NotRecorded(f"no request {attempt} of {agent} in episode {episode}, step {step} was recorded")
+        if prompt_sha256(exchange.prompt) != prompt_sha256(request.messages):
+            where = _difference(exchange.prompt, request.messages)
+            raise NotRecorded(
+                f"the prompt of {agent} in episode {episode}, step {step} is not the recorded one: {where}"
+            )
+        return exchange
+
+
+class _Final(LLMError):
+    """A failure that was not tried again then, and so is not now."""
+
+    @classmethod
+    def of(cls, exchange: Exchange) -> LLMError:
+        status = "timeout" if exchange.status == "cancelled" else exchange.status
+        kind = _FinalUnbilled if status.startswith("http ") else cls
+        return kind(f"recorded: {exchange.status}", status=status)
+
+
+class _FinalUnbilled(_Final):
+    may_be_billed: ClassVar[bool] = False
+
+
+def _passing(exchange: Exchange) -> LLMError:
+    text = f"recorded: {exchange.status}"
+    match exchange.status:
+        case "timeout" | "cancelled":
+            return TryTimeout(text)
+        case "connection":
+            return Unreachable(text)
+        case "malformed":
+            return MalformedCompletion(text)
+    return Unavailable(text, status=exchange.status)
+
+
+def _key(request: Request) -> Key:
+    origin = request.origin
+    if origin is None:
+        raise NotRecorded("a request without its origin cannot be looked up")
+    return origin.agent, origin.episode, origin.step, request.attempt
+
+
+def _difference(recorded: tuple[ChatMessage, ...], asked: tuple[ChatMessage, ...]) -> str:
+    if len(recorded) != len(asked):
+        return f"{len(recorded)} messages were recorded, {len(asked)} are sent"
+    for index, (old, new) in enumerate(zip(recorded, asked, strict=True)):
+        if old.role != new.role:
+            return f"message {index} was of role {old.role}, and is of role {new.role}"
+        if old.images != new.images:
+            return f"message {index} was sent with {_names(old)}, and is with {_names(new)}"
+        lines = zip(f"{old.content}\n".splitlines(), f"{new.content}\n".splitlines(), strict=False)
+        for number, (before, after) in enumerate(lines, 1):
+            if before != after:
+                return f"message {index}, line {number} was {before!r}, and is {after!r}"
+    return "its end differs"
+
+
+def _names(message: ChatMessage) -> str:
+    """The pictures of a message."""
+    return ", ".join(f"{image.name} {image.sha256[:8]}" for image in message.images) or "no pictures"

@@ -1,0 +1,203 @@
+"""How an agent decides: what a user writes, and what is made of it.
+
+    async def decide(briefing, observation) -> str          a function, `async` or not
+    class Mine(Policy):
+        async def decide(self, context) -> str: ...         with pictures, the deadline and a trace of requests
+
+The worker (`khala_agents.worker`) is above: it owns the bus and the deadline, and cancels a decision that is late. A policy
+that raises, or answers nothing in time, costs its agent that step and no more. The policy that asks a language model
+is `khala_agents.llm_policy.LLMPolicy`; shipped doubles are in `khala_agents.scripted`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import inspect
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeAlias, TypeVar
+
+from khala_agents.deadline import time_to_decide_s
+from khala_agents.pictures import Pictures
+from khala_protocol.messages import Usage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_protocol.messages import Briefing, Exchange, Observation
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A reply with what is to be known about it; a policy may return one in place of the bare text.
+
+    Attributes:
+        text: the reply.
+        status: `fallback` if the policy knows that it failed.
+        detail: why it is a fallback, in a few words.
+        attempts, usage: what it took; requests that a policy traces (`Context.trace`) are counted by the worker.
+    """
+
+    text: str
+    status: Literal["ok", "fallback"] = "ok"
+    detail: str = ""
+    attempts: int = 0
+    usage: Usage = field(default_factory=Usage)
+
+
+Said: TypeAlias = str | Decision
+"""What `decide` returns: a reply, or a reply with what is to be known about it."""
+
+
+def _untraced(exchange: Exchange) -> None:
+    """Drop an exchange that nobody wants."""
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a policy has for one decision. The worker makes it; a test can: `Context(briefing, observation)`.
+
+    Attributes:
+        briefing: who the agent is and what it may do, in this episode.
+        observation: what it answers.
+        pictures: where the pictures of the observation are found.
+        trace: call it with each request to a model as soon as the request is over; it is published, recorded and
+            counted in the reply.
+        arrived: when the observation arrived, on the clock of the event loop.
+    """
+
+    briefing: Briefing
+    observation: Observation
+    pictures: Pictures = field(default_factory=Pictures)
+    trace: Callable[[Exchange], None] = _untraced
+    arrived: float = field(default_factory=_now)
+
+    @property
+    def time_s(self) -> float | None:
+        """Seconds that the decision may take in all; None for as long as it likes."""
+        return time_to_decide_s(self.observation.answer_within_s)
+
+    @property
+    def deadline(self) -> float | None:
+        """When the decision is cancelled, on the clock of the event loop; None for never."""
+        return None if self.time_s is None else self.arrived + self.time_s
+
+    @property
+    def time_left_s(self) -> float | None:
+        """Seconds until the deadline, not below 0; None if there is none."""
+        return None if self.deadline is None else max(self.deadline - _now(), 0.0)
+
+
+class Policy(ABC):
+    """Decides for one agent: the base class of policies. Only `decide` has to be written."""
+
+    async def check(self) -> None:  # noqa: B027  # a hook, not a duty
+        """Look for what is wrong, before the agent joins a run.
+
+        Raises:
+            KhalaError: something that the user has to mend.
+        """
+
+    async def prepare(self, briefing: Briefing) -> None:  # noqa: B027  # a hook
+        """Get ready for an episode, before its first observation."""
+
+    @abstractmethod
+    async def decide(self, context: Context) -> Said:
+        """Return the reply to an observation: free text with calls in it, see `khala_protocol.speech`.
+
+        It may be cancelled at any moment, when its time is over or a newer observation is there.
+        """
+
+    async def close(self) -> None:  # noqa: B027  # a hook
+        """Release what is held open, when the worker ends."""
+
+
+class FunctionPolicy(Policy):
+    """Decides with a function of briefing and observation.
+
+    One that is not `async` runs in a thread, where it may block. A thread cannot be cancelled: what it still does after
+    the deadline is thrown away. An `async` function runs on the loop of all agents of the process, and must not block.
+    """
+
+    def __init__(self, function: Callable[[Briefing, Observation], Said | Awaitable[Said]]) -> None:
+        self._function = function
+
+    async def decide(self, context: Context) -> Said:
+        """Return what the function returns."""
+        said: Said | Awaitable[Said]
+        if inspect.iscoroutinefunction(self._function):
+            said = self._function(context.briefing, context.observation)
+        else:
+            said = await _in_thread(self._function, context.briefing, context.observation)
+        return await said if isinstance(said, Awaitable) else said
+
+
+class ObjectPolicy(FunctionPolicy):
+    """Decides with any object that has `decide(briefing, observation)`, and calls its `prepare` and `close` if any.
+
+    Attributes:
+        thing: the object.
+    """
+
+    def __init__(self, thing: Any) -> None:
+        super().__init__(thing.decide)
+        self.thing = thing
+
+    async def prepare(self, briefing: Briefing) -> None:
+        """Call `prepare(briefing)` of the object."""
+        await self._call("prepare", briefing)
+
+    async def close(self) -> None:
+        """Call `close()` of the object."""
+        await self._call("close")
+
+    async def _call(self, name: str, *arguments: object) -> None:
+        function = getattr(self.thing, name, None)
+        if function is not None:
+            returned = function(*arguments)
+            if isinstance(returned, Awaitable):
+                await returned
+
+
+def as_policy(thing: object) -> Policy:
+    """Return a policy as it is, and a function or an object with a method `decide` as a policy.
+
+    Raises:
+        TypeError: it is none of these.
+    """
+    if isinstance(thing, Policy):
+        return thing
+    if hasattr(thing, "decide"):
+        return ObjectPolicy(thing)
+    if callable(thing):
+        return FunctionPolicy(thing)
+    raise TypeError("it is no function and has no method `decide`")
+
+
+async def _in_thread(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """What `function` returns, from a thread that does not keep the process from ending."""
+    future: Future[T] = Future()
+    future.set_running_or_notify_cancel()  # from now on it cannot be cancelled, as the thread cannot
+    context = contextvars.copy_context()
+
+    def run() -> None:
+        try:
+            result = context.run(function, *args, **kwargs)
+        except BaseException as error:  # noqa: BLE001 - it is raised where the future is awaited
+            future.set_exception(error)
+        else:
+            future.set_result(result)
+
+    threading.Thread(target=run, name="policy", daemon=True).start()
+    return await asyncio.wrap_future(future)

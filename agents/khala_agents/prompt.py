@@ -1,0 +1,200 @@
+"""A briefing and an observation → the messages of a prompt.
+
+All that stays the same during an episode is put together once and stands at the front, word for word the
+same in each step, so that a provider can cache it: who the agent is, what it has to do, its teams, what it
+may do and how, how to answer, and an example made of the agent's own teams and actions. Then come
+what the memory recalls, and the observation as the host wrote it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_protocol.messages import ChatMessage
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from khala_protocol.messages import ActionSpec, Briefing, Clock, Correspondent, Frames, ImageRef, TeamSpec
+
+EXAMPLE_TAGS = ("0xe0001", "0xe0002")
+"""Tags of the example; a game's own tags are longer, so that one that was copied is seen at once."""
+_EXAMPLE_VALUES = {"screen": "[14.5, 9]", "minimap": "[31, 22]"}
+
+
+class Prompt:
+    """The prompts of one episode."""
+
+    def __init__(self, briefing: Briefing) -> None:
+        self._head = (
+            ChatMessage(role="system", content=system_text(briefing)),
+            ChatMessage(role="user", content=_example_observation(briefing)),
+            ChatMessage(role="assistant", content=_example_reply(briefing)),
+        )
+
+    def messages(
+        self,
+        observation_text: str,
+        recalled: Sequence[ChatMessage] = (),
+        images: tuple[ImageRef, ...] = (),
+        missing: Sequence[ImageRef] = (),
+    ) -> tuple[ChatMessage, ...]:
+        """System message, example, what the memory recalls, and at the end the observation behind its pictures.
+
+        Args:
+            observation_text: as the host wrote it.
+            recalled: of earlier steps.
+            images: are shown, each with its title before it.
+            missing: should be there and are not; the model is told.
+        """
+        lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
+        seen = ChatMessage(
+            role="user", content=f"{lost}\n{observation_text}" if lost else observation_text, images=images
+        )
+        return (*self._head, *recalled, seen)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def system_text(briefing: Briefing) -> str:
+    """The part of a prompt that says everything but what is seen."""
+    sections = (
+        ("Who you are", _identity(briefing)),
+        ("Your task", briefing.task),
+        ("Your teams", _teams(briefing.teams)),
+        ("Rules", _rules(briefing)),
+        ("Actions", _actions(briefing.actions)),
+        ("Arguments", _arguments(briefing.actions, briefing.frames)),
+        ("Communication", _communication(briefing.correspondents, briefing.channels)),
+        ("How to answer", _format(briefing)),
+    )
+    return "\n\n".join(f"# {title}\n{text}" for title, text in sections if text)
+
+
+def _identity(briefing: Briefing) -> str:
+    return f"You are {briefing.agent}, one of the agents that play a game of StarCraft II.\n{briefing.role}".rstrip()
+
+
+def _teams(teams: Iterable[TeamSpec]) -> str:
+    return "\n".join(
+        f"- {team.name}: {', '.join(team.unit_types)}" + (f". {team.task}" if team.task else "") for team in teams
+    )
+
+
+def _rules(briefing: Briefing) -> str:
+    number = briefing.max_actions
+    rules = [
+        "You command your own teams only; others are commanded by other agents.",
+        "Rely on what the latest observation says. Units that it does not list are out of sight or dead.",
+        "Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.",
+        "Fight where you gain more than you lose; pull out units that are about to die for nothing.",
+        "Abilities that help now come before moving and attacking.",
+        f"A team carries out at most {number} of your actions a step, in the order you write them; more are refused.",
+        "An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.",
+        _clock(briefing.clock),
+    ]
+    return "\n".join(f"- {rule}" for rule in rules)
+
+
+def _clock(clock: Clock) -> str:
+    seconds = f"{clock.step_loops / 22.4:.2g} s of game time pass between two observations"
+    answer = (
+        "" if clock.max_wait_s is None else f" Answer within {clock.max_wait_s:g} s, or your teams go on as before."
+    )
+    match clock.rule:
+        case "frozen":
+            return f"The game stands still while you think; {seconds}.{answer}"
+        case "budget":
+            return f"Each decision costs the same game time however long you think; {seconds}.{answer}"
+        case "token":
+            return f"The more you write, the more game time passes before your actions are carried out.{answer}"
+        case "realtime":
+            return f"The game goes on while you think: be brief.{answer}"
+
+
+def _actions(actions: Iterable[ActionSpec]) -> str:
+    return "\n".join(
+        f"- {signature(action)}" + (f": {action.description}" if action.description else "") for action in actions
+    )
+
+
+def signature(action: ActionSpec) -> str:
+    """An action as it is listed: `<Attack_Unit(tag)>`."""
+    return f"<{action.name}({', '.join(action.args)})>"
+
+
+def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
+    used = {argument for action in actions for argument in action.args}
+    meanings = {
+        "tag": "the tag of a unit exactly as the observation gives it, hexadecimal with 0x in front",
+        "screen": f"a point [x, y] near the team that acts, x and y from 0 to {frames.screen:g} "
+        f"with the team's screen centre at {frames.screen / 2:g}; x grows to the right, y grows downwards",
+        "minimap": f"a point [x, y] of the whole map, x and y from 0 to {frames.minimap:g}; "
+        "x grows to the right, y grows downwards",
+    }
+    return "\n".join(f"- {name}: {meaning}" for name, meaning in meanings.items() if name in used)
+
+
+def _communication(correspondents: Sequence[Correspondent], channels: Sequence[str]) -> str:
+    if not correspondents and not channels:
+        return ""
+    lines = [f"- {who.name}" + (f": {who.role}" if who.role else "") for who in correspondents]
+    lines += [f"- {channel}: a channel, heard by all who listen to it" for channel in channels]
+    lines.append("<MessageTo(name, '''text''')> sends a text to one of them; it arrives with their next observation.")
+    if channels:
+        lines.append("<ListenTo(channel)> lets you hear a channel from the next observation on.")
+    return "\n".join(lines)
+
+
+def _format(briefing: Briefing) -> str:
+    lines = [
+        'Write "Analysis:" and a few sentences on what matters now.',
+        'Then write "Actions:", and under it a line "Team <name>:" for each team that shall act, named as observed.',
+        "Below it write the actions of that team, each as <Name(arguments)> on a line of its own.",
+        "A team that you do not mention goes on with what it is doing.",
+    ]
+    if briefing.correspondents or briefing.channels:
+        lines.append('If you have something to say to others, end with "Communications:" and the messages.')
+    return "\n".join(lines)
+
+
+def _example_observation(briefing: Briefing) -> str:
+    names = " and ".join(_example_teams(briefing))
+    return (
+        f"This is an example of the form of an answer, not a situation of this game. Suppose that {names} had units, "
+        f"that the enemy units {' and '.join(EXAMPLE_TAGS)} stood before them, and that all actions were possible. "
+        "The tags and points of the example mean nothing later on."
+    )
+
+
+def _example_reply(briefing: Briefing) -> str:
+    lines = [
+        "Analysis: Two enemies are in reach and the first one is weaker. All fire on it, then on the other.",
+        "Actions:",
+    ]
+    for team, actions in _example_teams(briefing).items():
+        lines.append(f"    Team {team}:")
+        lines += [f"        {_filled(action)}" for action in actions]
+    if briefing.correspondents:
+        first = briefing.correspondents[0].name
+        lines += ["Communications:", f"    <MessageTo({first}, '''We fire on {EXAMPLE_TAGS[0]} first.''')>"]
+    return "\n".join(lines)
+
+
+def _example_teams(briefing: Briefing) -> dict[str, list[ActionSpec]]:
+    """Up to two teams, with up to two actions each, that show as many kinds of arguments as there are."""
+    teams = [team.name for team in briefing.teams[:2]] or [briefing.agent]
+    kinds: dict[tuple[str, ...], ActionSpec] = {}
+    for action in briefing.actions:
+        kinds.setdefault(action.args, action)
+    shown = sorted(kinds.values(), key=lambda action: len(action.args) != 1)
+    count = min(2, briefing.max_actions)
+    return {team: shown[index : index + count] or shown[:count] for index, team in enumerate(teams)}
+
+
+def _filled(action: ActionSpec) -> str:
+    tags = iter(EXAMPLE_TAGS)
+    values = [next(tags) if kind == "tag" else _EXAMPLE_VALUES[kind] for kind in action.args]
+    return f"<{action.name}({', '.join(values)})>"

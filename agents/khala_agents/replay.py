@@ -1,0 +1,160 @@
+"""Show recorded observations to an agent again, and compare what it says with what it said.
+
+Worker and prompt are the real ones, on a bus in memory; the model is replaced by its recorded completions,
+or the whole policy by one of the caller's. Observations that were not answered in time then are left out: what an
+agent does when it is cut off depends on the clock.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_agents.build import replay_policies
+from khala_agents.worker import run_worker
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.errors import RecordingError
+from khala_protocol.keys import Topic, agent_key, image_key, run_key
+from khala_protocol.messages import Briefing, Exchange, Observation, Reply
+from khala_protocol.recording.difference import Difference
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+
+    from khala_agents.policy import Policy
+    from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.messages import Run
+    from khala_protocol.recording import Recording
+
+PATIENCE_S = 30.0
+"""How long a reply may take that waits for no model."""
+
+
+async def replay_agent(recording: Recording, agent: str, policy: Policy | None = None) -> list[Difference]:
+    """Replays one agent of a recording.
+
+    Args:
+        recording: of a run.
+        agent: its name.
+        policy: decides; by default the language model policy with the recorded completions.
+
+    Returns:
+        every reply that is not the recorded one.
+
+    Raises:
+        RecordingError: the recording has no such agent, or no requests of it and no policy is given.
+    """
+    run = recording.run
+    card = next((card for card in run.agents if card.name == agent), None) if run else None
+    if run is None or card is None:
+        raise RecordingError(f"{recording.path} has no agent {agent}")
+    if policy is None:
+        policies = replay_policies(recording.of(Exchange, agent=agent))
+        if agent not in policies:
+            raise RecordingError(
+                f"{recording.path} has no requests of {agent} to a model: give the policy it played with"
+            )
+        policy = policies[agent]
+    broker = MemoryBroker()
+    bus = broker.session()
+    stage = await _Stage.set(bus, run, card.side, agent)
+    stop = asyncio.Event()
+    worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, agent, policy, stop=stop))
+    try:
+        return [difference async for difference in stage.play(_script(recording, agent))]
+    finally:
+        stop.set()
+        await worker
+        await bus.close()
+
+
+class _Scene:
+    """One observation with what was said to it."""
+
+    def __init__(self, observation: Observation, reply: Reply) -> None:
+        self.observation, self.reply = observation, reply
+
+
+class _Image(NamedTuple):
+    """A picture, and the place that it was published under."""
+
+    place: int
+    data: bytes
+
+
+_Part = Briefing | _Image | _Scene
+
+
+def _script(recording: Recording, agent: str) -> Iterator[_Part]:
+    """Briefings, pictures, and the observations that were answered, in their order."""
+    replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
+    for sample in recording:
+        address = sample.address
+        if address is not None and address.topic is Topic.IMAGE and address.agent == agent:
+            yield _Image(int(address.instance or 0), sample.payload)
+            continue
+        match sample.message:
+            case Briefing(agent=name) as briefing if name == agent:
+                yield briefing
+            case Observation(agent=name) as seen if name == agent and (seen.episode, seen.step) in replies:
+                yield _Scene(seen, replies[seen.episode, seen.step])
+
+
+class _Stage:
+    """The host's side of the bus, for one agent."""
+
+    def __init__(
+        self,
+        briefings: Publisher,
+        observations: Publisher,
+        replies: Subscription[Sample],
+        frame: Callable[[int], Awaitable[Publisher]],
+    ) -> None:
+        self._frame = frame
+        self._frames: dict[int, Publisher] = {}
+        self._briefings, self._observations = briefings, observations
+        self._replies = replies
+
+    @classmethod
+    async def set(cls, bus: Bus, run: Run, side: str, agent: str) -> _Stage:
+        def key(topic: Topic) -> str:
+            return agent_key(run.run, side, agent, topic)
+
+        def frame(place: int) -> Awaitable[Publisher]:
+            return bus.publisher(image_key(run.run, side, agent, place), Delivery.STATE)
+
+        card = await bus.publisher(run_key(run.run, Topic.RUN), Delivery.STATE)
+        await card.put(encode(run))
+        return cls(
+            await bus.publisher(key(Topic.BRIEFING), Delivery.STATE),
+            await bus.publisher(key(Topic.OBSERVATION), Delivery.STATE),
+            await bus.subscribe(key(Topic.REPLY), Delivery.SPEECH),
+            frame,
+        )
+
+    async def _show(self, image: _Image) -> None:
+        if image.place not in self._frames:
+            self._frames[image.place] = await self._frame(image.place)
+        await self._frames[image.place].put(image.data)
+
+    async def play(self, script: Iterator[_Part]) -> AsyncIterator[Difference]:
+        for part in script:
+            if isinstance(part, _Image):
+                await self._show(part)
+                continue
+            if isinstance(part, Briefing):
+                await self._briefings.put(encode(part))
+                continue
+            await self._observations.put(encode(part.observation))
+            async with asyncio.timeout(PATIENCE_S):
+                reply = decode_as(Reply, (await anext(self._replies)).payload)
+            recorded, sent = _words(part.reply), _words(reply)
+            if recorded != sent:
+                yield Difference(reply.agent, reply.episode, reply.step, "reply", recorded, sent)
+
+
+def _words(reply: Reply) -> str:
+    """What a reply says, without how long it took."""
+    return reply.model_dump_json(exclude={"latency_s", "usage"})

@@ -1,0 +1,145 @@
+"""Players that answer a prompt with a script: text in, reply in the form of the paper out.
+
+The same prompt gives the same reply. They know the prompt and nothing else: no game, no state, no clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, Literal
+
+from khala_agents.scripted.reading import Action, Situation, Team, Unit, read
+from khala_agents.scripted.skilled import skilled
+from khala_agents.scripted.writing import call, inside, point, reply
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Callable, Iterable
+
+PlayerName = Literal["silent", "random-legal", "focus-fire", "skilled"]
+
+REACH = 4.0
+"""World units: an enemy is in reach if it is at most so much farther than the team's nearest one."""
+SCREEN_CENTRE = (12.0, 12.0)
+MAP_CENTRE = (32.0, 32.0)
+MESSAGE_SHARE = 0.25
+"""Part of the replies in which a player that has somebody to write to does so."""
+
+
+def silent(observation: str, rng: random.Random) -> str:
+    """Analyses, and orders nothing."""
+    del rng
+    teams = read(observation).teams
+    enemies = {unit.tag for team in teams.values() for unit in team.enemies}
+    return f"Analysis: {len(teams)} team(s) of mine, {len(enemies)} enemy unit(s) in sight. I watch.\n"
+
+
+def random_legal(observation: str, rng: random.Random) -> str:
+    """Gives each team one valid action with arguments that it may have."""
+    situation = read(observation)
+    orders = {}
+    for team in situation.teams.values():
+        possible = [action for action in team.actions if all(_pools(action, team))]
+        if possible:
+            action = rng.choice(possible)
+            orders[team.name] = [call(action.name, *_random_values(action, team, rng))]
+    return reply("Something will come of it.", orders, _hello(situation, rng))
+
+
+def focus_fire(observation: str, rng: random.Random) -> str:
+    """All teams fire on the weakest enemy in reach, the same for all that reach it; who sees none closes up."""
+    situation = read(observation)
+    teams = list(situation.teams.values())
+    target = _common_target(teams)
+    orders = {team.name: order for team in teams if (order := _fight(team, target))}
+    if target is None:
+        return reply("No enemy is in sight.", orders, [])
+    said = []
+    if situation.correspondents and rng.random() < MESSAGE_SHARE:
+        said = [(situation.correspondents[0], f"We fire on {target.tag}.")]
+    words = f"{target.tag} is the weakest enemy in reach, with {target.hit_points:g} left. All fire on it."
+    return reply(words, orders, said)
+
+
+PLAYERS: dict[PlayerName, Callable[[str, random.Random], str]] = {
+    "silent": silent,
+    "random-legal": random_legal,
+    "focus-fire": focus_fire,
+    "skilled": skilled,
+}
+
+
+# --- whom to shoot ----------------------------------------------------------------------------------
+
+
+def in_reach(team: Team) -> list[Unit]:
+    """The enemies that are about as near as the nearest one."""
+    if not team.enemies:
+        return []
+    nearest = min(unit.distance for unit in team.enemies)
+    return [unit for unit in team.enemies if unit.distance <= nearest + REACH or math.isinf(nearest)]
+
+
+def _common_target(teams: Iterable[Team]) -> Unit | None:
+    """The enemy that most teams reach; of those the weakest, then the nearest."""
+    seen = [unit for team in teams for unit in in_reach(team)]
+    reached_by = Counter(unit.tag for unit in seen)
+    return min(seen, key=lambda unit: (-reached_by[unit.tag], *_weakness(unit)), default=None)
+
+
+def _weakness(unit: Unit) -> tuple[float, float, str]:
+    return unit.hit_points, unit.distance, unit.tag
+
+
+def _fight(team: Team, target: Unit | None) -> list[str]:
+    actions = {action.name: action for action in team.actions}
+    reached = in_reach(team)
+    if reached and "Attack_Unit" in actions:
+        common = next((unit for unit in reached if target and unit.tag == target.tag), None)
+        return [f"<Attack_Unit({(common or min(reached, key=_weakness)).tag})>"]
+    if not reached and team.allies and "Move_Screen" in actions:
+        return [f"<Move_Screen({point(_middle(team))})>"]
+    if not reached and "Move_Minimap" in actions:
+        return [f"<Move_Minimap({point(MAP_CENTRE)})>"]
+    return []
+
+
+def _middle(team: Team) -> tuple[float, float]:
+    """Where the allies of a team are, on its screen."""
+    x = sum(unit.x for unit in team.allies) / len(team.allies)
+    y = sum(unit.y for unit in team.allies) / len(team.allies)
+    return inside((x, y), team)
+
+
+# --- arguments --------------------------------------------------------------------------------------
+
+
+def _pools(action: Action, team: Team) -> list[list[Unit]]:
+    """For each tag that an action takes, the units that it may be."""
+    hostile = any(word in action.name for word in ("Attack", "Storm", "Feedback", "Beam", "Stasis"))
+    targets = team.enemies if hostile else team.allies or team.own
+    count = action.args.count("tag")
+    if action.name.startswith("Select_Unit_"):  # the first says who acts
+        return [team.own, targets][:count]
+    return [targets] * count
+
+
+def _random_values(action: Action, team: Team, rng: random.Random) -> list[str]:
+    pools = iter(_pools(action, team))
+    values = []
+    for kind in action.args:
+        if kind == "tag":
+            values.append(rng.choice(next(pools)).tag)
+        elif kind == "minimap":
+            values.append(point((rng.uniform(1, 63), rng.uniform(1, 63))))
+        else:
+            x, y = (middle + rng.uniform(-8, 8) for middle in SCREEN_CENTRE)
+            values.append(point(inside((x, y), team)))
+    return values
+
+
+def _hello(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
+    if situation.correspondents and rng.random() < MESSAGE_SHARE:
+        return [(rng.choice(situation.correspondents), f"{len(situation.teams)} team(s) of mine are left.")]
+    return []

@@ -1,0 +1,12 @@
+"""The skilled player: the baseline that every model is compared with. It plays from the text of an observation alone.
+
+    skilled(observation, rng) -> reply
+
+`kinds` is what anybody knows who plays StarCraft II; `space` is geometry on a screen; `plan` collects the calls of a
+team; `skills`, `combat` and `journey` fill it for units, `economy` for the whole side. It keeps nothing from one
+observation to the next, so that it can be asked like a model; what it would have to remember it reads from the text.
+"""
+
+from khala_agents.scripted.skilled.player import skilled
+
+__all__ = ["skilled"]

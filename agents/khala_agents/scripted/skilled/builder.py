@@ -1,0 +1,117 @@
+"""Placing structures by hand with one worker: where there is room on the screen, and power if it is needed.
+
+The same wants as in `builds` decide what is built; where is guessed from what the screen shows, and mended by the
+place that the host names when it refuses one.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+from typing import TYPE_CHECKING
+
+from khala_agents.scripted.reading import points
+from khala_agents.scripted.skilled.builds import PROTOSS
+from khala_agents.scripted.skilled.economy import met, needs_supply
+from khala_agents.scripted.skilled.kinds import TOWN_HALLS, kind_of
+from khala_agents.scripted.skilled.space import distance
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from khala_agents.scripted.reading import Point, Team, Unit
+    from khala_agents.scripted.skilled.plan import Plan
+
+UNPOWERED = frozenset({"Pylon", "Nexus", "Assimilator"})
+FIELD = 5.5
+"""How far from a Pylon a structure is put."""
+ROOM = {"Nexus": 4.6, "Pylon": 2.6}
+"""Between the middles of a structure of three cells and another one, with a cell to walk on."""
+PLAIN_ROOM = 3.6
+FROM_MINERALS = 3.5
+_HINT = re.compile(r"free place is (\[[^\]]*\])")
+
+
+def leads(plan: Plan) -> bool:
+    """Whether a team is a builder: workers that may build, now or later."""
+    names = {action.name for action in plan.team.actions} | plan.situation.impossible
+    workers = all(kind_of(unit).role == "worker" for unit in plan.team.own)
+    return workers and any(name.startswith("Build_") for name in names)
+
+
+def build(plan: Plan) -> None:
+    """Begins the first structure that is wanted and can be paid, if the worker is free."""
+    team, situation = plan.team, plan.situation
+    if any(unit.order.startswith("Build") for unit in team.own):
+        return
+    wants = [PROTOSS.supply.makes] if needs_supply(situation, PROTOSS) else []
+    wants += [
+        w.action.removeprefix("Build_")
+        for w in PROTOSS.wants
+        if w.action.startswith("Build_") and not met(situation, w)
+    ]
+    for what in wants:
+        if _begin(plan, what):
+            return
+        if not situation.counts.get("Pylon") and what == "Pylon":
+            return
+
+
+def _begin(plan: Plan, what: str) -> bool:
+    """Orders a structure; says whether it could be."""
+    team, situation = plan.team, plan.situation
+    if what in {"Nexus", "Assimilator"}:
+        wanted = "VespeneGeyser" if what == "Assimilator" else ""
+        sites = [tag for kind, tag in situation.sites if (wanted in kind if wanted else "Mineral" in kind)]
+        return bool(sites) and plan.give(f"Build_{what}_Near", sites[0])
+    if not team.can(f"Build_{what}_Screen"):
+        return False
+    place = _hint(plan, what) or _place(team, what, situation.fields)
+    return place is not None and plan.give(f"Build_{what}_Screen", place)
+
+
+def _hint(plan: Plan, what: str) -> Point | None:
+    """The place that the host named when it refused the last one."""
+    for text in plan.situation.rejected:
+        if f"Build_{what}_Screen" in text and (found := _HINT.search(text)):
+            return points(found[1])[0]
+    return None
+
+
+def _place(team: Team, what: str, fields: Sequence[Point]) -> Point | None:
+    """A free place: by a Pylon for what needs power, near the base for Pylons; whole cells for odd sizes in halves."""
+    half = 0.0 if what == "Pylon" else 0.5
+    halls = [unit for unit in team.allies if unit.type in TOWN_HALLS]
+    x0, x1, y0, y1 = (int(edge) for edge in team.bounds)
+    cells = [(x + half, y + half) for x, y in product(range(x0 + 2, x1 - 2), range(y0 + 2, y1 - 2))]
+    structures = [unit for unit in team.allies if kind_of(unit).structure]
+
+    def fits(at: Point) -> bool:
+        if any(
+            distance(at, unit) < ROOM.get(unit.type, PLAIN_ROOM) + (0.5 if what == "Pylon" else 0.9)
+            for unit in structures
+        ):
+            return False
+        if any(distance(at, resource) < FROM_MINERALS for resource in team.resources):
+            return False
+        return not _between(at, halls, team.resources)
+
+    if what not in UNPOWERED:
+        near = [cell for cell in cells if any(distance(cell, field) <= FIELD for field in fields)]
+        return min((cell for cell in near if fits(cell)), key=lambda cell: _nearest(cell, fields), default=None)
+    around = [cell for cell in cells if halls and 6.0 <= min(distance(cell, hall) for hall in halls) <= 10.0]
+    apart = [cell for cell in around if all(distance(cell, field) > FIELD for field in fields)] or around
+    return min((cell for cell in apart if fits(cell)), key=lambda cell: (_nearest(cell, halls), cell), default=None)
+
+
+def _between(at: Point, halls: Sequence[Unit], resources: Sequence[Point]) -> bool:
+    """Whether workers pass there on their way between minerals and base."""
+    return any(
+        distance(at, hall) + distance(at, resource) < distance(resource, hall) + 2.0
+        for hall in halls
+        for resource in resources
+    )
+
+
+def _nearest(at: Point, others: Sequence[Unit] | Sequence[Point]) -> tuple[float, Point]:
+    return min((distance(at, other) for other in others), default=0.0), at

@@ -1,0 +1,191 @@
+"""Fighting with one team: whom to shoot, when to step back, whom to pull out of the fight.
+
+The team shoots at the enemy whose loss helps most for the time that it takes; while its weapons cool down it steps out
+of the reach of slower or shorter-ranged enemies; units that are nearly dead blink or walk out of reach first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_agents.scripted.skilled.kinds import IGNORED, TOWN_HALLS, kind_of
+from khala_agents.scripted.skilled.space import away, distance, middle, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from khala_agents.scripted.reading import Team, Unit
+    from khala_agents.scripted.skilled.plan import Plan
+
+HURT = 0.5
+"""Share of hit points below which a unit is pulled back."""
+IN_DANGER = 7.0
+STEP_BACK = 4.5
+BLINK = 7.5
+WALK_COST = 1.5
+"""World units of walking that halve what a target is worth."""
+MELEE_WALK_COST = 1.0
+"""The same for those who stand in each other's way."""
+COOLING_S = 0.3
+CLINGING = 230.0
+"""Worth of a runner at one's heels during a raid; a worker is worth 200."""
+
+
+def targets(team: Team) -> list[Unit]:
+    """The enemies that some unit of the team has a weapon against."""
+    mine = [kind_of(unit) for unit in team.own]
+    return [
+        enemy for enemy in team.enemies if enemy.type not in IGNORED and any(kind.hits(kind_of(enemy)) for kind in mine)
+    ]
+
+
+def threats(team: Team) -> list[Unit]:
+    """The enemies that have a weapon against some unit of the team."""
+    mine = [kind_of(unit) for unit in team.own]
+    return [
+        enemy
+        for enemy in team.enemies
+        if enemy.built >= 100 and kind_of(enemy).role != "worker" and any(kind_of(enemy).hits(kind) for kind in mine)
+    ]
+
+
+def worth(enemy: Unit, prey: str) -> float:
+    """What it is worth to be rid of an enemy.
+
+    Args:
+        enemy: of the other side.
+        prey: what the team is after besides the fight: "worker" or "hall"; "" for nothing.
+    """
+    kind = kind_of(enemy)
+    value = kind.damage
+    if prey == "worker" and kind.role == "worker":
+        value = 200.0
+    if prey == "hall" and enemy.type in TOWN_HALLS:
+        value = 2e5
+    if enemy.hallucination or enemy.built < 100:
+        value *= 0.2
+    return value
+
+
+def support(teams: Iterable[Team]) -> dict[str, float]:
+    """By the tag of an enemy: how many units of all teams have it in reach, or nearly."""
+    count: dict[str, float] = {}
+    for team in teams:
+        for enemy in team.enemies:
+            able = sum(_gap(unit, enemy) < 1.0 and kind_of(unit).hits(kind_of(enemy)) for unit in team.own)
+            count[enemy.tag] = count.get(enemy.tag, 0.0) + able
+    return count
+
+
+def best_target(plan: Plan, prey: str = "") -> Unit | None:
+    """The enemy whose loss helps most for the time and the way that it takes; None without targets.
+
+    What others have in reach, too, is the better target.
+    """
+    team, most = plan.team, max(1.0, *plan.support.values()) if plan.support else 1.0
+    shooters = [unit for unit in team.own if kind_of(unit).reach >= 0]
+    if not shooters:
+        return None
+    patience = MELEE_WALK_COST if all(kind_of(unit).melee for unit in shooters) else WALK_COST
+
+    def value(enemy: Unit) -> tuple[float, str]:
+        able = [unit for unit in shooters if kind_of(unit).hits(kind_of(enemy))]
+        ways = sorted(max(0.0, distance(unit, enemy) - _range(unit, enemy) - 1.0) for unit in able)
+        way = ways[len(ways) // 2]
+        value = worth(enemy, prey)
+        if prey == "worker" and kind_of(enemy).melee and any(_gap(enemy, unit) < 1.0 for unit in team.own):
+            value = max(value, CLINGING)  # who is caught by runners cannot raid
+        shared = 0.5 + plan.support.get(enemy.tag, 0.0) / most
+        return -shared * value / (enemy.hit_points + 30.0) / 2 ** (way / patience), enemy.tag
+
+    return min(targets(team), key=value, default=None)
+
+
+def fight(plan: Plan, prey: str = "") -> bool:
+    """Plans a fight of one team against what it sees; says whether there is one."""
+    team = plan.team
+    target = best_target(plan, prey)
+    foes = threats(team)
+    if target is None and not foes:
+        return False
+    if prey != "hall":  # who destroys a base does not come back
+        save_the_hurt(plan, foes)
+    if target is None:
+        return bool(prey) or _keep_off(plan, foes)
+    return (not prey and step_back(plan, foes)) or shoot(plan, target)
+
+
+def shoot(plan: Plan, target: Unit) -> bool:
+    """Orders the team to attack one enemy; units that have no weapon against it take the next best one."""
+    team = plan.team
+    able = [unit for unit in team.own if kind_of(unit).hits(kind_of(target))]
+    if len(able) == len(team.own) or not team.can("Select_Unit_Attack_Unit"):
+        return plan.give("Attack_Unit", target.tag)
+    given = [plan.give("Select_Unit_Attack_Unit", unit.tag, target.tag) for unit in able]
+    return any(given)
+
+
+def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
+    """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
+    hit = plan.team.hit
+    hurt = [
+        unit
+        for unit in plan.team.own
+        if unit.share < HURT and (unit.tag in hit or _caught(unit, foes)) and _pressed(unit, foes)
+    ]
+    if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
+        return  # nobody would be left to fight
+    for unit in sorted(hurt, key=lambda unit: unit.share):
+        if plan.left <= keep:
+            return
+        refuge = away(plan.team, (unit.x, unit.y), foes, BLINK)
+        if plan.cast("Blink_Screen", unit, refuge):
+            continue
+        if unit.share < HURT / 2 and kind_of(unit).speed > 2.9:
+            plan.cast("Move_Screen", unit, refuge)
+
+
+def step_back(plan: Plan, foes: Sequence[Unit]) -> bool:
+    """While weapons cool down: out of the reach of enemies who would have to follow; says whether it is worth it."""
+    team = plan.team
+    kinds = [kind_of(unit) for unit in team.own]
+    cooling = sum(unit.weapon_s > COOLING_S for unit in team.own)
+    if not foes or 2 * cooling <= len(team.own) or min(kind.reach for kind in kinds) < 2:
+        return False
+    reach, speed = min(kind.reach for kind in kinds), min(kind.speed for kind in kinds)
+    close = [foe for foe in foes if any(_gap(foe, unit) < 1.0 for unit in team.own)]
+    chased = [foe for foe in close if kind_of(foe).reach < reach - 0.9 and kind_of(foe).speed <= speed + 0.1]
+    if not chased or 2 * len(chased) < len(close):
+        return False
+    if any(kind_of(ally).melee for ally in team.allies):
+        return False  # they hold the line, and need the fire
+    centre = middle(team.own)
+    return plan.give("Move_Screen", away(team, centre, foes, STEP_BACK))
+
+
+def _keep_off(plan: Plan, foes: Sequence[Unit]) -> bool:
+    """Keeps a team that cannot fight out of reach."""
+    near = [foe for foe in foes if any(_gap(foe, unit) < 2.0 for unit in plan.team.own)]
+    if near:
+        plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
+    return True
+
+
+def _caught(unit: Unit, foes: Sequence[Unit]) -> bool:
+    """Whether somebody who fights by hand stands at a unit."""
+    return any(kind_of(foe).melee and _gap(foe, unit) < 1.0 for foe in foes)
+
+
+def _pressed(unit: Unit, foes: Sequence[Unit]) -> bool:
+    foe = nearest(unit, foes)
+    return foe is not None and distance(unit, foe) < max(IN_DANGER, kind_of(foe).reach + 1.5)
+
+
+def _gap(foe: Unit, unit: Unit) -> float:
+    """How far a foe has to come until it reaches a unit."""
+    return distance(foe, unit) - _range(foe, unit) - 1.0
+
+
+def _range(unit: Unit, other: Unit) -> float:
+    kind = kind_of(unit)
+    return kind.air if kind_of(other).flying else kind.ground

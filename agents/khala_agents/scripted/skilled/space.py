@@ -1,0 +1,81 @@
+"""Places on a team's screen: distances, middles, crowds, and where to run."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from khala_agents.scripted.reading import Unit
+from khala_agents.scripted.writing import inside
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from khala_agents.scripted.reading import Point, Team
+
+_DIRECTIONS = tuple((math.cos(k * math.pi / 8), math.sin(k * math.pi / 8)) for k in range(16))
+
+
+def place(unit: Unit) -> Point:
+    """Where a unit is on the screen."""
+    return unit.x, unit.y
+
+
+def distance(a: Unit | Point, b: Unit | Point) -> float:
+    """Between two units or points of one screen, centre to centre."""
+    (ax, ay), (bx, by) = _xy(a), _xy(b)
+    return math.hypot(ax - bx, ay - by)
+
+
+def _xy(what: Unit | Point) -> Point:
+    return (what.x, what.y) if isinstance(what, Unit) else what
+
+
+def middle(units: Sequence[Unit]) -> Point:
+    """The mean place of some units."""
+    return sum(unit.x for unit in units) / len(units), sum(unit.y for unit in units) / len(units)
+
+
+def nearest(to: Unit | Point, units: Iterable[Unit]) -> Unit | None:
+    """The nearest unit; of equally near ones the first."""
+    return min(units, key=lambda unit: distance(to, unit), default=None)
+
+
+def towards(begin: Point, end: Point, length: float) -> Point:
+    """The point so far on the way from one to another; beyond it if the way is shorter."""
+    way = distance(begin, end)
+    if way < 1e-6:
+        return end
+    return begin[0] + (end[0] - begin[0]) * length / way, begin[1] + (end[1] - begin[1]) * length / way
+
+
+def away(team: Team, begin: Point, threats: Sequence[Unit], length: float) -> Point:
+    """A point on the map about so far from a place that is as far from some threats as possible."""
+
+    def safety(at: Point) -> tuple[float, float]:
+        return min((distance(at, unit) for unit in threats), default=0.0), distance(at, begin)
+
+    choices = [inside((begin[0] + dx * length, begin[1] + dy * length), team) for dx, dy in _DIRECTIONS]
+    return max(choices, key=safety)
+
+
+def crowd(
+    targets: Sequence[Unit], radius: float, worth: Callable[[Unit], float], spared: Sequence[Unit] = ()
+) -> tuple[float, Point] | None:
+    """Where most is hit within a radius, and what it is worth; None without targets.
+
+    Args:
+        targets: units that are to be hit; the middle is tried on each of them and between near ones.
+        radius: of what is hit.
+        worth: of one target.
+        spared: units whose worth counts against a place, twice.
+    """
+    best: tuple[float, Point] | None = None
+    for centre in targets:
+        near = [unit for unit in targets if distance(unit, centre) <= radius]
+        for at in (place(centre), middle(near)):
+            value = sum(worth(unit) for unit in targets if distance(unit, at) <= radius)
+            value -= 2 * sum(worth(unit) for unit in spared if distance(unit, at) <= radius + 0.5)
+            if best is None or value > best[0]:
+                best = value, at
+    return best

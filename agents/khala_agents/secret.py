@@ -1,0 +1,60 @@
+"""Keys of model providers: read from the environment, and nowhere else to be seen.
+
+A key is a `pydantic.SecretStr` from the moment it is read, so that neither `repr` nor a log line shows it. What
+a server says can still echo it; every text that comes from outside on its way to a log, a message or a
+recording goes through `scrub`, which knows all keys that this process has read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import SecretStr
+
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+MASK = "[key]"
+_SENDABLE = re.compile(r"[!-~]{1,8192}")  # visible ASCII: an HTTP library quotes a header value it refuses
+_read: set[str] = set()
+
+
+def read_key(variable: str, environ: Mapping[str, str] | None = None) -> SecretStr:
+    """The key in the environment variable `variable`, or in the file that `<variable>_FILE` names.
+
+    Raises:
+        ConfigError: there is none, or it cannot be one; the text does not show it.
+    """
+    environ = os.environ if environ is None else environ
+    file = environ.get(f"{variable}_FILE")
+    value = environ.get(variable) or ""
+    source = variable
+    if not value and file:
+        source = f"{variable}_FILE"
+        try:
+            value = Path(file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            raise ConfigError(f"the file {file!r} cannot be read", source=source) from None
+    value = value.strip()
+    if not value:
+        raise ConfigError(
+            f"no key: set the environment variable {variable}, or let {variable}_FILE name a file that holds it",
+        )
+    if not _SENDABLE.fullmatch(value):
+        raise ConfigError("the key has blanks, line breaks or other characters that no key has", source=source)
+    if len(value) >= 4:  # a shorter "key" is a dummy for a local server and would blot out ordinary words
+        _read.add(value)
+    return SecretStr(value)
+
+
+def scrub(text: str) -> str:
+    """`text` with every key that was read replaced by a mask."""
+    for value in _read:
+        if value in text:
+            text = text.replace(value, MASK)
+    return text

@@ -1,0 +1,267 @@
+"""One agent on the bus: an observation in, one reply out.
+
+The worker owns what a policy must not care about: the bus, the deadline, and that every step is answered once
+and only once. It announces the agent's liveliness, hears briefings and observations (the newest supersedes
+the older ones, and cancels a decision that is still being made for one of them), has a policy decide under
+`khala_agents.guard`, and sends what was said and what it took. It does not read the reply: the host does.
+
+It may join late or be restarted: briefing and newest observation are there as soon as it listens. Below it
+are `protocol` and a policy; above it are the command line, and tests.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeVar
+
+from khala_agents.briefings import Briefings
+from khala_agents.deadline import time_to_decide_s
+from khala_agents.guard import Guard
+from khala_agents.ledger import Ledger
+from khala_agents.links import Links, join
+from khala_agents.pictures import Pictures
+from khala_agents.policy import Context
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.errors import BusClosed, BusError, PeerError
+from khala_protocol.messages import Briefing, Observation, Reply, Result, Run, Usage, Wire
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Mapping
+
+    from khala_agents.policy import Decision, Policy, Said
+    from khala_protocol.bus import Bus, Sample, Subscription
+
+log = logging.getLogger(__name__)
+
+M = TypeVar("M", bound=Wire)
+Ending = Literal["result", "stopped", "bus closed"]
+
+UNWIND_S = 1.0
+"""What cancelled decisions get to end, when the worker ends."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a worker has done.
+
+    Attributes:
+        replies: replies sent, by status.
+        fallbacks: the fallbacks among them, by detail.
+        superseded: observations that were not answered, because a newer one came.
+        usage: what all requests took.
+        ended: why the worker ended.
+    """
+
+    replies: Counter[str] = field(default_factory=Counter)
+    fallbacks: Counter[str] = field(default_factory=Counter)
+    superseded: int = 0
+    usage: Usage = field(default_factory=Usage)
+    ended: Ending = "stopped"
+
+
+async def run_worker(
+    bus: Bus,
+    run: str,
+    side: str,
+    name: str,
+    policy: Policy,
+    *,
+    stop: asyncio.Event | None = None,
+) -> Tally:
+    """Plays one agent until the run's last result, or until `stop` is set or the bus is closed.
+
+    Args:
+        bus: stays open afterwards.
+        run: name of the run.
+        side: side of the agent.
+        name: name of the agent.
+        policy: decides; closed afterwards. If it says nothing in time, an empty reply is sent as a fallback.
+        stop: ends the worker when it is set.
+    """
+    return await Worker(bus, run, side, name, policy).play(stop or asyncio.Event())
+
+
+async def run_workers(
+    bus: Bus,
+    run: str,
+    side: str,
+    policies: Mapping[str, Policy],
+    *,
+    stop: asyncio.Event | None = None,
+) -> dict[str, Tally]:
+    """Plays several agents in one process, each with its own policy, until all have ended."""
+    stop = stop or asyncio.Event()
+    async with asyncio.TaskGroup() as group:
+        tasks = {
+            name: group.create_task(run_worker(bus, run, side, name, policy, stop=stop), name=f"agent {name}")
+            for name, policy in policies.items()
+        }
+    return {name: task.result() for name, task in tasks.items()}
+
+
+class Worker:
+    """One agent's part in one run; see the module."""
+
+    def __init__(self, bus: Bus, run: str, side: str, name: str, policy: Policy) -> None:
+        self.tally = Tally()
+        self._bus = bus
+        self._run, self._side, self._name = run, side, name
+        self._policy = policy
+        self._guard = Guard(name)
+        self._clock = asyncio.get_running_loop().time
+        self._ended = asyncio.Event()
+        self._ledger = Ledger(name)
+        self._briefings = Briefings()
+        self._pictures = Pictures()
+        self._card: Run | None = None
+        self._last_result: int | None = None
+        self._newest: tuple[int, int] | None = None
+        self._deciding: asyncio.Task[None] | None = None
+        self._preparing: asyncio.Task[None] | None = None
+
+    async def play(self, stop: asyncio.Event) -> Tally:
+        """Joins, answers, and leaves; see `run_worker`."""
+        async with AsyncExitStack() as stack:
+            stack.push_async_callback(self._guard.safely, "closing the policy", self._policy.close)
+            try:
+                links = await join(stack, self._bus, self._run, self._side, self._name)
+                await self._serve(links, stop)
+            except* BusClosed:
+                self.tally.ended = "bus closed"
+        self.tally.usage = self._ledger.usage
+        return self.tally
+
+    async def _serve(self, links: Links, stop: asyncio.Event) -> None:
+        async with asyncio.TaskGroup() as group:
+            tasks = [
+                group.create_task(self._hear_images(links), name=f"images {self._name}"),
+                group.create_task(self._hear_briefings(links, group), name=f"briefings {self._name}"),
+                group.create_task(self._hear_run(links)),
+                group.create_task(self._hear_results(links)),
+                group.create_task(self._hear_observations(links, group), name=f"observations {self._name}"),
+                group.create_task(self._ledger.publish(links.exchanges)),
+                group.create_task(self._watch(stop)),
+            ]
+            await self._ended.wait()
+            for task in (*tasks, self._deciding, self._preparing):
+                _cancel(task)
+            if self._deciding:
+                await asyncio.wait({self._deciding})
+            await self._guard.settle(UNWIND_S)
+            await self._ledger.flush(links.exchanges)
+
+    # --- hearing ------------------------------------------------------------------------------------
+
+    async def _hear_briefings(self, links: Links, group: asyncio.TaskGroup) -> None:
+        async for briefing in self._read(Briefing, links.briefings):
+            if await self._briefings.put(briefing):
+                _cancel(self._preparing)
+                preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
+                self._preparing = group.create_task(preparing, name=f"prepare {self._name}")
+
+    async def _hear_images(self, links: Links) -> None:
+        async for sample in links.images:
+            await self._pictures.put(sample.payload)
+
+    async def _hear_run(self, links: Links) -> None:
+        async for card in self._read(Run, links.runs):
+            if self._card is not None:  # the host began again under the same name: its steps count from 0 again
+                self._newest = self._last_result = None
+            self._card = card
+            self._end_if_over()
+
+    async def _hear_results(self, links: Links) -> None:
+        async for result in self._read(Result, links.results):
+            self._last_result = result.episode
+            self._end_if_over()
+
+    async def _hear_observations(self, links: Links, group: asyncio.TaskGroup) -> None:
+        async for observation in self._read(Observation, links.observations):
+            at = (observation.episode, observation.step)
+            if self._newest is not None and at <= self._newest:
+                continue
+            self._newest = at
+            self._supersede()
+            self._deciding = group.create_task(self._answer(observation, links), name=f"answer {self._name} {at}")
+        self._end("bus closed")
+
+    async def _read(self, kind: type[M], samples: Subscription[Sample]) -> AsyncIterator[M]:
+        """What arrives, without what is no message of this kind."""
+        async for sample in samples:
+            try:
+                yield decode_as(kind, sample.payload)
+            except PeerError as error:
+                log.warning("agent %s: %s is dropped: %s", self._name, sample.key, error)
+
+    async def _watch(self, stop: asyncio.Event) -> None:
+        await stop.wait()
+        self._end("stopped")
+
+    # --- answering ----------------------------------------------------------------------------------
+
+    async def _answer(self, observation: Observation, links: Links) -> None:
+        """One turn: decide, then send. Cancelled while deciding only."""
+        arrived = self._clock()
+        self._ledger.open((observation.episode, observation.step))
+        time_s = time_to_decide_s(observation.answer_within_s)
+        decision = await self._guard.within(time_s, self._decide(observation, arrived))
+        self._deciding = None
+        try:
+            await self._send(observation, decision, links, latency_s=self._clock() - arrived)
+        except BusClosed:
+            self._end("bus closed")
+        except BusError as error:  # the host will find this step unanswered, and the next may get through
+            log.warning("agent %s: the reply to step %d could not be sent: %s", self._name, observation.step, error)
+
+    async def _decide(self, observation: Observation, arrived: float) -> Said:
+        briefing = await self._briefings.of(observation.episode)
+        return await self._policy.decide(Context(briefing, observation, self._pictures, self._ledger.note, arrived))
+
+    async def _send(self, observation: Observation, decision: Decision, links: Links, *, latency_s: float) -> None:
+        attempts, usage = self._ledger.account()  # before anything is awaited, for another step may begin meanwhile
+        reply = Reply(
+            run=self._run,
+            side=self._side,
+            agent=self._name,
+            episode=observation.episode,
+            step=observation.step,
+            text=decision.text,
+            status=decision.status,
+            detail=decision.detail,
+            latency_s=latency_s,
+            attempts=attempts or decision.attempts,
+            usage=usage if attempts else decision.usage,
+        )
+        await links.replies.put(encode(reply))
+        self._count(reply)
+
+    def _supersede(self) -> None:
+        if self._deciding is not None:
+            self._deciding.cancel()
+            self._deciding = None
+            self.tally.superseded += 1
+
+    def _count(self, reply: Reply) -> None:
+        self.tally.replies[reply.status] += 1
+        if reply.status == "fallback":
+            self.tally.fallbacks[reply.detail] += 1
+
+    # --- ending -------------------------------------------------------------------------------------
+
+    def _end_if_over(self) -> None:
+        if self._card is not None and self._last_result is not None and self._last_result >= self._card.episodes - 1:
+            self._end("result")
+
+    def _end(self, why: Ending) -> None:
+        if not self._ended.is_set():
+            self.tally.ended = why
+            self._ended.set()
+
+
+def _cancel(task: asyncio.Task[None] | None) -> None:
+    if task is not None:
+        task.cancel()

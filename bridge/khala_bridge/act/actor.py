@@ -1,0 +1,103 @@
+"""From the replies of a side to one joint action: the inward half of a turn.
+
+    joint = Actor(task).joint(sight, {"Zealots": parse(text), …})      what everybody wants, checked
+    plan = executor.plan(joint.commands, sight.snapshot, loops)        played by khala_bridge.game.game
+
+All calls of a turn draw on the same minerals, vespene, supply and workers, in the order of the agents in the task and
+of their words; what the host does by itself comes last, with what nobody ordered. An actor keeps nothing between two
+turns. Whose reply counts and when it is too late is decided above.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.addressee import Addressees
+from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.recognise import recognise
+from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.translate import Translator
+from khala_bridge.act.vocabulary import Vocabulary
+from khala_bridge.auto.workers import automatic
+from khala_protocol.messages import Rejection
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from khala_bridge.act.plan import Executor
+    from khala_bridge.act.translate import Command
+    from khala_bridge.observe.observation import AgentObservation, SideObservation
+    from khala_bridge.task.config import TaskConfig
+    from khala_protocol.speech import Speech
+
+
+@dataclass(frozen=True, slots=True)
+class JointAction:
+    """What a side does in one turn, and what became of each agent's words."""
+
+    commands: tuple[Command, ...] = ()
+    """In the order of the agents in the task, and of their calls."""
+    accepted: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """By agent, `Stalker-1 <Attack_Unit(0x1)>`."""
+    rejections: Mapping[str, tuple[Rejection, ...]] = field(default_factory=dict)
+    """By agent, in the order of the text; malformed calls among them."""
+
+
+class Actor:
+    """Makes one joint action of what the agents of a side said."""
+
+    def __init__(self, task: TaskConfig) -> None:
+        """Takes the task, which says what each agent may be told."""
+        self._task = task
+        self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
+
+    def joint(self, sight: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
+        """The joint action of a turn.
+
+        Args:
+            sight: what the agents see at the moment at which their replies are to take effect.
+            replies: by agent; an agent without one goes on with what it does.
+        """
+        translator = Translator(sight, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
+        commands: list[Command] = []
+        accepted: dict[str, tuple[str, ...]] = {}
+        rejections: dict[str, tuple[Rejection, ...]] = {}
+        for name, agent in sight.agents.items():
+            speech = replies.get(name)
+            if speech is None:
+                continue
+            ordered, said, faults = self._one(translator, agent, speech)
+            commands += ordered
+            accepted[name] = tuple(said)
+            rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
+        for order in automatic(self._task.auto, sight.snapshot, translator.ledger, frozenset(translator.ordered)):
+            commands += translator.commands(order)
+        return JointAction(tuple(commands), accepted, rejections)
+
+    def _one(
+        self, translator: Translator, agent: AgentObservation, speech: Speech
+    ) -> tuple[list[Command], list[str], list[Rejection]]:
+        words = self._words[agent.agent.name]
+        addressees = Addressees(agent, words)
+        commands: list[Command] = []
+        accepted: list[str] = []
+        faults: list[Rejection] = []
+        for call in speech.calls:
+            recognised = recognise(call, words, addressees)
+            if isinstance(recognised, Rejection):
+                faults.append(recognised)
+                continue
+            for said in recognised:
+                translated = translator.translate(said)
+                if isinstance(translated, Rejection):
+                    faults.append(translated)
+                else:
+                    commands += translated
+                    accepted.append(said.text)
+        return commands, accepted, faults
+
+
+def executor_of(task: TaskConfig) -> Executor:
+    """The executor that a task asks for."""
+    return RawExecutor() if task.executor == "raw" else ScreenExecutor()

@@ -1,0 +1,122 @@
+"""Whom a call speaks to: the words of a heading, or their absence → teams of the agent.
+
+| heading | means |
+|---|---|
+| the name of a team, however written: `stalker 1`, `Stalker_1` | that team |
+| a kind of units, if one team is called so: `Stalkers` for Stalker-1 | that team |
+| the name of the agent itself, if it has one team | that team |
+| several teams with commas or "and" between | each of them |
+| "all teams" in some language, "both teams" if there are two | each that may ever be told such an action |
+| none | the only team; or the one whose unit is named first; or the only one that may ever be told such an action |
+| any, with an action for units of the whole side | the team of the side that has it |
+
+Words only, as in `khala_bridge.act.recognise` above it: whether the team can do it now is not asked.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.refused import Refused
+from khala_bridge.act.vocabulary import squashed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from khala_bridge.act.vocabulary import Vocabulary
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.observe.observation import AgentObservation, TeamObservation
+
+_EVERY_TEAM = (
+    "all, all teams, all units, all my teams, every, every team, each, each team, everyone, alle, alle Teams, todos, "
+    "todos los equipos, todas as equipes, toutes les équipes, все команды, 所有队伍, 所有小队, 全部队伍, 所有隊伍, "
+    "全チーム, 모든 팀"
+)
+ALL = frozenset(squashed(words) for words in _EVERY_TEAM.split(", "))
+BOTH = frozenset({"both", "bothteams", "beide", "beideteams"})
+_BETWEEN = re.compile(r"\s*[,;&/+、]\s*(?:and\b)?\s*|\s+(?:and|und|et|y|e|и)\s+|和|与")
+_TEAM_WORD = re.compile(r"(?:the\s+)?teams?\s+", re.IGNORECASE)
+
+
+class Addressees:
+    """The teams of one agent, as the calls of a reply may speak to them."""
+
+    def __init__(self, agent: AgentObservation, words: Vocabulary) -> None:
+        """Takes what the agent sees now, which names its teams, and the names that it may say."""
+        self._agent = agent
+        self._words = words
+        self._by_name = {squashed(team.view.name): team for team in agent.teams}
+
+    def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamObservation]:
+        """The teams that a call speaks to, at least one.
+
+        Args:
+            heading: the team as written above the call; None if there was none.
+            action: what they are to do.
+            tags: the tags among its arguments.
+
+        Raises:
+            Refused: no team is meant, or one that is not there, or more than one may be.
+        """
+        if not self._agent.teams:
+            raise Refused("unknown_team", "You have no units left, so no team can act.")
+        if heading is None:
+            return [self._unnamed(action, tags)]
+        named = self._named(heading, action)
+        if action.subject == "side" and not any(self._words.has(team, action) for team in named):
+            of_side = [team for team in self._able(action) if not team.team.tags]
+            return of_side if len(of_side) == 1 else named
+        return named
+
+    def listening(self, heading: str | None) -> Sequence[TeamObservation]:
+        """The team of a heading, or all of them."""
+        team = None if heading is None else self._one(heading)
+        return self._agent.teams if team is None else [team]
+
+    def _able(self, action: Action) -> list[TeamObservation]:
+        """The teams that may ever be told to do it."""
+        return [team for team in self._agent.teams if self._words.has(team, action)]
+
+    def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamObservation:
+        """The team that is meant where none is named."""
+        teams = self._agent.teams
+        if len(teams) == 1:
+            return teams[0]
+        owners = [team for team in teams if tags[0] in team.team.tags] if action.named else []
+        for candidates in (owners, self._able(action)):
+            if len(candidates) == 1:
+                return candidates[0]
+        ask = 'write "Team <name>:" above the action'
+        raise Refused("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
+
+    def _named(self, heading: str, action: Action) -> Sequence[TeamObservation]:
+        """The teams that a heading names."""
+        plain = squashed(heading)
+        if team := self._one(heading):
+            return [team]
+        if plain in ALL or (plain in BOTH and len(self._agent.teams) == len("AB")):
+            return self._able(action) or self._agent.teams
+        several = [self._one(_TEAM_WORD.sub("", part)) for part in _BETWEEN.split(heading) if part.strip()]
+        if len(several) > 1 and None not in several:
+            return list({team.view.name: team for team in several if team is not None}.values())
+        if plain in map(squashed, self._agent.idle_teams):
+            raise Refused("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
+        close = difflib.get_close_matches(plain, self._by_name, n=1, cutoff=0.75)
+        meant = f"did you mean {self._by_name[close[0]].view.name}? Your" if close else "your"
+        raise Refused("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
+
+    def _one(self, name: str) -> TeamObservation | None:
+        """The one team that a name can mean."""
+        plain = squashed(name)
+        if found := self._by_name.get(plain):
+            return found
+        if plain == squashed(self._agent.agent.name) and len(self._agent.teams) == 1:
+            return self._agent.teams[0]
+        forms = (plain, plain.rstrip("s"))
+        kinds = [team for written, team in self._by_name.items() if written.rstrip("0123456789") in forms]
+        return kinds[0] if len(kinds) == 1 else None
+
+    def _your_teams(self, your: str = "your") -> str:
+        return f"{your} teams are {', '.join(team.view.name for team in self._agent.teams)}."

@@ -1,0 +1,103 @@
+"""What an executor makes of commands: a plan, played step by step by `khala_bridge.game.game`.
+
+A plan is a generator and touches no game: it yields what has to enter one `SC2Env.step`, is sent the snapshot that
+this step led to, and returns what it played. So both executors can be tested without a game, and the game needs to
+know nothing of executors. A plan ends when it is sent a snapshot of an episode that is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from khala_bridge.act.recognise import Refused, reject
+from khala_bridge.names import order_name
+from khala_bridge.state import Snapshot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from khala_bridge.act.translate import Command
+    from khala_protocol.messages import Rejection
+
+GameAction: TypeAlias = Any
+"""A `sc_pb.Action` or a PySC2 function call; `SC2Env.step` takes both."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What enters one `SC2Env.step`."""
+
+    actions: tuple[GameAction, ...]
+    loops: int
+    """Game loops that pass with it, at least 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A command that did not do what was asked, found out while it was played."""
+
+    agent: str
+    rejection: Rejection
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What came of a plan."""
+
+    functions: tuple[str, ...] = ()
+    """What entered the game, in PySC2's words."""
+    refusals: tuple[Refusal, ...] = ()
+
+
+Plan: TypeAlias = Generator[Step, Snapshot, Played]
+
+
+class Executor(Protocol):
+    """Plays commands in one of two ways."""
+
+    def begin(self) -> None:
+        """Forgets the episode before."""
+
+    def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:
+        """A plan that carries the commands out and lets `loops` game loops pass, or more if it needs them."""
+
+
+def refuse(command: Command, why: str) -> Refusal | None:
+    """The game said no to a command; `why` is the end of a sentence. None if it was the host's own command."""
+    said = command.said
+    if said is None:
+        return None
+    message = f"The game refused {said.action.name}: {why}."
+    return Refusal(said.team.team.agent, reject(said.call, Refused("refused_by_game", message), said.team.view.name))
+
+
+def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[Refusal, ...]:
+    """The refusals among the errors that the game reported; one for each command at most."""
+    found: dict[int, Refusal | None] = {}
+    for error in after.errors:
+        suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
+        same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]
+        for index in (same or suspects)[-1:]:
+            found.setdefault(index, refuse(commands[index], words(error.result)))
+    return tuple(refusal for _, refusal in sorted(found.items()) if refusal is not None)
+
+
+def _order(command: Command) -> str:
+    return order_name(command.function.ability_id)
+
+
+def words(result: str) -> str:
+    """A result of the game's action errors in words, `CantTargetAirUnits` → `cant target air units`."""
+    return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in result).strip()
+
+
+def written(name: str, *arguments: object) -> str:
+    """A function as reports show it, `Attack_unit(now, [0x1, 0x2], 0x3)`."""
+    return f"{name}({', '.join(map(str, arguments))})"
+
+
+def listed(tags: Iterable[int]) -> str:
+    """Tags as reports show them."""
+    return f"[{', '.join(map(hex, tags))}]"

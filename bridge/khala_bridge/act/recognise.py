@@ -1,0 +1,121 @@
+"""Calls as written → actions of the catalogue, or rejections that say what would be right.
+
+Only words are judged here: is there such an action, has it these arguments, is there such a team. What is
+possible in the game now is judged in `khala_bridge.act.translate`. Repaired is what can mean one thing only:
+
+| written | taken as |
+|---|---|
+| a name in another case, with blanks or hyphens, an alias | the action (`khala_bridge.act.vocabulary`) |
+| `stalker 1`, no team, several, all teams | those that are meant (`khala_bridge.act.addressee`) |
+| a tag as a decimal number | the tag |
+| a point before the tags | the tags, then the point |
+| `None` for no argument | no argument |
+
+Everything else is said, with what is nearest to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.refused import Refused, reject
+from khala_protocol.speech import written
+
+if TYPE_CHECKING:
+    from khala_bridge.act.addressee import Addressees
+    from khala_bridge.act.vocabulary import Vocabulary
+    from khala_bridge.catalogue.action import Action, ArgKind
+    from khala_bridge.observe.observation import TeamObservation
+    from khala_protocol.messages import Call, Point, Rejection
+
+__all__ = ["Recognised", "Refused", "recognise", "reject"]
+
+EXAMPLES: dict[ArgKind, str] = {"tag": "0x100140001", "screen": "[12, 9.5]", "minimap": "[30, 41]"}
+_SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, no tags
+_LONGEST_TAG = 20  # digits of 2^64
+_NOTHING = frozenset({"none", "null", "nil", "n/a", "-"})
+
+
+@dataclass(frozen=True, slots=True)
+class Recognised:
+    """A call that is an action of the catalogue, for one team."""
+
+    call: Call
+    action: Action
+    team: TeamObservation
+    tags: tuple[int, ...]
+    """Tags among its arguments, in their order."""
+    point: Point | None
+    """The point among its arguments, in the frame that the action says."""
+
+    @property
+    def text(self) -> str:
+        """The call as agents and reports read it: `Stalker-1 <Attack_Unit(0x1)>`."""
+        return f"{self.team.view.name} {self.written}"
+
+    @property
+    def written(self) -> str:
+        """The call alone, as the catalogue would have it written: `<Attack_Unit(0x1)>`."""
+        tags = tuple(map(hex, self.tags))
+        return written(self.action.name, tags if self.point is None else (*tags, self.point))
+
+
+def recognise(call: Call, words: Vocabulary, addressees: Addressees) -> list[Recognised] | Rejection:
+    """What a call means: one action, or one for each team if it speaks to several.
+
+    Args:
+        call: as read in the reply.
+        words: the names that the agent may say.
+        addressees: the teams that it may speak to.
+    """
+    try:
+        action = _action(call, words, addressees)
+        tags, point = _arguments(call, action)
+        teams = addressees.meant(call.team, action, tags)
+    except Refused as refused:
+        return reject(call, refused)
+    return [Recognised(call, action, team, tags, point) for team in teams]
+
+
+def _action(call: Call, words: Vocabulary, addressees: Addressees) -> Action:
+    if action := words.find(call.name):
+        return action
+    hint = words.hint(call.name, addressees.listening(call.team))
+    raise Refused("unknown_action", f"There is no action {call.name}; {hint}")
+
+
+def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | None]:
+    given = [_typed(argument) for argument in call.args]
+    if not action.args and _is_nothing(given):
+        given = []
+    tags = tuple(value for value in given if isinstance(value, int))
+    points = [value for value in given if isinstance(value, tuple)]
+    wanted = action.args.count("tag")
+    if len(given) != len(action.args) or len(tags) != wanted or len(points) != len(action.args) - wanted:
+        raise Refused("wrong_arguments", _right_form(action))
+    return tags, points[0] if points else None
+
+
+def _typed(argument: str | Point) -> int | Point | str:
+    """A tag as a number, a point as it is, anything else as text."""
+    if not isinstance(argument, str):
+        return argument
+    if argument.startswith("0x"):
+        try:
+            return int(argument, 16)
+        except ValueError:
+            return argument
+    is_number = argument.isascii() and argument.isdigit() and len(argument) <= _LONGEST_TAG
+    return int(argument) if is_number and int(argument) >= _SMALLEST_TAG else argument
+
+
+def _is_nothing(given: list[int | Point | str]) -> bool:
+    return len(given) == 1 and isinstance(given[0], str) and given[0].casefold() in _NOTHING
+
+
+def _right_form(action: Action) -> str:
+    if not action.args:
+        return f"{action.name} takes no arguments: write <{action.name}()>."
+    example = ", ".join(EXAMPLES[kind] for kind in action.args)
+    return f"{action.name} takes ({', '.join(action.args)}): write it like <{action.name}({example})>."

@@ -1,0 +1,186 @@
+"""The screen executor: camera, selection and functions of the screen, one in a game loop, as the paper plays.
+
+For each team that has commands: move the camera to its head, select who is meant, call the function. It costs a game
+loop and an `SC2Env.step` for each of these; what a picture of the real screen shows, and what can be compared with
+the paper's runs, is bought with that. Positions are taken from the snapshot of the moment, since units move on
+while others are being told. Who is selected is read back from the game; what the hand did not get right is clicked
+again, and a command whose units cannot be selected is refused, never given to others.
+
+| who is meant | how they are selected |
+|---|---|
+| a whole team of kind `group` with a control group | recall; the group is set when its units are not in it yet |
+| WarpGates that warp in | `select_warp_gates`: the game takes one that is ready |
+| Larvae that hatch | a click on their hatchery, `select_larva`: the game takes one of them |
+| the only idle worker; the whole army | `select_idle_worker`; `select_army` |
+| anybody else | `select_point`: all of a type on the screen at once if all of them are meant, else one by one |
+
+The camera goes to a target that is not on the screen, and back to the team if the team's screen shows it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.aim import RealScreen
+from khala_bridge.act.plan import Plan, Played, Refusal, Step, refuse, refused_by_game, written
+from khala_bridge.act.select import Hand, Missed
+from khala_bridge.catalogue.functions import raw_forms
+from khala_bridge.compat import actions as pysc2
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.requests import camera_move
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Sequence
+
+    from khala_bridge.act.aim import Pixel
+    from khala_bridge.act.plan import GameAction
+    from khala_bridge.act.translate import Command
+    from khala_bridge.state import Snapshot, Unit
+
+SAME_PLACE = 0.25
+"""World units within which the camera is where it should be; it snaps to a grid in the game."""
+
+
+class ScreenExecutor:
+    """Plays commands through camera, selection and screen; remembers who is in which control group."""
+
+    def __init__(self) -> None:
+        self._groups: dict[int, frozenset[int]] = {}
+
+    def begin(self) -> None:
+        """Control groups are empty in a new game."""
+        self._groups = {}
+
+    def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:
+        """One step for each move of the camera, selection and function, then what is left of `loops`."""
+        tour = _Tour(snapshot, self._groups)
+        places = {_team(command): place for place, command in reversed(list(enumerate(commands)))}
+        in_order = sorted(commands, key=lambda command: (command.said is None, places[_team(command)]))
+        with contextlib.suppress(_EpisodeOver):
+            for _, of_team in groupby(in_order, key=_team):
+                yield from tour.visit(list(of_team))
+            if tour.loops < loops:
+                yield from tour.step(None, loops - tour.loops)
+        return Played(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
+
+
+def _team(command: Command) -> tuple[str, str]:
+    """Whose command it is; the host's own are a group of their own, and come last."""
+    if command.said is None:
+        return "", ""
+    team = command.said.team.team
+    return team.agent, team.name
+
+
+class _EpisodeOver(Exception):
+    """Ends a tour where the game ended."""
+
+
+class _Tour:
+    """One round of the teams: where the game is now, and what was played so far."""
+
+    def __init__(self, snapshot: Snapshot, groups: dict[int, frozenset[int]]) -> None:
+        self.now = snapshot
+        self.loops = 0
+        self.functions: list[str] = []
+        self.refusals: list[Refusal] = []
+        self._hand = Hand(self, groups)
+        self._wanted: WorldPoint | None = None
+
+    def step(self, action: GameAction | None, loops: int = 1) -> Generator[Step, Snapshot, None]:
+        """Lets something enter the game, and loops pass."""
+        self.now = yield Step(() if action is None else (action,), loops)
+        self.loops += loops
+        if self.now.ended:
+            raise _EpisodeOver
+
+    def look_at(self, place: WorldPoint) -> Generator[Step, Snapshot, None]:
+        """Moves the camera, unless it is there or was sent there last."""
+        if self._wanted is not None and math.dist(place, self._wanted) < SAME_PLACE:
+            return
+        self._wanted = place
+        self.functions.append(written("camera_move", f"[{place.x:.1f}, {place.y:.1f}]"))
+        yield from self.step(camera_move(place))
+
+    def function(self, name: str, *arguments: object) -> Generator[Step, Snapshot, None]:
+        """Calls a function of PySC2."""
+        shown = [list(value) if isinstance(value, tuple) else value for value in arguments]
+        self.functions.append(written(name, *shown))
+        yield from self.step(pysc2.FUNCTIONS[name](*arguments))
+
+    def visit(self, commands: Sequence[Command]) -> Generator[Step, Snapshot, None]:
+        """Carries out the commands of one team."""
+        home = _home(commands[0])
+        if home is not None:
+            yield from self.look_at(home)
+        for command in commands:
+            try:
+                yield from self._hand.select(command)
+                yield from self._call(command)
+            except Missed as missed:
+                self._missed(command, str(missed))
+
+    def _missed(self, command: Command, why: str) -> None:
+        if refusal := refuse(command, why):
+            self.refusals.append(refusal)
+
+    def _call(self, command: Command) -> Generator[Step, Snapshot, None]:
+        function = command.function
+        if function.id not in self.now.functions:
+            raise Missed(f"{function.name} is not available to what is selected")
+        arguments: list[object] = []
+        for argument in function.args:
+            match argument:
+                case "queued":
+                    arguments.append("queued" if command.queued else "now")
+                case "minimap":
+                    arguments.append(RealScreen(self.now).minimap(self._place(command)))
+                case _:
+                    arguments.append((yield from self._pixel(command)))
+        yield from self.function(function.name, *arguments)
+
+    # --- the target -------------------------------------------------------------------------------------------
+
+    def _place(self, command: Command) -> WorldPoint:
+        """Where the target is now."""
+        assert command.target is not None  # the catalogue gives functions with a target to actions with a target
+        if not isinstance(command.target, int):
+            return command.target
+        return self._unit(command.target).pos
+
+    def _unit(self, tag: int) -> Unit:
+        """A target that is a unit, even one that is only remembered, as a geyser under the fog of war."""
+        if unit := self.now.known.get(tag):
+            return unit
+        raise Missed("the target is gone")
+
+    def _pixel(self, command: Command) -> Generator[Step, Snapshot, Pixel]:
+        """Where to click for the target, with the camera moved if that is needed."""
+        for place in (None, _home(command), self._place(command)):
+            if place is not None:
+                yield from self.look_at(place)
+            if RealScreen(self.now).pixel(self._place(command)) is not None:
+                return self._hit(command)
+        raise Missed("the target is beyond the reach of the camera")
+
+    def _hit(self, command: Command) -> Pixel:
+        screen, place = RealScreen(self.now), self._place(command)
+        if isinstance(command.target, int):
+            pixel = screen.hit(self._unit(command.target))
+        elif "unit" in raw_forms(command.function.ability_id):
+            pixel = screen.bare(place)  # a click on somebody would mean him and not the place
+        else:
+            pixel = screen.pixel(place)
+        if pixel is None:
+            raise Missed("the target cannot be clicked, something stands over it")
+        return pixel
+
+
+def _home(command: Command) -> WorldPoint | None:
+    """Where a team's camera is; None for one without a screen of its own."""
+    if command.said is None or command.said.team.camera is None:
+        return None
+    return WorldPoint(command.said.team.camera.x, command.said.team.camera.y)

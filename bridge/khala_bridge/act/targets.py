@@ -1,0 +1,224 @@
+"""At what an order is aimed: tags and points of a call → units and places of the world, or what is wrong with them.
+
+A team aims at what stands on its screen and at its own units wherever they are; a rule of `khala_bridge.auto` may be told
+of anything that the side knows, such as a mineral field in the fog. Near misses of a tag are named, never taken: the
+wrong target may be the worst one. Knows no ability of the units that are to do it, except what their targets may be.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.filters import needs_sight, unfit
+from khala_bridge.act.refused import Refused
+from khala_bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
+from khala_bridge.state import Alliance
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.ground.land import SEEN_NOW
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_bridge.act.recognise import Recognised
+    from khala_bridge.frames import Camera
+    from khala_bridge.observe.observation import SideObservation
+    from khala_bridge.state import Unit
+
+_SIDES = {Alliance.OWN: "own", Alliance.ALLY: "ally", Alliance.ENEMY: "enemy", Alliance.NEUTRAL: "neutral"}
+_WHOSE = {
+    Alliance.OWN: "your own",
+    Alliance.ALLY: "your ally's",
+    Alliance.ENEMY: "an enemy",
+    Alliance.NEUTRAL: "nobody's",
+}
+MOST_SLIPS = 2
+"""Wrong digits up to which a tag may be a slip of another one."""
+SHORTEST = 6
+"""Characters that a tag which was cut needs to be known by: `0x1008`."""
+
+
+class Targets:
+    """What can be aimed at, at the moment of a sight."""
+
+    def __init__(self, sight: SideObservation) -> None:
+        self._sight = sight
+        self._units = sight.snapshot.units
+
+    def named(self, said: Recognised) -> tuple[int, ...]:
+        """The units that the first arguments name.
+
+        Raises:
+            Refused: one of them is no unit of the team, or named twice.
+        """
+        tags = said.tags[: said.action.named]
+        for tag in tags:
+            if tag not in said.team.team.tags:
+                raise self._not_of_team(said, tag)
+        if twice := [tag for place, tag in enumerate(tags) if tag in tags[:place]]:
+            what = f"{said.action.name} takes two different units, {hex(twice[0])} stands there twice."
+            raise Refused("wrong_arguments", what)
+        return tags
+
+    def unit(self, said: Recognised) -> Unit:
+        """The unit that the last tag names.
+
+        Raises:
+            Refused: there is none, it is dead or out of sight, or the action cannot be used on it.
+        """
+        tag, anywhere = said.tags[-1], said.action.rule is not None or said.team.camera is None
+        unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
+        if unit is None:
+            raise self._nowhere(said, tag)
+        if not (anywhere or tag in said.team.team.tags or _shows(said.team.camera, unit)):
+            raise self._out_of_sight(said, unit)
+        if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
+            what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
+            raise Refused("invalid_target", f"{what}; {said.action.name} needs {reason}.")
+        return unit
+
+    def place(self, said: Recognised) -> WorldPoint:
+        """The point among the arguments, in the world.
+
+        Raises:
+            Refused: it lies outside of its frame, beyond the edge of the map, or where it would have to be seen.
+        """
+        point = self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
+        if needs_sight(said.action) and not self._is_seen(point):
+            where = f"[{said.point[0]:g}, {said.point[1]:g}]" if said.point else "The place"
+            raise Refused("invalid_target", f"{where} is out of your sight; {said.action.name} needs a place in sight.")
+        return point
+
+    def instead(self, said: Recognised, place: WorldPoint) -> str:
+        """A place that would do, as the end of a sentence: on the team's screen if it is there, else on the minimap."""
+        camera = said.team.camera
+        if camera is not None:
+            x, y = camera.screen(place.x, place.y)
+            if 0 <= x < camera.size and 0 <= y < camera.size:
+                return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
+        x, y = self._sight.map.minimap(place.x, place.y)
+        return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
+
+    def _is_seen(self, point: WorldPoint) -> bool:
+        """Whether the player sees a place now; not doubted where the game showed no map."""
+        if not self._sight.snapshot.visibility.data:
+            return True
+        cells = land_of(self._sight.snapshot).sight  # (w, h)
+        x, y = min(int(point.x), cells.shape[0] - 1), min(int(point.y), cells.shape[1] - 1)
+        return bool(cells[x, y] == SEEN_NOW)
+
+    # --- points -----------------------------------------------------------------------------------------------
+
+    def _screen_point(self, said: Recognised) -> WorldPoint:
+        name, camera = said.team.view.name, said.team.camera
+        if camera is None:
+            raise Refused("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
+        x, y = self._in_frame(said, "screen", camera.size, "minimap", self._sight.map.minimap_size)
+        point = camera.world(ScreenPoint(x, y))
+        if not self._sight.map.holds(point):
+            x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
+            inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
+        return point
+
+    def _minimap_point(self, said: Recognised) -> WorldPoint:
+        screen = 0.0 if said.team.camera is None else said.team.camera.size
+        x, y = self._in_frame(said, "minimap", self._sight.map.minimap_size, "screen", screen)
+        point = self._sight.map.world(MinimapPoint(x, y))
+        if not self._sight.map.holds(point):
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map.")
+        return point
+
+    def _in_frame(self, said: Recognised, frame: str, size: float, other: str, its_size: float) -> tuple[float, float]:
+        assert said.point is not None  # recognised by its form
+        x, y = said.point
+        if 0 <= x <= size and 0 <= y <= size:
+            return x, y
+        if not (0 <= x <= its_size and 0 <= y <= its_size):
+            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}.")
+        sister = said.action.name.replace(frame.capitalize(), other.capitalize())
+        agent = self._sight.agents[said.team.team.agent].agent
+        has_sister = sister in {action.name for action in agent.catalogue()}
+        hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
+        where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
+        raise Refused("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
+
+    # --- tags that are wrong ----------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _remembered(self) -> dict[int, Unit]:
+        """What is there under the fog as far as the side knows: resources and structures that it saw once."""
+        return self._sight.snapshot.known
+
+    def _nowhere(self, said: Recognised, tag: int) -> Refused:
+        if tag in self._sight.snapshot.dead:
+            return Refused("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
+        wanted = said.action.target
+        fits = [unit.tag for unit in self._units.values() if self._may_be_meant(said, unit, wanted)]
+        hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
+        return Refused("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
+
+    def _may_be_meant(self, said: Recognised, unit: Unit, wanted: str | None) -> bool:
+        if said.team.camera is not None and not _shows(said.team.camera, unit):
+            return False
+        return wanted is None or unit.is_enemy == (wanted == "enemy")
+
+    def _not_of_team(self, said: Recognised, tag: int) -> Refused:
+        name, own = said.team.view.name, said.team.team.tags
+        if tag in self._sight.snapshot.dead:
+            return Refused("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
+        units = f"units of team {name} are {', '.join(map(hex, own))}"
+        unit = self._units.get(tag)
+        if unit is None:
+            hint = self._near_miss(tag, own) or f"{units}."
+            return Refused("unknown_target", f"There is no unit {hex(tag)}; {hint}")
+        what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
+        if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
+            right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
+            return Refused("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
+        owner = self._team_of(tag)
+        whose = f" of team {owner}" if owner else ""
+        return Refused("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
+
+    def _team_of(self, tag: int) -> str | None:
+        teams = (team for agent in self._sight.agents.values() for team in agent.teams)
+        return next((team.view.name for team in teams if tag in team.team.tags), None)
+
+    def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
+        """The tag that was most likely meant, as the end of a sentence; None if none is like it."""
+        wanted = hex(tag)
+        slips = ((_slips(wanted, hex(known)), known) for known in tags)
+        _slip, meant = min(((slip, known) for slip, known in slips if slip is not None), default=(0, None))
+        if meant is None:
+            return None
+        return f"did you mean {hex(meant)} ({self._units[meant].name})?"
+
+    def _out_of_sight(self, said: Recognised, unit: Unit) -> Refused:
+        x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
+        what = f"{_SIDES[unit.alliance]} {unit.name} {hex(unit.tag)}"
+        away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
+        return Refused("unknown_target", f"The {what} {away}; move there first.")
+
+
+def _slips(wanted: str, known: str) -> int | None:
+    """Slips between a tag as written and one that is there, if they are few: 0 for a tag that was only cut.
+
+    One digit too many or too few is one slip, up to two may be others. Two tags of units differ in two or three.
+    """
+    if known.startswith(wanted) and len(wanted) >= SHORTEST:
+        return 0
+    if len(wanted) == len(known):
+        wrong = sum(map(operator.ne, wanted, known))
+        return wrong if wrong <= MOST_SLIPS else None
+    shorter, longer = sorted((wanted, known), key=len)
+    dropped = (longer[:place] + longer[place + 1 :] for place in range(2, len(longer)))
+    return 1 if len(longer) == len(shorter) + 1 and shorter in dropped else None
+
+
+def _shows(camera: Camera | None, unit: Unit) -> bool:
+    """Whether a unit stands on a camera's screen."""
+    if camera is None:
+        return False
+    right, down, half = unit.pos.x - camera.x, camera.y - unit.pos.y, CAMERA_WIDTH / 2
+    return -half <= right < half and -half <= down < half

@@ -1,0 +1,227 @@
+"""Recognised actions → commands to the game, checked against the state that they meet.
+
+A command knows units, a function, a unit or a point of the world as its target, and whether it waits behind earlier
+orders. It knows no frame: the two executors play the same commands.
+
+    who       units of the team, those that are named, or whoever a rule of `khala_bridge.auto` finds
+    may they  `khala_bridge.act.validity`; only the units that can do it are told to
+    at what   `khala_bridge.act.targets`
+
+Order of the commands of one turn, unit by unit: the first one replaces what the unit did, a later one waits for it
+if the action queues (the catalogue says), and replaces it if not. In the paper it is the first queueing function of a
+*team* that replaces, which makes an order to a second unit wait behind that unit's old order, and lets an attack
+cancel a skill of the same reply, since here all commands of a turn reach the game in one loop.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.reasons import facts_of
+from khala_bridge.act.refused import Refused, reject
+from khala_bridge.act.targets import Targets
+from khala_bridge.act.validity import Obstacle, Validity
+from khala_bridge.auto import RULES, Ask, Impossible, Ledger, Order
+from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import buff_name, unit_name
+from khala_bridge.state.abilities import is_attack
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from khala_bridge.act.recognise import Recognised
+    from khala_bridge.catalogue.functions import Function
+    from khala_bridge.observe.observation import SideObservation
+    from khala_bridge.state import Unit
+    from khala_protocol.messages import Rejection
+
+MAKERS = frozenset({"build", "warp_in", "research"})
+"""Kinds of abilities that one unit of a team is enough for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One order to some units."""
+
+    said: Recognised | None
+    """The call that it carries out; None for an order that the host gives by itself."""
+    function: Function
+    """PySC2's function for it, which names the ability."""
+    units: tuple[int, ...]
+    target: int | WorldPoint | None
+    """Tag of a unit, or a point of the world."""
+    queued: bool = False
+
+
+class Translator:
+    """Translates the calls of one turn, one after the other, those of all agents of a side."""
+
+    def __init__(self, sight: SideObservation, max_actions: Mapping[str, int]) -> None:
+        """Takes what the agents see now, and by agent how many actions one team may have in a turn."""
+        self._sight = sight
+        self._snapshot = sight.snapshot
+        self._max_actions = max_actions
+        self.ledger = Ledger.of(sight.snapshot)
+        self.ordered: set[int] = set()
+        """Tags of the units that were told something in this turn."""
+        self._validity = Validity(sight.snapshot, self.ledger)
+        self._targets = Targets(sight)
+        self._count: dict[tuple[str, str], int] = {}
+
+    def translate(self, said: Recognised) -> list[Command] | Rejection:
+        """Commands for a call: none for an action that orders nothing, two if only some of its units have to wait."""
+        try:
+            orders = self._orders(said)
+        except Refused as refused:
+            return reject(said.call, refused, said.team.view.name)
+        return [command for order in orders for command in self.commands(order, said)]
+
+    def commands(self, order: Order, said: Recognised | None = None) -> list[Command]:
+        """An order in its place behind those that its units were given before in this turn."""
+        queues = said is not None and said.action.queue
+        first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
+        later = tuple(tag for tag in order.units if queues and tag in self.ordered)
+        self.ordered.update(order.units)
+        found = [Command(said, order.function, first, order.target, order.queued)] if first else []
+        return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
+
+    def _orders(self, said: Recognised) -> list[Order]:
+        """What a call orders; it is counted if it can be carried out.
+
+        Raises:
+            Refused: it cannot.
+        """
+        count = (said.team.team.agent, said.team.team.name)
+        if said.action.rule is not None:
+            found = self._by_rule(said, said.action.rule) if self._may_say(count) else []
+        else:
+            found = self._as_said(said)
+        if not self._may_say(count):
+            allowed = self._max_actions[said.team.team.agent]
+            limit = f"{allowed} action{'s' if allowed > 1 else ''}"
+            raise Refused("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
+        self._count[count] = self._count.get(count, 0) + 1
+        if said.action.rule is None:
+            self._book(found)
+        return found
+
+    def _book(self, orders: Iterable[Order]) -> None:
+        """Takes from the ledger what orders cost and whom they keep busy; rules do so themselves."""
+        for order in orders:
+            self.ledger.busy.update(order.units)
+            self._validity.pay(order.function, [self._snapshot.units[tag] for tag in order.units])
+
+    def _may_say(self, count: tuple[str, str]) -> bool:
+        return self._count.get(count, 0) < self._max_actions[count[0]]
+
+    def _by_rule(self, said: Recognised, rule: str) -> list[Order]:
+        """What a rule makes of a call; it takes the price from the ledger itself."""
+        units = self._having(said, self._units(said)) if said.team.team.tags else ()
+        tag = self._targets.unit(said).tag if said.action.target_kind == "tag" else None
+        point = None if said.point is None else self._targets.place(said)
+        try:
+            return RULES[rule](Ask(said.action, self._snapshot, self.ledger, units, tag, point))
+        except Impossible as impossible:
+            better = "" if impossible.place is None else self._targets.instead(said, impossible.place)
+            raise Refused(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
+
+    def _as_said(self, said: Recognised) -> list[Order]:
+        """The order of a call whose words say it all."""
+        function = said.action.pysc2
+        if function is None and not said.team.team.tags:
+            return []
+        units = self._having(said, self._units(said))
+        if function is None:
+            return []
+        able = self._able(said, function, units)
+        match said.action.target_kind:
+            case None:
+                return [Order(function, able)]
+            case "tag":
+                return [self._at_unit(said, function, able)]
+            case _:
+                return [Order(function, able, self._targets.place(said))]
+
+    # --- who --------------------------------------------------------------------------------------------------
+
+    def _units(self, said: Recognised) -> tuple[int, ...]:
+        """The units that are spoken of, those that are there."""
+        tags = self._targets.named(said) if said.action.named else said.team.team.tags
+        found = tuple(tag for tag in tags if tag in self._snapshot.units)
+        if not found:
+            raise self._cannot(said, ["it has no units" if not tags else "it is gone"])
+        return found
+
+    def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
+        """Those of some units that may be told to do it, as the task says."""
+        listed = self._sight.agents[said.team.team.agent].agent.actions
+        types = {tag: self._snapshot.units[tag].name for tag in tags}
+        found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
+        if not found:
+            raise self._cannot(said, [f"{name} has no such action" for name in dict.fromkeys(types.values())])
+        return found
+
+    def _able(self, said: Recognised, function: Function, tags: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of some units that can do it now; one, if one is enough for it."""
+        obstacles = {tag: self._validity.obstacle(said.action, function, self._snapshot.units[tag]) for tag in tags}
+        able = tuple(tag for tag, obstacle in obstacles.items() if obstacle is None)
+        if not able:
+            nearest = max((one for one in obstacles.values() if one), key=_nearness)
+            raise self._cannot(said, [nearest.text])
+        if said.action.subject == "two_units" and len(able) < len(tags):
+            raise self._cannot(said, [one.text for one in obstacles.values() if one])
+        facts = facts_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
+        if facts is not None and facts.does in MAKERS:
+            return able[:1]
+        return self._validity.affordable(function, [self._snapshot.units[tag] for tag in able])
+
+    @staticmethod
+    def _cannot(said: Recognised, reasons: list[str]) -> Refused:
+        why = "; ".join(dict.fromkeys(reasons))
+        return Refused("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
+
+    # --- at what ----------------------------------------------------------------------------------------------
+
+    def _at_unit(self, said: Recognised, function: Function, able: tuple[int, ...]) -> Order:
+        """The order at the unit that is named, for those of the able ones that it can be aimed at by."""
+        unit = self._targets.unit(said)
+        if said.action.aim == "place":
+            return Order(function, able, WorldPoint(unit.pos.x, unit.pos.y))
+        aiming = tuple(tag for tag in able if tag != unit.tag)
+        if is_attack(function):
+            aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
+            where = "in the air" if _is_aloft(unit) else "on the ground"
+            what = f"{hex(unit.tag)} is a {unit.name} {where}"
+            if not aiming:
+                raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
+        if not aiming:
+            raise Refused(
+                "invalid_target", f"{hex(unit.tag)} is the unit itself; {said.action.name} needs another one."
+            )
+        return Order(function, aiming, unit.tag)
+
+    @staticmethod
+    def _hits(unit: Unit, target: Unit) -> bool:
+        """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
+        return _reaches(unit.name, target.name, _is_aloft(target))
+
+
+def _is_aloft(unit: Unit) -> bool:
+    """Whether a unit is hit in the air: what flies, and what a Phoenix holds up with its beam."""
+    return unit.is_flying or any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)
+
+
+@functools.cache
+def _reaches(unit_type: str, target_type: str, is_flying: bool) -> bool:  # a key of the cache
+    mine, other = knowledge().get(unit_type), knowledge().get(target_type)
+    if mine is None or other is None or not mine.weapons:
+        return True
+    planes = {*other.planes, "air"} - {"ground"} if is_flying else {*other.planes, "ground"}
+    return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
+
+
+def _nearness(obstacle: Obstacle) -> tuple[int, float]:
+    return obstacle.rank, obstacle.energy

@@ -1,0 +1,97 @@
+"""The names that one agent may say: its actions by any spelling of them, and those that a wrong name is near to.
+
+Made once for an agent of a task. Case, underscores, blanks and hyphens make no difference to a name, since no two
+actions differ in nothing else; aliases of the catalogue count as names. Above it is `khala_bridge.act.recognise`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import itertools
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.observe.observation import TeamObservation
+    from khala_bridge.task.config import AgentConfig
+
+CLOSE = 0.8
+"""Similarity of two names, 0 to 1, above which one is taken for a slip of the other."""
+ALIKE = 0.7
+"""Likeness of two names, 0 to 2, above which one is worth mentioning where the other was said."""
+NEAREST = 3
+"""Actions that a refusal names at most."""
+
+
+class Vocabulary:
+    """What an agent may say."""
+
+    def __init__(self, agent: AgentConfig) -> None:
+        """Takes the names of all actions of its teams."""
+        self._agent = agent
+        self._actions: dict[str, Action] = {}
+        self._catalogue = agent.catalogue()
+        self._by_name = {action.name: action for action in self._catalogue}
+        for action in self._catalogue:
+            self._actions[squashed(action.name)] = action
+        for action in self._catalogue:
+            for alias in action.aliases:
+                self._actions.setdefault(squashed(alias), action)
+
+    def find(self, name: str) -> Action | None:
+        """The action of this name, in any spelling; None if the agent has no such action."""
+        return self._actions.get(squashed(name))
+
+    def has(self, team: TeamObservation, action: Action) -> bool:
+        """Whether a team may ever be told to do an action, with the units that it has now."""
+        return action.name in team.team.config.actions or any(
+            action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
+        )
+
+    def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
+        """What some teams may be told instead of a wrong name, as the end of a sentence."""
+        wanted, words = squashed(name), _words(name)
+        known = list(self._sayable(list(teams)))
+        likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
+        ranked = sorted(known, key=lambda action: -likeness[action.name])[:NEAREST]
+        if ranked and difflib.SequenceMatcher(None, wanted, squashed(ranked[0].name)).ratio() >= CLOSE:
+            return f"did you mean {ranked[0].form}?"
+        alike = [action.form for action in ranked if likeness[action.name] >= ALIKE]
+        if alike:
+            return f"like it {'is' if len(alike) == 1 else 'are'} {', '.join(alike)}."
+        others = f" and {len(known) - NEAREST} others" if len(known) > NEAREST else ""
+        return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
+
+    def _sayable(self, teams: list[TeamObservation]) -> Iterable[Action]:
+        """What some teams may be told, in the order in which it is listed; everything if there are none."""
+        if not teams:
+            return self._catalogue
+        types = dict.fromkeys(unit.type for team in teams for unit in team.view.units)
+        lists = (*(team.team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
+        return [self._by_name[name] for name in dict.fromkeys(name for listed in lists for name in listed)]
+
+
+@functools.lru_cache(maxsize=8192)
+def squashed(name: str) -> str:
+    """A name without what models vary in it: case, underscores, blanks, hyphens."""
+    return "".join(filter(str.isalnum, name)).casefold()
+
+
+def _likeness(pairs: frozenset[str], words: frozenset[str], known: str) -> float:
+    """How like a name another one is: by pairs of letters (Dice's coefficient), and by the words that both have."""
+    its_pairs = _pairs(squashed(known))
+    letters = 2 * len(pairs & its_pairs) / max(len(pairs) + len(its_pairs), 1)
+    return letters + len(words & _words(known)) / max(len(words), 1)
+
+
+@functools.lru_cache(maxsize=8192)
+def _pairs(name: str) -> frozenset[str]:
+    return frozenset(map("".join, itertools.pairwise(name)))
+
+
+@functools.lru_cache(maxsize=8192)
+def _words(name: str) -> frozenset[str]:
+    return frozenset(name.replace("-", "_").casefold().split("_"))

@@ -1,0 +1,131 @@
+"""Orders to the whole army, with the plain meaning of their words; where to is what the host finds."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_bridge.auto.places import front
+from khala_bridge.auto.rule import Order, never
+from khala_bridge.auto.scouting import unseen_places
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.side import (
+    army,
+    enemies_in_reach,
+    enemy_structures,
+    is_armed,
+    is_structure,
+    own_structures,
+    place,
+)
+
+if TYPE_CHECKING:
+    from khala_bridge.auto.rule import Ask
+    from khala_bridge.state import Unit
+
+NEAR_ARMY: Final = 24.0
+"""Enemies so near to the middle of the army are fought first; the paper's figure."""
+NEAR_ONE: Final = 20.0
+"""Enemies so near to any unit of it, too; the same."""
+INTRUDES: Final = 15.0
+"""Enemies so near to an own structure are intruders; the same."""
+
+
+def army_attack(ask: Ask) -> list[Order]:
+    """Fights its way to enemies near the army, else to the nearest known enemy structure, else to where they may be.
+
+    Of the enemies near it those that fight come first, then structures and workers.
+
+    Raises:
+        Impossible: there is no army that is free.
+    """
+    units = _army(ask)
+    middle = _middle(units)
+    close = [u for u in enemies_in_reach(ask.snapshot, units) if _is_close(u, units, middle)]
+    known = [unit for unit in close if is_armed(unit)] or close or enemy_structures(ask.snapshot)
+    if known:
+        return _send(ask, units, _nearest(known, [middle]), fight=True)
+    return _send(ask, units, unseen_places(ask.snapshot, middle)[0], fight=True)
+
+
+def army_defend(ask: Ask) -> list[Order]:
+    """Fights intruders, those nearest to a town hall first; without any it waits in front of the foremost base.
+
+    Queens fight intruders too, and do not wait.
+
+    Raises:
+        Impossible: there is no army that is free.
+    """
+    units = _army(ask, home=True)
+    homes = [place(unit) for unit in own_structures(ask.snapshot)]
+    enemies = [unit for unit in enemies_in_reach(ask.snapshot, units) if not is_structure(unit) or is_armed(unit)]
+    intruders = [u for u in enemies if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
+    if intruders:
+        halls = [place(hall) for hall in land_of(ask.snapshot).own_halls]
+        return _send(ask, units, _nearest(intruders, halls or homes), fight=True)
+    units = _army(ask)
+    return _send(ask, units, _rally(ask, _middle(units)), fight=True)
+
+
+def army_retreat(ask: Ask) -> list[Order]:
+    """Goes back to the foremost base without fighting.
+
+    Raises:
+        Impossible: there is no army that is free, or nothing to retreat to.
+    """
+    units = _army(ask)
+    if not own_structures(ask.snapshot):
+        raise never(ask, "you have no base to retreat to; name a place with a Move action.")
+    return _send(ask, units, _rally(ask, _middle(units)), fight=False)
+
+
+def _army(ask: Ask, *, home: bool = False) -> list[Unit]:
+    """The army, without units that an agent has ordered in this turn: what was said of them holds."""
+    found = army(ask.snapshot, home=home)
+    if not found:
+        raise never(ask, "you have no army; train units first.")
+    free = [unit for unit in found if unit.tag not in ask.ledger.busy]
+    if not free:
+        raise never(ask, "every unit of the army has an order already in this turn.")
+    return free
+
+
+def _middle(units: list[Unit]) -> WorldPoint:
+    x, y = np.median([place(unit) for unit in units], axis=0).tolist()  # who is far behind does not move it
+    return WorldPoint(x, y)
+
+
+def _is_close(unit: Unit, units: list[Unit], middle: WorldPoint) -> bool:
+    at = place(unit)
+    return math.dist(at, middle) <= NEAR_ARMY or any(math.dist(at, place(own)) <= NEAR_ONE for own in units)
+
+
+def _nearest(units: list[Unit], to: list[WorldPoint]) -> WorldPoint:
+    def away(unit: Unit) -> tuple[float, int]:
+        return min((math.dist(place(unit), point) for point in to), default=0.0), unit.tag
+
+    return place(min(units, key=away))
+
+
+def _rally(ask: Ask, middle: WorldPoint) -> WorldPoint:
+    """In front of the base to which the enemy has the shortest way; where the army is if there is no base."""
+    land = land_of(ask.snapshot)
+    fronts = [front(land, place(hall)) for hall in land.own_halls]
+    enemies = land.ground.starts
+    if not fronts:
+        homes = [place(unit) for unit in own_structures(ask.snapshot)]
+        return min(homes, key=lambda home: (math.dist(home, middle), home), default=middle)
+    if not enemies:
+        return min(fronts, key=lambda point: (math.dist(point, middle), point))
+    ways = np.min([land.ground.ways_from(start) for start in enemies], axis=0)
+    return min(fronts, key=lambda point: (float(ways[int(point.x), int(point.y)]), point))
+
+
+def _send(ask: Ask, units: list[Unit], to: WorldPoint, *, fight: bool) -> list[Order]:
+    tags = tuple(unit.tag for unit in units)
+    ask.ledger.take(*tags)
+    return [Order(functions()["Attack_minimap" if fight else "Move_minimap"], tags, to)]

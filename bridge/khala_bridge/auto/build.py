@@ -1,0 +1,288 @@
+"""Building: at a point, near a unit, or where the host finds it best."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_bridge.auto.builders import GAS_STRUCTURES, builder
+from khala_bridge.auto.places import for_structure, free_base, free_geyser
+from khala_bridge.auto.price import charge, check, require
+from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground import land_of, sites
+from khala_bridge.state.ground.land import SEEN_NOW, addon_place
+from khala_bridge.state.side import finished, name, place
+
+if TYPE_CHECKING:
+    from khala_bridge.auto.rule import Ask
+    from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.state import Unit
+    from khala_bridge.state.ground import Base, Land
+
+NEAR = 10.0
+"""What is built near a unit stands at most so far from it, in world units."""
+ON_GEYSER = 2.0
+"""A point so near to the middle of a geyser means the geyser."""
+OF_BASE = 12.0
+"""A unit so near to a place for a town hall means this place."""
+
+
+def build_at(ask: Ask) -> list[Order]:
+    """Builds at a point, on the nearest cells of the grid.
+
+    Raises:
+        Impossible: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
+    """
+    assert ask.point is not None, f"{ask.action.name} is said with a point"
+    _prepare(ask)
+    if _is_gas(ask):
+        near_by = [u for u in _free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
+        if not near_by:
+            raise Impossible("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
+        return _on_geyser(ask, near_by[0])
+    footprint = footprint_need(_structure(ask))
+    return _checked(ask, footprint.middle(footprint.cell(*ask.point)))
+
+
+def build_near(ask: Ask) -> list[Order]:
+    """Builds near a unit: a town hall on the base place of its resources, gas on the geyser, others as near as may be.
+
+    Raises:
+        Impossible: as `build_at`, or there is no place near it.
+    """
+    unit = _named(ask)
+    _prepare(ask)
+    land, structure = land_of(ask.snapshot), _structure(ask)
+    if _is_gas(ask):
+        free = _free_geysers(ask)
+        found = min(free, key=lambda u: (math.dist(place(u), place(unit)), u.tag), default=None)
+        if found is None or math.dist(place(found), place(unit)) > NEAR:
+            raise Impossible("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
+        return _on_geyser(ask, found)
+    if sites()[structure].clear:
+        return _checked(ask, _base_of(ask, unit).place)
+    cost = near(land, [place(unit)], reach=NEAR, corner=on_corner(structure))
+    cell = best(good(land, ask.ledger, structure), cost) or best(legal(land, ask.ledger, structure), cost)
+    if cell is None:
+        what = f"{name(unit)} {hex(unit.tag)}{_lack(structure)}"
+        raise Impossible("invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {what}.")
+    return _at(ask, footprint_need(structure).middle(cell))
+
+
+def lock_base(ask: Ask) -> list[Order]:
+    """Builds on the very place where a town hall would gather a resource best, so that nobody else can have it.
+
+    Raises:
+        Impossible: as `build_at`.
+    """
+    unit = _named(ask)
+    _prepare(ask)
+    footprint = footprint_need(_structure(ask))
+    return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
+
+
+def build_auto(ask: Ask) -> list[Order]:
+    """Builds where the host finds it best, with a worker of the side that goes back to the minerals afterwards.
+
+    Raises:
+        Impossible: there is no place, or as `build_at`.
+    """
+    _prepare(ask)
+    land, structure = land_of(ask.snapshot), _structure(ask)
+    if _is_gas(ask):
+        orders = _on_geyser(ask, free_geyser(ask, _free_geysers(ask)))
+    elif sites()[structure].clear:
+        orders = _at(ask, free_base(ask, land, structure))
+    else:
+        cell = for_structure(land, ask.ledger, structure)
+        if cell is None:
+            raise never(ask, f"there is no room for it at your bases{_lack(structure)}.")
+        orders = _at(ask, footprint_need(structure).middle(cell))
+    return [*orders, *_back_to_work(ask, orders[-1])]
+
+
+# the order ------------------------------------------------------------------------------------------------------------
+
+
+def _prepare(ask: Ask) -> None:
+    """Checks what does not depend on the place."""
+    facts = _facts(ask)
+    if facts is not None:
+        require(ask, facts)
+        check(ask, facts, _user(ask))
+
+
+def _checked(ask: Ask, middle: WorldPoint) -> list[Order]:
+    """The orders to build at the middle of some cells, which somebody else than the host has chosen."""
+    _check_site(ask, land_of(ask.snapshot), middle)
+    return _at(ask, middle)
+
+
+def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
+    """The orders to build at the middle of some cells."""
+    structure = _structure(ask)
+    worker, queued = builder(ask, middle)
+    orders = _go(ask, worker, middle, queued=queued)
+    width, height = footprint_need(structure).size
+    ask.ledger.promise(middle, width, height)
+    if sites()[structure].addon:
+        ask.ledger.promise(addon_place(middle), 2, 2)
+    return orders
+
+
+def _on_geyser(ask: Ask, geyser: Unit) -> list[Order]:
+    worker, queued = builder(ask, place(geyser))
+    orders = _go(ask, worker, geyser.tag, queued=queued)
+    ask.ledger.promise(place(geyser), 3, 3)
+    return orders
+
+
+def _go(ask: Ask, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[Order]:
+    if not ask.has(worker.tag):
+        raise never(ask, f"the game does not take it from your {name(worker)} at this moment; try again later.")
+    facts = _facts(ask)
+    if facts is not None:
+        charge(ask, facts, name(worker))
+    ask.ledger.take(worker.tag)
+    return [Order(ask.function, (worker.tag,), target, queued)]
+
+
+def _back_to_work(ask: Ask, build: Order) -> list[Order]:
+    """Sends a worker that outlives its work back to the mineral field that is nearest to where it built."""
+    worker = ask.snapshot.units[build.units[0]]
+    land = land_of(ask.snapshot)
+    fields = [u for u in land.standing("mineral_field") if u.tag in ask.snapshot.units]
+    if name(worker) == "Drone" or not fields:
+        return []
+    target = land.unit(build.target) if isinstance(build.target, int) else None
+    where = place(target) if target is not None else build.target
+    assert isinstance(where, WorldPoint)  # a structure is built at a point or on a unit
+    field = min(fields, key=lambda unit: (math.dist(place(unit), where), unit.tag))
+    return [Order(functions()["Harvest_Gather_screen"], build.units, field.tag, queued=True)]
+
+
+# the place ------------------------------------------------------------------------------------------------------------
+
+
+def _check_site(ask: Ask, land: Land, middle: WorldPoint) -> None:
+    """Raises if the structure cannot stand there, with the nearest place where it can."""
+    structure = _structure(ask)
+    footprint = footprint_need(structure)
+    allowed = legal(land, ask.ledger, structure)
+    cell = footprint.cell(*middle)
+    if land.ground.holds(*cell) and allowed[cell]:
+        return
+    other = best(allowed, near(land, [middle], corner=on_corner(structure)))
+    raise Impossible(
+        "invalid_target",
+        f"{structure} cannot stand there: {_why_not(ask, land, cell)}",
+        None if other is None else footprint.middle(other),
+    )
+
+
+def _why_not(ask: Ask, land: Land, cell: tuple[int, int]) -> str:
+    """Why a structure cannot stand on a cell and those around it, as half a sentence."""
+    site, footprint = sites()[_structure(ask)], footprint_need(_structure(ask))
+    cells = [(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells]
+    if not all(land.ground.holds(x, y) and land.ground.buildable[x, y] for x, y in cells):
+        return "a cliff, a ramp or the edge of the map is in its way."
+    x, y = np.array(cells).T
+    standing = land.standing_on(cells)
+    again = (_structure(ask), footprint.middle(cell)) in land.plans
+    reasons = (
+        (again, f"a {_structure(ask)} is going to be built there already."),
+        (land.taken[x, y].any(), f"a {name(standing) if standing else 'unit'} is in its way."),
+        ((land.planned | promised(land, ask.ledger))[x, y].any(), "something else is going to be built there."),
+        (site.ground == "creep" and not land.creep[x, y].all(), "it needs creep under all of it."),
+        (site.ground in ("bare", "powered") and land.creep[x, y].any(), "there is creep, on which only Zerg build."),
+        (site.seen and (land.sight[x, y] < SEEN_NOW).any(), "the place has to be in sight."),
+        (
+            site.clear and not land.clear[x, y].all(),
+            "it is too near to minerals or gas; 3 cells between have to be free.",
+        ),
+    )
+    unpowered = "no Pylon or phasing WarpPrism powers that place; build a Pylon within 6 of it first."
+    return next((why for so, why in reasons if so), unpowered)
+
+
+def _lack(structure: str) -> str:
+    """What is usually missing where a structure has no place."""
+    match sites()[structure].ground:
+        case "powered":
+            return " in the field of a Pylon; build a Pylon first"
+        case "creep":
+            return " on creep; build another Hatchery or spread creep first"
+        case _:
+            return ""
+
+
+def _named(ask: Ask) -> Unit:
+    """The unit that says where; it may be one that is only remembered."""
+    unit = None if ask.tag is None else land_of(ask.snapshot).unit(ask.tag)
+    if unit is None:
+        raise Impossible(
+            "unknown_target", f"No unit {hex(ask.tag or 0)} is known; use a tag that stands in your lists."
+        )
+    return unit
+
+
+def _base_of(ask: Ask, unit: Unit) -> Base:
+    """The place for a town hall that a unit lies at."""
+    bases = land_of(ask.snapshot).bases
+    found = min(bases, key=lambda base: (math.dist(base.place, place(unit)), base.place), default=None)
+    if found is None or math.dist(found.place, place(unit)) > OF_BASE:
+        raise Impossible(
+            "invalid_target",
+            f"The {name(unit)} {hex(unit.tag)} is at no place for a town hall; name a mineral field or geyser there.",
+        )
+    return found
+
+
+def _free_geysers(ask: Ask) -> list[Unit]:
+    """Geysers on which no gas structure stands or is going to stand, by ascending tags."""
+    land = land_of(ask.snapshot)
+    standing = land.standing("geyser")
+    taken = {_spot(unit) for unit in standing if name(unit) in GAS_STRUCTURES}
+    taken |= {(round((x0 + x1) / 2), round((y0 + y1) / 2)) for x0, y0, x1, y1 in ask.ledger.sites}
+    aimed = {o.target_unit_tag for u in ask.snapshot.own for o in u.orders if o.ability_id == ask.function.ability_id}
+    bare = [unit for unit in standing if name(unit) not in GAS_STRUCTURES]
+    return [unit for unit in bare if _spot(unit) not in taken and unit.tag not in aimed and _has_gas(unit)]
+
+
+def _spot(unit: Unit) -> tuple[int, int]:
+    return round(unit.pos.x), round(unit.pos.y)
+
+
+def _has_gas(unit: Unit) -> bool:
+    """Whether a geyser holds anything; of one that is only remembered it is not known, and hoped."""
+    return unit.is_remembered or unit.vespene_contents > 0
+
+
+# names ----------------------------------------------------------------------------------------------------------------
+
+
+def _structure(ask: Ask) -> str:
+    structure = ask.action.produces
+    assert structure is not None, f"{ask.action.name} builds something"
+    return structure
+
+
+def _is_gas(ask: Ask) -> bool:
+    return sites()[_structure(ask)].ground == "geyser"
+
+
+def _user(ask: Ask) -> str:
+    """Type of the worker, for what it costs."""
+    units = finished(ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units)
+    facts = _facts(ask)
+    users = facts.users if facts is not None else ask.action.units
+    return next((name(unit) for unit in units if name(unit) in users), users[0] if users else "")
+
+
+def _facts(ask: Ask) -> AbilityFacts | None:
+    return ask.facts(ask.action.units[0] if ask.action.units else "")

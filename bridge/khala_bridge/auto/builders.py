@@ -1,0 +1,80 @@
+"""Which worker builds: one that is missed least, of those the nearest to the place."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from khala_bridge.auto.rule import never
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.ground.land import built_by
+from khala_bridge.state.side import ability, bears_resources, finished, is_doing, name, of_types, place
+
+if TYPE_CHECKING:
+    from khala_bridge.auto.rule import Ask
+    from khala_bridge.frames import WorldPoint
+    from khala_bridge.state import Snapshot, Unit
+
+
+def builder(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
+    """The worker that builds at a place, and whether the order waits behind those that it has.
+
+    Of a team the nearest one, and a second structure waits for the first. Of the side the nearest one among those that
+    are idle or gather minerals and carry nothing; then those that carry something, then those that gather gas. Who
+    builds, scouts or was ordered by an agent in this turn is left alone.
+
+    Raises:
+        Impossible: there is none.
+    """
+    return _of_team(ask, where) if ask.units else (_of_side(ask, where), False)
+
+
+def _of_team(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
+    units = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
+    able = [unit for unit in finished(units) if ask.facts_of(name(unit)) is not None]
+    if not able:
+        raise never(ask, "the team has no unit that builds it.")
+
+    def rank(unit: Unit) -> tuple[bool, float, int]:
+        return _has_more_to_do(ask, unit), math.dist(place(unit), where), unit.tag
+
+    best = min(able, key=rank)
+    return best, _has_more_to_do(ask, best)
+
+
+def _has_more_to_do(ask: Ask, unit: Unit) -> bool:
+    """Whether a worker builds already, or was told so in this turn."""
+    return unit.tag in ask.ledger.busy or any(built_by(order.ability_id) for order in unit.orders)
+
+
+def _of_side(ask: Ask, where: WorldPoint) -> Unit:
+    free = [unit for unit in finished(of_types(ask.snapshot, ask.action.units)) if unit.tag not in ask.ledger.busy]
+    ranked = [
+        (cost, math.dist(place(unit), where), unit.tag) for unit in free if (cost := use(ask.snapshot, unit)) < _USED
+    ]
+    if not ranked:
+        raise never(ask, f"you have no {' or '.join(ask.action.units)} that is free to build.")
+    return ask.snapshot.units[min(ranked)[2]]
+
+
+_IDLE, _LADEN, _ON_GAS, _USED = range(4)
+
+
+def use(snapshot: Snapshot, unit: Unit) -> int:
+    """How much a worker would be missed: 0 if it is idle or gathers minerals, 3 if it does anything but gather."""
+    if unit.orders and not is_doing(unit, ability("Harvest_Gather_screen"), ability("Harvest_Return_quick")):
+        return _USED
+    if is_on_gas(snapshot, unit):
+        return _ON_GAS
+    return _LADEN if bears_resources(unit) else _IDLE
+
+
+def is_on_gas(snapshot: Snapshot, unit: Unit) -> bool:
+    """Whether a worker gathers gas."""
+    target = land_of(snapshot).unit(unit.orders[0].target_unit_tag) if unit.orders else None
+    return target is not None and name(target) in GAS_STRUCTURES
+
+
+GAS_STRUCTURES = frozenset(
+    f"{structure}{rich}" for structure in ("Assimilator", "Refinery", "Extractor") for rich in ("", "Rich")
+)

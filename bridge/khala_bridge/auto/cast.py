@@ -1,0 +1,151 @@
+"""Abilities of the side that one unit of several can use: the one that can, and what at."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from khala_bridge.auto.price import require
+from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.side import finished, is_structure, name, of_types, place
+
+if TYPE_CHECKING:
+    from khala_bridge.auto.rule import Ask
+    from khala_bridge.frames import WorldPoint
+    from khala_bridge.state import Unit
+
+
+def cast(ask: Ask) -> list[Order]:
+    """Lets one unit that can now use an ability, at what the words name.
+
+    If it has to go there, the nearest one; if the whole map is in reach, that with the most energy.
+
+    Raises:
+        Impossible: no unit can.
+    """
+    target, where = _target(ask)
+    unit = caster(ask, where)
+    return [Order(ask.function, (unit.tag,), target)]
+
+
+def recall_near(ask: Ask) -> list[Order]:
+    """Recalls the units around the one that is named.
+
+    Raises:
+        Impossible: nobody can.
+    """
+    _, where = _target(ask)
+    if where is None:
+        raise Impossible("unknown_target", "Name the unit around which the others are recalled by its tag.")
+    unit = caster(ask, where)
+    return [Order(ask.function, (unit.tag,), where)]
+
+
+def stop_building(ask: Ask) -> list[Order]:
+    """Lets structures call off the newest of what they train or research, those of the team or the one that is named.
+
+    Raises:
+        Impossible: they do nothing.
+    """
+    tags = ask.units or (() if ask.tag is None else (ask.tag,))
+    units = [ask.snapshot.units[tag] for tag in tags if tag in ask.snapshot.units]
+    busy = tuple(unit.tag for unit in units if is_structure(unit) and unit.orders)
+    if not busy:
+        named = f"the {name(units[0])} {hex(units[0].tag)} trains and researches" if units else "the team does"
+        raise never(ask, f"{named} nothing that could be called off.")
+    return [Order(ask.function, busy)]
+
+
+def cancel_building(ask: Ask) -> list[Order]:
+    """Calls off, or halts, the building of the structure that is named; what of it stands is what the game makes of it.
+
+    Raises:
+        Impossible: it is no structure in the making, or the game does not take it.
+    """
+    unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
+    if unit is None or not unit.is_own or not is_structure(unit):
+        raise Impossible(
+            "invalid_target", f"{hex(ask.tag or 0)} is no structure of yours; name one that is being built."
+        )
+    if unit.build_progress >= 1:
+        raise never(ask, f"the {name(unit)} {hex(unit.tag)} is finished; only what is being built can be called off.")
+    if not ask.has(unit.tag):
+        raise never(ask, f"the game does not take it from the {name(unit)} {hex(unit.tag)} at this moment.")
+    return [Order(ask.function, (unit.tag,))]
+
+
+# who ------------------------------------------------------------------------------------------------------------------
+
+
+def caster(ask: Ask, where: WorldPoint | None) -> Unit:
+    """The unit of the action's types that can use its ability now, noted in the ledger.
+
+    Raises:
+        Impossible: there is none; the text says what is missing.
+    """
+    unit = casters(ask, where)[0]
+    note(ask, unit)
+    return unit
+
+
+def note(ask: Ask, unit: Unit) -> None:
+    """Notes in the ledger that a unit uses the action's ability: a structure goes on with its other work."""
+    facts = ask.facts(name(unit))
+    ask.ledger.energy[unit.tag] += int(facts.energy) if facts is not None else 0
+    if not is_structure(unit):
+        ask.ledger.take(unit.tag)
+
+
+def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
+    """Every unit that can use the action's ability now, that which should first; never none."""
+    named = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
+    units = finished(named or of_types(ask.snapshot, ask.action.units))
+    if not units:
+        raise never(ask, f"you have no finished {' or '.join(ask.action.units)}.")
+    facts = ask.facts(name(units[0]))
+    if facts is not None:
+        require(ask, facts)
+    free = [unit for unit in units if is_structure(unit) or unit.tag not in ask.ledger.busy]
+    if not free:
+        raise never(ask, f"every {name(units[0])} has an order already in this turn.")
+    able = [unit for unit in free if _has_energy(ask, unit)]
+    if not able:
+        most = max(free, key=lambda unit: (_energy(ask, unit), -unit.tag))
+        need = facts.energy if facts is not None else 0.0
+        left = int(_energy(ask, most))
+        raise never(ask, f"it needs {need:g} energy, and your {name(most)} {hex(most.tag)} has {left}.")
+    ready = [unit for unit in able if ask.has(unit.tag)]
+    if not ready:
+        raise never(ask, f"the game does not take it from your {name(able[0])} at this moment; try again later.")
+
+    goes = facts is not None and facts.range is not None
+
+    def rank(unit: Unit) -> tuple[float, float, int]:
+        away, energy = 0.0 if where is None else math.dist(place(unit), where), -float(int(_energy(ask, unit)))
+        return (away, energy, unit.tag) if goes else (energy, away, unit.tag)
+
+    return sorted(ready, key=rank)
+
+
+def _has_energy(ask: Ask, unit: Unit) -> bool:
+    facts = ask.facts(name(unit))
+    return facts is None or _energy(ask, unit) >= facts.energy
+
+
+def _energy(ask: Ask, unit: Unit) -> float:
+    """Energy of a unit that earlier calls of this turn leave."""
+    return unit.energy - ask.ledger.energy[unit.tag]
+
+
+# what at --------------------------------------------------------------------------------------------------------------
+
+
+def _target(ask: Ask) -> tuple[int | WorldPoint | None, WorldPoint | None]:
+    """What the words aim at, as the function takes it, and where that is."""
+    if ask.tag is None:
+        return ask.point, ask.point
+    unit = land_of(ask.snapshot).unit(ask.tag)
+    if unit is None:
+        raise Impossible("unknown_target", f"No unit {hex(ask.tag)} is known; use a tag that stands in your lists.")
+    return (place(unit) if ask.action.aim == "place" else unit.tag), place(unit)

@@ -1,0 +1,184 @@
+"""Where a structure may stand, and which of these places is the best one if an agent leaves it open.
+
+`legal` is what the game asks: ground, creep, power, distance to resources. `good` is what a player asks besides: the
+ways of workers and the places of town halls stay free, an add-on has its room, and nobody is walled in. All over the
+whole map at once, on grids `[x, y]` of the cells that `Footprint.cell` gives.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground import footprint_of, sites
+from khala_bridge.state.ground.footprints import ADDON
+from khala_bridge.state.ground.land import SEEN_NOW
+from khala_bridge.state.ground.resources import coordinates, everywhere
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_bridge.state.ground import Footprint, Land
+    from khala_bridge.state.ground.footprints import Cells
+    from khala_bridge.state.ground.terrain import Bools, Floats
+    from khala_bridge.state.ledger import Ledger
+
+PYLON_REACH: Final = 4
+"""A structure of 3 x 3 whose middle is at most so many cells away on both axes is in the field of a Pylon (6.5)."""
+BASE_REACH: Final = 16.0
+"""A place that is farther from every town hall, as the crow flies, belongs to no base."""
+
+
+def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
+    """(w, h) where the game would let the player place a structure, as far as he can know."""
+    return _fitting(land, structure, _ground(land, ledger, structure))
+
+
+def _fitting(land: Land, structure: str, ground: Bools) -> Bools:
+    """(w, h) where a structure may stand if its cells may be on this ground."""
+    site, footprint = sites()[structure], footprint_need(structure)
+    result = everywhere(ground & land.clear if site.clear else ground, footprint.cells)
+    return result & land.powered(corner=on_corner(structure)) if site.ground == "powered" else result
+
+
+def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
+    """(w, h) the cells on which some part of the structure may stand."""
+    site = sites()[structure]
+    ground = land.free & ~promised(land, ledger)
+    if site.ground == "creep":
+        ground &= land.creep
+    elif site.ground != "any":
+        ground &= ~land.creep
+    return ground & (land.sight >= SEEN_NOW) if site.seen else ground
+
+
+def promised(land: Land, ledger: Ledger) -> Bools:
+    """(w, h) where earlier calls of this turn are going to build."""
+    taken = np.zeros(land.ground.size, np.bool_)
+    for x0, y0, x1, y1 in ledger.sites:
+        taken[max(int(x0), 0) : int(np.ceil(x1)), max(int(y0), 0) : int(np.ceil(y1))] = True
+    return taken
+
+
+def good(land: Land, ledger: Ledger, structure: str) -> Bools:
+    """(w, h) where a structure may stand and is in nobody's way; what is asked for least is dropped first.
+
+    Never dropped: what the game asks, the ways of workers, the places of town halls, and that the place was seen and
+    can be walked to.
+    """
+    ground = _ground(land, ledger, structure) & ~land.kept
+    result = _fitting(land, structure, ground & (land.sight > 0)) & _reached(land)
+    wishes = [_open_around(land, ledger, _with_addon(structure))]
+    if sites()[structure].addon:
+        wishes.insert(0, everywhere(ground, ADDON))
+    for wish in wishes:
+        narrowed = result & wish
+        if narrowed.any():
+            result = narrowed
+    return result
+
+
+def best(grid: Bools, cost: Floats) -> tuple[int, int] | None:
+    """The cell with the least cost among those that are marked; of equal ones that with the least coordinates."""
+    costs = np.where(grid, np.round(cost, 3), np.inf)
+    place = int(np.argmin(costs))
+    x, y = divmod(place, grid.shape[1])
+    return (x, y) if np.isfinite(costs[x, y]) else None
+
+
+def footprint_need(structure: str) -> Footprint:
+    """The cells that a structure needs; every structure that can be placed has some."""
+    found = footprint_of(structure)
+    assert found is not None, f"{structure} stands in sites.yaml and has no footprint"
+    return found
+
+
+def on_corner(structure: str) -> bool:
+    """Whether the middle of a structure is on the corner of its cell."""
+    return footprint_need(structure).size[0] % 2 == 0
+
+
+def _with_addon(structure: str) -> Cells:
+    cells = footprint_need(structure).cells
+    return (*cells, *ADDON) if sites()[structure].addon else cells
+
+
+def _reached(land: Land) -> Bools:
+    """(w, h) where a worker can walk from any own town hall; everywhere if there is none."""
+    reached = np.zeros(land.ground.size, np.bool_)
+    for hall in land.own_halls:
+        reached |= np.isfinite(land.ground.ways_from(WorldPoint(hall.pos.x, hall.pos.y)))
+    return reached if land.own_halls else np.ones_like(reached)
+
+
+def _open_around(land: Land, ledger: Ledger, cells: Cells) -> Bools:
+    """(w, h) where a structure cuts no way off: the cells around it that can be walked on are one piece.
+
+    Who goes round such a structure can go everywhere that he could go before, so that no gap is closed, no unit locked
+    in and no add-on walled up, wherever the structure stands.
+    """
+    open_ = land.open & ~land.planned & ~promised(land, ledger)
+    width, height = open_.shape
+    ring = _ring(cells)
+    reach = max(max(abs(dx), abs(dy)) for dx, dy in ring)
+    padded = np.pad(open_, reach)
+    around = [padded[reach + dx : reach + dx + width, reach + dy : reach + dy + height] for dx, dy in ring]
+    pieces = np.zeros(open_.shape, np.int8)
+    for here, following in zip(around, (*around[1:], around[0]), strict=True):
+        pieces += here & ~following
+    some: Bools = np.logical_or.reduce(around)
+    return some & (pieces <= 1)
+
+
+def _ring(cells: Cells) -> list[tuple[int, int]]:
+    """The cells around the rectangle of some cells, in the order in which one walks around it."""
+    xs, ys = zip(*cells, strict=True)
+    x0, x1, y0, y1 = min(xs) - 1, max(xs) + 1, min(ys) - 1, max(ys) + 1
+    bottom = [(x, y0) for x in range(x0, x1)]
+    right = [(x1, y) for y in range(y0, y1)]
+    top = [(x, y1) for x in range(x1, x0, -1)]
+    left = [(x0, y) for y in range(y1, y0, -1)]
+    return bottom + right + top + left
+
+
+# what makes a place good ----------------------------------------------------------------------------------------------
+
+
+def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, corner: bool = False) -> Floats:
+    """(w, h) straight distance of each cell to the nearest of some points; infinite beyond a reach.
+
+    Measured from the cell's middle, or its lower left corner, which is the middle of structures of 2 x 2.
+    """
+    x, y = coordinates(land.ground.size)
+    shift = 0.0 if corner else 0.5
+    squared = np.full(land.ground.size, np.inf, np.float32)
+    for point in points:
+        np.minimum(squared, (x + (shift - point.x)) ** 2 + (y + (shift - point.y)) ** 2, out=squared)
+    least: Floats = np.sqrt(squared)
+    least[least > reach] = np.inf
+    return least
+
+
+def new_power(land: Land, ledger: Ledger) -> Floats:
+    """(w, h) how many new places for a structure of 3 x 3 a Pylon would power, of those that are in nobody's way."""
+    places = everywhere(_ground(land, ledger, "Gateway") & ~land.kept, footprint_need("Gateway").cells)
+    places &= ~land.powered(corner=False)
+    for left, bottom, right, top in ledger.sites:  # it may be a Pylon; either way the next one stands elsewhere
+        x, y = int((left + right) / 2), int((bottom + top) / 2)
+        places[max(x - PYLON_REACH, 0) : x + PYLON_REACH + 1, max(y - PYLON_REACH, 0) : y + PYLON_REACH + 1] = False
+    return _sum_around(places, PYLON_REACH)
+
+
+def _sum_around(grid: Bools, reach: int) -> Floats:
+    """(w, h) how many cells are marked among those at most so many steps below and to the left, or less above."""
+    sums = np.pad(grid.astype(np.float32).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    low, high = ([np.clip(np.arange(n) + shift, 0, n) for n in grid.shape] for shift in (-reach, reach))
+    total: Floats = (
+        sums[np.ix_(high[0], high[1])]
+        - sums[np.ix_(low[0], high[1])]
+        - sums[np.ix_(high[0], low[1])]
+        + sums[np.ix_(low[0], low[1])]
+    )
+    return total

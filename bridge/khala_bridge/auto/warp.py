@@ -1,0 +1,174 @@
+"""Warping in: which gate is ready, and where in a power field there is room."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from khala_bridge.auto.price import charge, check, require
+from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.sites import best, near, promised
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.ground.resources import coordinates, everywhere
+from khala_bridge.state.ledger import Ledger
+from khala_bridge.state.side import finished, is_structure, kind, name, of_types, place
+
+if TYPE_CHECKING:
+    from khala_bridge.auto.rule import Ask
+    from khala_bridge.state import PowerSource, Snapshot, Unit
+    from khala_bridge.state.ground import Land
+    from khala_bridge.state.ground.terrain import Bools
+
+BODY: Final = 0.625
+"""Radius of the widest unit that is warped in, a Stalker, in world units."""
+CROWD: Final = 7.0
+"""Units so near to a power field make it a crowded one."""
+BESIDE: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+"""A cell and its four neighbours."""
+FAST: Final = {"Nexus": 7.0, "Gateway": 6.5, "WarpGate": 6.5}
+"""How near to one of these structures a Pylon warps in fast, in world units."""
+
+
+class PowerField(NamedTuple):
+    """What a model may want to know of one of its power fields before it warps in there."""
+
+    tag: int
+    """Of the Pylon or phasing WarpPrism."""
+    fast: bool
+    """Whether units are there soon after they are warped in."""
+    room: bool
+    """Whether one more unit has room."""
+
+
+def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
+    """The player's power fields, by ascending tags."""
+    ledger = Ledger.of(snapshot)
+    return tuple(
+        PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
+        for source in land_of(snapshot).power_sources
+    )
+
+
+def warp_near(ask: Ask) -> list[Order]:
+    """Warps a unit in as near to a Pylon or phasing WarpPrism as there is room.
+
+    Raises:
+        Impossible: no gate is ready, the price is not there, or there is no room in that field.
+    """
+    land = land_of(ask.snapshot)
+    source = next((s for s in land.power_sources if s.tag == ask.tag), None)
+    if source is None:
+        unit = None if ask.tag is None else land.unit(ask.tag)
+        what = "unit" if unit is None else name(unit)
+        raise Impossible(
+            "invalid_target",
+            f"The {what} {hex(ask.tag or 0)} has no power field; name a finished Pylon or phasing WarpPrism of yours.",
+        )
+    gate = _gate(ask)
+    cell = _room(ask.snapshot, ask.ledger, source)
+    if cell is None:
+        raise Impossible(
+            "invalid_target",
+            f"There is no room in the power field of {hex(source.tag)}; name another Pylon, or move the units away.",
+        )
+    return _warp(ask, gate, cell)
+
+
+def warp_auto(ask: Ask) -> list[Order]:
+    """Warps a unit in at the field where it is soonest there and the fewest own units stand.
+
+    Raises:
+        Impossible: no gate is ready, the price is not there, or no field has room.
+    """
+    gate = _gate(ask)
+    for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _crowded(ask, source)):
+        cell = _room(ask.snapshot, ask.ledger, source)
+        if cell is not None:
+            return _warp(ask, gate, cell)
+    raise never(ask, "no power field has room for it; build a Pylon first.")
+
+
+def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
+    facts = ask.facts(name(gate))
+    if facts is not None:
+        charge(ask, facts, name(gate))
+    ask.ledger.take(gate.tag)
+    point = WorldPoint(cell[0] + 0.5, cell[1] + 0.5)
+    ask.ledger.promise(point, 1, 1)
+    return [Order(ask.function, (gate.tag,), point)]
+
+
+def _gate(ask: Ask) -> Unit:
+    """The gate that is ready; of several that with the least tag."""
+    if ask.units:
+        gates = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
+    else:
+        gates = of_types(ask.snapshot, ask.action.units)
+    gates = finished(gates)
+    if not gates:
+        raise never(ask, "you have no WarpGate; research WarpGate and turn a Gateway into one.")
+    powered = [gate for gate in gates if gate.is_powered]
+    if not powered:
+        raise never(ask, "no WarpGate has power; build a Pylon near one.")
+    facts = ask.facts(name(powered[0]))
+    if facts is not None:
+        require(ask, facts)
+        check(ask, facts, name(powered[0]))
+    ready = [gate for gate in powered if gate.tag not in ask.ledger.busy and ask.has(gate.tag)]
+    if not ready:
+        raise never(ask, "every WarpGate recharges; wait until one is ready.")
+    return ready[0]
+
+
+# where ----------------------------------------------------------------------------------------------------------------
+
+
+def _crowded(ask: Ask, source: PowerSource) -> tuple[bool, int, int]:
+    """The less, the better a field is for the next unit."""
+    middle = (source.pos.x, source.pos.y)
+    units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]
+    return not _is_fast(ask.snapshot, source), len(units) + len(ask.ledger.sites), source.tag
+
+
+def _is_fast(snapshot: Snapshot, source: PowerSource) -> bool:
+    unit = snapshot.units.get(source.tag)
+    if unit is not None and name(unit) == "WarpPrismPhasing":
+        return True
+    middle = (source.pos.x, source.pos.y)
+    near_by = finished(of_types(snapshot, FAST))
+    return any(math.dist(place(other), middle) <= FAST[name(other)] for other in near_by)
+
+
+def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int, int] | None:
+    """The cell nearest to a source where a unit touches nobody; one with free cells beside it before others."""
+    land = land_of(snapshot)
+    ground = land.open & ~promised(land, ledger)
+    free = ground & land.powered(corner=False, by=source.tag) & ~_bodies(snapshot, land, source)
+    away = near(land, [WorldPoint(source.pos.x, source.pos.y)])
+    airy = free & everywhere(ground, BESIDE)
+    return best(airy & ~land.kept, away) or best(airy, away) or best(free, away)
+
+
+def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:
+    """(w, h) the cells in whose middle a unit would touch another one, around a power source."""
+    result = np.zeros(land.ground.size, np.bool_)
+    reach = source.radius + 2
+    for unit in snapshot.units.values():
+        offset = max(abs(unit.pos.x - source.pos.x), abs(unit.pos.y - source.pos.y))
+        if offset > reach or unit.is_flying or is_structure(unit) or _is_neutral_ground(unit):
+            continue
+        apart = BODY + unit.radius
+        x0, y0 = max(int(unit.pos.x - apart - 1), 0), max(int(unit.pos.y - apart - 1), 0)
+        part = result[x0 : int(unit.pos.x + apart + 2), y0 : int(unit.pos.y + apart + 2)]
+        x, y = coordinates((part.shape[0], part.shape[1]), (x0, y0))
+        part |= (x + 0.5 - unit.pos.x) ** 2 + (y + 0.5 - unit.pos.y) ** 2 < apart**2
+    return result
+
+
+def _is_neutral_ground(unit: Unit) -> bool:
+    """Whether a unit is a resource or an obstacle, whose footprint is known to the land."""
+    known = kind(unit)
+    return known is not None and known.race == "neutral" and not known.speed

@@ -1,0 +1,218 @@
+"""What the host does by itself when a task says so: workers gather, town halls train them, Gateways become WarpGates.
+
+Extra orders after those of the agents, with what these leave: never to a unit that an agent has ordered in the same
+turn, never with minerals that an agent has spent. `AutoConfig` says what is switched on; by default nothing is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from khala_bridge.auto.builders import GAS_STRUCTURES
+from khala_bridge.auto.rule import Order
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import abilities
+from khala_bridge.state.ground import land_of
+from khala_bridge.state.side import (
+    ability,
+    bears_resources,
+    finished,
+    has_upgrade,
+    is_doing,
+    name,
+    of_types,
+    place,
+    workers,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.frames import WorldPoint
+    from khala_bridge.state import Snapshot, Unit
+    from khala_bridge.state.ledger import Ledger
+    from khala_bridge.task.config import AutoConfig
+
+PER_FIELD: Final = 2
+"""Workers that a mineral field keeps busy."""
+PER_GAS: Final = 3
+OF_HALL: Final = 10.0
+"""Resources so near to a town hall are gathered into it."""
+MOST_WORKERS: Final = 75
+"""More are never trained by the host; the paper's figure."""
+TRAINED: Final = {
+    "Nexus": "Train_Probe_quick",
+    "CommandCenter": "Train_SCV_quick",
+    "OrbitalCommand": "Train_SCV_quick",
+    "PlanetaryFortress": "Train_SCV_quick",
+    "Larva": "Train_Drone_quick",
+}
+GATHER: Final = "Harvest_Gather_screen"
+MORPH: Final = "Morph_WarpGate_quick"
+
+
+def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: frozenset[int]) -> list[Order]:
+    """The orders of the host's own that go with a joint action, deterministic.
+
+    Args:
+        auto: what the host does.
+        snapshot: what the agents saw.
+        ledger: what their calls left; is written on.
+        ordered: tags of the units that agents have ordered in this turn.
+    """
+    taken = ordered | ledger.busy
+    orders: list[Order] = []
+    if auto.warpgates:
+        orders += _warpgates(snapshot, ledger, taken)
+    if auto.train_workers:
+        orders += _train(snapshot, ledger, taken)
+    if auto.gather:
+        orders += _gather(snapshot, taken)
+    return orders
+
+
+# Gateways -------------------------------------------------------------------------------------------------------------
+
+
+def _warpgates(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[Order]:
+    gateways = [
+        unit.tag
+        for unit in finished(of_types(snapshot, ("Gateway",)))
+        if not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken or unit.tag in ledger.changing)
+        and unit.is_powered
+        and _takes(snapshot, unit.tag, ability(MORPH), when_unasked=has_upgrade(snapshot, "WarpGateResearch"))
+    ]
+    ledger.changing.update(gateways)
+    return [Order(functions()[MORPH], tuple(gateways))] if gateways else []
+
+
+def _takes(snapshot: Snapshot, tag: int, number: int, *, when_unasked: bool = True) -> bool:
+    known = snapshot.abilities
+    return when_unasked if known is None else number in known.get(tag, ())
+
+
+# training -------------------------------------------------------------------------------------------------------------
+
+
+def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[Order]:
+    """One worker from each idle town hall, of Larvae as many as there are town halls."""
+    posts = _posts(snapshot)
+    making = [order for unit in snapshot.own for order in unit.orders if order.ability_id in _trainings()]
+    left = min(sum(post.room for post in posts), MOST_WORKERS - len(workers(snapshot))) - len(making)
+    producers = finished(of_types(snapshot, [kind for kind in TRAINED if kind != "Larva"]))
+    larvae = of_types(snapshot, ("Larva",))[: len(finished(land_of(snapshot).own_halls))]
+    orders = []
+    for unit in (*producers, *larvae):
+        function = functions()[TRAINED[name(unit)]]
+        facts = abilities()[function.ability_id]
+        free = not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken or unit.tag in ledger.changing)
+        paid = ledger.minerals >= facts.minerals and ledger.supply >= 1
+        if left > 0 and free and paid and _takes(snapshot, unit.tag, function.ability_id):
+            ledger.pay(facts.minerals, facts.vespene, 1)
+            ledger.queued[unit.tag] += 1
+            orders.append(Order(function, (unit.tag,)))
+            left -= 1
+    return orders
+
+
+def _trainings() -> set[int]:
+    return {ability(function) for function in TRAINED.values()}
+
+
+# gathering ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class _Post:
+    """Where workers gather: the mineral fields of a town hall, or one gas structure."""
+
+    hall: WorldPoint
+    target: int
+    has: int
+    wants: int
+    gas: bool
+
+    @property
+    def room(self) -> int:
+        return max(self.wants - self.has, 0)
+
+    @property
+    def fill(self) -> float:
+        return self.has / self.wants if self.wants else math.inf
+
+
+def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[Order]:
+    """Sends idle workers to work, and some from full places to those with room."""
+    posts = _posts(snapshot)
+    if not posts:
+        return []
+    idle = [worker for worker in workers(snapshot) if not worker.orders and worker.tag not in taken]
+    return [*_employed(posts, idle), *_moved(snapshot, posts, taken)]
+
+
+def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[Order]:
+    """Idle workers at the places that need them most, one after the other."""
+    for worker in idle:
+        post = _post_for(posts, worker)
+        post.has += 1
+        yield Order(functions()[GATHER], (worker.tag,), post.target)
+
+
+def _posts(snapshot: Snapshot) -> list[_Post]:
+    """Every place where workers can gather into a finished town hall, by the tags of the halls."""
+    land = land_of(snapshot)
+    fields = [unit for unit in land.standing("mineral_field") if unit.tag in snapshot.units]
+    gas = [u for u in finished(of_types(snapshot, GAS_STRUCTURES)) if u.vespene_contents > 0]
+    return [post for hall in finished(land.own_halls) for post in _posts_of(hall, fields, gas)]
+
+
+def _posts_of(hall: Unit, fields: list[Unit], gas: list[Unit]) -> Iterator[_Post]:
+    at = place(hall)
+    own = sorted((math.dist(place(f), at), f.tag) for f in fields if math.dist(place(f), at) <= OF_HALL)
+    if own:
+        yield _Post(at, own[0][1], hall.assigned_harvesters, PER_FIELD * len(own), gas=False)
+    for unit in gas:
+        if math.dist(place(unit), at) <= OF_HALL:
+            yield _Post(at, unit.tag, unit.assigned_harvesters, PER_GAS, gas=True)
+
+
+def _post_for(posts: list[_Post], worker: Unit) -> _Post:
+    """The place for an idle worker: at the nearest town hall with room where it is emptiest, else the nearest."""
+
+    def rank(post: _Post) -> tuple[bool, float, float, bool, int]:
+        return not post.room, round(math.dist(post.hall, place(worker)), 3), post.fill, post.gas, post.target
+
+    return min(posts, key=rank)
+
+
+def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[Order]:
+    """Workers of full places for emptier ones: to the gas of the same base, and from full bases to others."""
+    free = [
+        worker
+        for worker in workers(snapshot)
+        if worker.tag not in taken and is_doing(worker, ability(GATHER)) and not bears_resources(worker)
+    ]
+    for to in posts:
+        for source in posts:
+            if source.gas or not to.room or not _gives(source, to):
+                continue
+            own = [w for w in free if _gathers_minerals(snapshot, w) and math.dist(place(w), source.hall) <= OF_HALL]
+            worker = min(own, key=lambda w: (math.dist(place(w), to.hall), w.tag), default=None)
+            if worker is not None:
+                free.remove(worker)
+                source.has, to.has = source.has - 1, to.has + 1
+                yield Order(functions()[GATHER], (worker.tag,), to.target)
+
+
+def _gives(source: _Post, to: _Post) -> bool:
+    """Whether the mineral fields of a town hall have a worker to spare for another place."""
+    if to.gas and source.hall == to.hall:
+        return source.fill > to.fill
+    return not to.gas and source.hall != to.hall and source.has > source.wants
+
+
+def _gathers_minerals(snapshot: Snapshot, worker: Unit) -> bool:
+    target = land_of(snapshot).unit(worker.orders[0].target_unit_tag)
+    return target is None or name(target) not in GAS_STRUCTURES

@@ -1,0 +1,248 @@
+"""The game as the rest of Khala knows it: a thing that is reset, played with plans, and closed.
+
+`Game` is blocking, and one thread may use it. `GameThread` runs one in a thread of its own, so that a match can await
+it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`; no code above this module knows
+whether it talks to StarCraft II or to Khala's simulator, which is only a matter of the directory in `GameConfig`.
+
+Players are the ones that Khala plays, in the order of the configuration: one now, two later; so a game has a tuple of
+snapshots and not one. `OneSide` is the game as a match with one side has it: commands in, one snapshot out.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, Self, TypeVar
+
+from khala_bridge.errors import GameHangs, GameMissing
+from khala_bridge.frames import CAMERA_WIDTH
+from khala_bridge.task.maps import MapSpec  # noqa: TC001  # pydantic evaluates it
+from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import TracebackType
+
+    from khala_bridge.act import Command, Executor
+    from khala_bridge.act.plan import Plan, Played
+    from khala_bridge.state import Snapshot
+
+T = TypeVar("T")
+
+
+class GameConfig(Frozen):
+    """Which game is started, and how."""
+
+    sc2path: Path
+    """Directory of the install, laid out as StarCraft II is; SC2PATH points to it while PySC2 looks for it."""
+    map: MapSpec
+    seed: int | None = None
+    """Of the first episode; the next ones count up from it. None leaves it to the game."""
+    screen_px: int = 128
+    """Resolution of the feature layers of the screen, which shows 24 world units."""
+    minimap_px: int = 64
+    render_px: int | None = None
+    """Resolution of the real pictures of the screen and the minimap, for a game that can draw; None for none."""
+    limit_loops: int | None = None
+    """Game loops after which an episode ends without a result; None leaves it to the map."""
+    abilities: bool = True
+    """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
+    start_timeout_s: int = 120
+    """How long the game may take until it listens."""
+
+    @property
+    def camera_width(self) -> float:
+        """World units that the screen shows."""
+        return CAMERA_WIDTH
+
+
+@dataclass(frozen=True, slots=True)
+class GameInfo:
+    """What plays, for the run card."""
+
+    version: str
+    """As the game says it, `4.10.0.75689`."""
+    data_version: str
+    map_file: str
+    map_sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class StepResult:
+    """What became of one player's plan."""
+
+    snapshot: Snapshot
+    played: Played
+    env_steps: int
+    """Calls of `SC2Env.step` that the plan took; players share them."""
+
+
+class Game(Protocol):
+    """One game with its players. Every method blocks; errors are `khala_bridge.errors.GameError`."""
+
+    @property
+    def info(self) -> GameInfo:
+        """What plays."""
+
+    def reset(self) -> tuple[Snapshot, ...]:
+        """Begins an episode; a snapshot for each player."""
+
+    def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
+        """Plays one plan of each player to its end, or to the end of the episode, which must not be over yet."""
+
+    def kill(self) -> None:
+        """Ends the game at once; the only method that another thread may call."""
+
+    def close(self) -> None:
+        """Ends the game in good order; may be called twice."""
+
+
+class GameThread:
+    """A game in a thread of its own; an async context manager.
+
+    Entering it starts the game, leaving it closes the game. The calls are not reentrant: one at a time.
+    """
+
+    def __init__(self, start: Callable[[], Game], *, hang_s: float | None = 120.0) -> None:
+        """Prepares a game.
+
+        Args:
+            start: makes the game; runs in the thread.
+            hang_s: longest time that one call may take before the game is ended and `GameHangs` is raised.
+        """
+        self._start = start
+        self._hang_s = hang_s
+        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")
+        self._game: Game | None = None
+
+    async def __aenter__(self) -> Self:
+        """Starts the game."""
+        try:
+            self._game = await asyncio.get_running_loop().run_in_executor(self._threads, self._start)
+        except BaseException:
+            self._threads.shutdown(wait=False)
+            raise
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Closes the game, or kills it if it does not let itself be closed."""
+        try:
+            with contextlib.suppress(GameHangs):  # it is gone, which was wanted
+                await self._run(self._playing.close)
+        finally:
+            self._threads.shutdown(wait=False)
+
+    @property
+    def info(self) -> GameInfo:
+        """What plays."""
+        return self._playing.info
+
+    async def reset(self) -> tuple[Snapshot, ...]:
+        """Begins an episode; a snapshot for each player."""
+        return await self._run(self._playing.reset)
+
+    async def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
+        """Plays one plan of each player to its end, or to the end of the episode."""
+        return await self._run(functools.partial(self._playing.act, plans))
+
+    @property
+    def _playing(self) -> Game:
+        assert self._game is not None, "the game is entered before it is used"
+        return self._game
+
+    async def _run(self, call: Callable[[], T]) -> T:
+        work = asyncio.get_running_loop().run_in_executor(self._threads, call)
+        try:
+            async with asyncio.timeout(self._hang_s):
+                return await asyncio.shield(work)
+        except TimeoutError:
+            self._playing.kill()
+            await asyncio.wait([work])  # it fails soon: its process is gone
+            work.exception()
+            raise GameHangs(
+                f"the game did not answer within {self._hang_s:g} s and was ended; try again, or another game or map"
+            ) from None
+
+
+class OneSide:
+    """A game in which Khala plays one side; an async context manager around its thread."""
+
+    def __init__(self, thread: GameThread, executor: Executor, *, step_loops: int) -> None:
+        """Takes a game that is not entered yet, how to play commands, and how many loops pass between two decisions."""
+        self._thread = thread
+        self._executor = executor
+        self._step_loops = step_loops
+        self._now: Snapshot | None = None
+
+    async def __aenter__(self) -> Self:
+        """Starts the game."""
+        await self._thread.__aenter__()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Closes the game."""
+        await self._thread.__aexit__(kind, error, trace)
+
+    @property
+    def info(self) -> GameInfo:
+        """What plays."""
+        return self._thread.info
+
+    async def reset(self) -> Snapshot:
+        """Begins an episode."""
+        self._executor.begin()
+        (self._now,) = await self._thread.reset()
+        return self._now
+
+    async def act(self, commands: Sequence[Command]) -> StepResult:
+        """Plays the commands of a joint action, and lets the game loops of a step pass."""
+        assert self._now is not None, "the game is reset before it is played"
+        (result,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
+        self._now = result.snapshot
+        return result
+
+
+def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str, str] = os.environ) -> Path:
+    """The directory of the game that a configuration asks for.
+
+    Args:
+        source: `simulator`, `starcraft2` (found by SC2PATH, else where its installer puts it), or a directory.
+        simulator: where the simulator is installed; callers that may know it pass it here.
+        environ: where SC2PATH is looked up.
+
+    Raises:
+        GameMissing: there is no game; the text says what to do.
+    """
+    if source == "simulator":
+        if simulator is None:
+            raise GameMissing("the simulator is not installed: `khala sc2 install DIR` lays it out")
+        return check_install(simulator)
+    if source == "starcraft2":
+        if "SC2PATH" in environ:
+            return check_install(Path(environ["SC2PATH"]).expanduser(), told_by="SC2PATH")
+        return check_install(Path("~/StarCraftII").expanduser(), told_by="SC2PATH is not set, the usual place")
+    return check_install(Path(source).expanduser())
+
+
+def check_install(directory: Path, *, told_by: str = "") -> Path:
+    """Returns `directory` if a game is installed in it.
+
+    Raises:
+        GameMissing: it is not.
+    """
+    where = f"{directory} ({told_by})" if told_by else str(directory)
+    if not directory.is_dir():
+        raise GameMissing(f"there is no StarCraft II in {where}: no such directory; set SC2PATH to where it is")
+    versions = directory / "Versions"
+    if not versions.is_dir() or not any(entry.name.startswith("Base") for entry in versions.iterdir()):
+        raise GameMissing(f"there is no StarCraft II in {where}: it has no directory Versions with a Base in it")
+    return directory

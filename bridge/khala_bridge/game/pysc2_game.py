@@ -1,0 +1,277 @@
+"""A game on PySC2: the unmodified `SC2Env`, told what to do by plans.
+
+PySC2 starts the game that SC2PATH names, speaks its API and checks what goes in and out; here its observations become
+snapshots, and what it raises becomes a `GameError` that says what to do. The proto of an observation is kept, since
+positions in world units are only there. It knows no agent, no team and no text.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import os
+import threading
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from absl import flags
+
+from khala_bridge.act.plan import Played, Step
+from khala_bridge.catalogue.functions import check_against_pysc2
+from khala_bridge.compat import maps, sc2_env
+from khala_bridge.errors import GameError, GameMissing
+from khala_bridge.game.game import GameConfig, GameInfo, StepResult, check_install
+from khala_bridge.state import read_info, read_snapshot
+from khala_bridge.state.abilities import available, question
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
+
+    from s2clientprotocol import sc2api_pb2 as sc_pb
+
+    from khala_bridge.act.plan import GameAction, Plan
+    from khala_bridge.state import EpisodeInfo, Snapshot
+    from khala_bridge.task.maps import MapSpec
+
+_PLACING_LOOPS = 16
+"""Loops that a map's script may take until the first unit stands; the battles need none or one."""
+_environment = threading.Lock()
+
+
+class PySC2Game:
+    """One player against the computer, on `SC2Env`."""
+
+    def __init__(self, config: GameConfig) -> None:
+        """Starts the game.
+
+        Raises:
+            GameMissing: there is no game or no such map in the install.
+            GameError: it could not be started.
+            CatalogueError: this PySC2 has other functions than the text actions were made for.
+        """
+        self._config = config
+        self._asks = config.abilities
+        self._episode = 0
+        self._ended = True
+        self._maps: tuple[EpisodeInfo, ...] = ()
+        check_against_pysc2()
+        check_install(config.sc2path)
+        map_data = _map_data(config)
+        self._env = _start(config)
+        with _explained("the game could not be asked for its version"):
+            ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
+        self._info = GameInfo(
+            version=ping.game_version,
+            data_version=ping.data_version,
+            map_file=config.map.file,
+            map_sha256=hashlib.sha256(map_data).hexdigest(),
+        )
+
+    @property
+    def info(self) -> GameInfo:
+        """What plays."""
+        return self._info
+
+    def reset(self) -> tuple[Snapshot, ...]:
+        """Begins an episode, and waits for the map's script to place its units."""
+        with _explained("a new episode could not be begun"):
+            if self._config.seed is not None:
+                # `SC2Env` would begin every episode with the same seed, and has no other way to be told
+                self._env._random_seed = self._config.seed + self._episode  # noqa: SLF001
+            steps = self._env.reset()
+            self._episode += 1
+            self._maps = tuple(map(read_info, self._env.game_info))
+            snapshots = self._snapshots(steps)
+            for _ in range(_PLACING_LOOPS):
+                if all(snapshot.own or snapshot.ended for snapshot in snapshots):
+                    break
+                snapshots = self._snapshots(self._env.step([[] for _ in snapshots], step_mul=1))
+            return self._with_abilities(snapshots)
+
+    def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
+        """Plays one plan of each player, step by step, all players in the same steps."""
+        if self._ended:
+            raise GameError("the episode is over: the game has to be reset before it is played on")
+        players = [_Player(plan) for plan in plans]
+        snapshots: tuple[Snapshot, ...] = ()
+        env_steps = 0
+        with _explained("the game died or broke its contract"):
+            while any(player.step for player in players) and not self._ended:
+                loops = min(player.step.loops for player in players if player.step)
+                steps = self._env.step([player.actions() for player in players], step_mul=loops)
+                env_steps += 1
+                snapshots = self._snapshots(steps, snapshots)
+                for player, snapshot in zip(players, snapshots, strict=True):
+                    player.pass_loops(loops, snapshot)
+            snapshots = self._with_abilities(snapshots)
+        for player in players:
+            player.close()
+        return tuple(StepResult(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
+
+    def kill(self) -> None:
+        """Kills the game's processes; a call that waits for them fails then."""
+        for process in self._env._sc2_procs or ():  # noqa: SLF001  # the only way to a process that hangs
+            if process.running:
+                process._proc.kill()  # noqa: SLF001
+
+    def close(self) -> None:
+        """Ends the game in good order; may be called twice."""
+        with contextlib.suppress(Exception):  # it may be dead already, and nothing is left to be done about it
+            self._env.close()
+
+    def _snapshots(self, steps: Iterable[Any], before: Sequence[Snapshot] = ()) -> tuple[Snapshot, ...]:
+        made = []
+        for index, (step, info) in enumerate(zip(steps, self._maps, strict=True)):
+            response: sc_pb.ResponseObservation = step.observation["_response_observation"]()
+            earlier = before[index] if before else None
+            made.append(
+                read_snapshot(
+                    response,
+                    info,
+                    functions=frozenset(int(number) for number in step.observation["available_actions"]),
+                    dead=earlier.dead if earlier else frozenset(),
+                    errors=earlier.errors if earlier else (),
+                    ended=bool(step.last()),
+                )
+            )
+        self._ended = made[0].ended
+        return tuple(made)
+
+    def _with_abilities(self, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
+        """Asks once for each player what its units can do; a game that is over takes no questions."""
+        if self._ended or not self._asks:
+            return tuple(snapshots)
+        controllers = self._env._controllers  # noqa: SLF001  # `SC2Env` has no query of its own
+        return tuple(
+            dataclasses.replace(snapshot, abilities=available(controller.query(question(snapshot))))
+            for snapshot, controller in zip(snapshots, controllers, strict=True)
+        )
+
+
+class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
+    """A map as PySC2 takes it. The class has no file name, which keeps it out of PySC2's global table of maps."""
+
+    def __init__(self, spec: MapSpec) -> None:
+        file = PurePosixPath(spec.file)
+        self.players = 1 if spec.opponent is None else 2
+        self._name = spec.name
+        self.directory = str(file.parent)
+        self.filename = file.name
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+
+class _Player:
+    """One plan while it is played: the step that it wants next, and how much of it has passed."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._fresh = True
+        self.played = Played()
+        self.step: Step | None = None
+        self._advance(None)
+
+    def actions(self) -> list[GameAction]:
+        """What enters the game now: the step's actions, once."""
+        fresh, self._fresh = self._fresh, False
+        return list(self.step.actions) if self.step and fresh else []
+
+    def pass_loops(self, loops: int, snapshot: Snapshot) -> None:
+        """Lets game loops pass; a step that is over gives way to the next one."""
+        if self.step is None:
+            return
+        if self.step.loops > loops and not snapshot.ended:
+            self.step = Step(self.step.actions, self.step.loops - loops)
+        else:
+            self._advance(snapshot)
+
+    def close(self) -> None:
+        """Ends a plan that the end of the episode cut short."""
+        self._plan.close()
+
+    def _advance(self, snapshot: Snapshot | None) -> None:
+        self._fresh = True
+        try:
+            self.step = next(self._plan) if snapshot is None else self._plan.send(snapshot)
+        except StopIteration as done:
+            self.step, self.played = None, done.value
+
+
+def _map_data(config: GameConfig) -> bytes:
+    path: Path = config.sc2path / "Maps" / config.map.file
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise GameMissing(
+            f"there is no map {config.map.file} in {config.sc2path / 'Maps'}: copy it there, or play with the simulator"
+        ) from None
+    except OSError as error:
+        raise GameMissing(f"the map {path} cannot be read: {error.strerror}") from None
+
+
+def _start(config: GameConfig) -> Any:
+    pictures = config.render_px and sc2_env.Dimensions(screen=config.render_px, minimap=config.render_px)
+    interface = sc2_env.AgentInterfaceFormat(
+        feature_dimensions=sc2_env.Dimensions(screen=config.screen_px, minimap=config.minimap_px),
+        rgb_dimensions=pictures or None,
+        action_space=sc2_env.ActionSpace.FEATURES,
+        camera_width_world_units=config.camera_width,
+        use_feature_units=True,
+        use_raw_units=True,
+        send_observation_proto=True,
+        hide_specific_actions=False,  # a general action would do what the unit can, not what was said
+    )
+    players: list[Any] = [sc2_env.Agent(sc2_env.Race[config.map.race], "Khala")]
+    if config.map.opponent is not None:
+        # the build `random` would be drawn from Python's own generator
+        difficulty, build = sc2_env.Difficulty[config.map.difficulty], sc2_env.BotBuild.macro
+        players.append(sc2_env.Bot(sc2_env.Race[config.map.opponent], difficulty, build))
+    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; their defaults are wanted, not our command line
+        flags.FLAGS.mark_as_parsed()
+    flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
+    env = object.__new__(sc2_env.SC2Env)  # kept while it starts, so that a start that fails leaves no process
+    try:
+        with _sc2path(config.sc2path), _explained("the game could not be started"):
+            env.__init__(
+                map_name=_Map(config.map),
+                players=players,
+                agent_interface_format=interface,
+                game_steps_per_episode=config.limit_loops,
+                random_seed=config.seed,
+                ensure_available_actions=False,
+            )
+    except BaseException:
+        env.close()
+        raise
+    return env
+
+
+@contextlib.contextmanager
+def _sc2path(directory: Path) -> Iterator[None]:
+    """Lets PySC2 find this install; it reads SC2PATH once, while it starts."""
+    with _environment:
+        before = os.environ.get("SC2PATH")
+        os.environ["SC2PATH"] = str(directory)
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ["SC2PATH"]
+            else:
+                os.environ["SC2PATH"] = before
+
+
+@contextlib.contextmanager
+def _explained(what: str) -> Iterator[None]:
+    """Turns whatever PySC2 raises into an error for the user; it has no common base."""
+    try:
+        yield
+    except GameError:
+        raise
+    except Exception as error:
+        detail = " ".join(str(error).split()) or type(error).__name__
+        raise GameError(f"{what}: {detail}") from error

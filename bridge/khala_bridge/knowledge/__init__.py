@@ -1,0 +1,36 @@
+"""What is known of the game: unit types, abilities, upgrades of every race, with facts and words.
+
+    knowledge()  unit types by name    abilities()  by id    upgrades(), buffs()  by name
+
+    model   the records                                words   fills numbers into sentences
+    facts   reads what was generated, by version       load    facts and words together, once
+    prompt  the lines of a prompt                      lookup  everything, for people
+
+What happens in a running game is no knowledge but an observation: health, energy and the like of a unit come from
+there; here is what the game does not say of an enemy, and what an order would cost and need.
+"""
+
+from khala_bridge.knowledge.facts import VERSION, VERSIONS
+from khala_bridge.knowledge.load import RACES, abilities, ability_of, buffs, is_armed, knowledge, stand_ins, upgrades
+from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts, Weapon
+from khala_bridge.knowledge.prompt import advice, short
+
+__all__ = [
+    "RACES",
+    "VERSION",
+    "VERSIONS",
+    "AbilityFacts",
+    "BuffFacts",
+    "UnitType",
+    "UpgradeFacts",
+    "Weapon",
+    "abilities",
+    "ability_of",
+    "advice",
+    "buffs",
+    "is_armed",
+    "knowledge",
+    "short",
+    "stand_ins",
+    "upgrades",
+]

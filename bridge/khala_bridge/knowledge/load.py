@@ -1,0 +1,196 @@
+"""What is known of the game: the facts of a version, merged with the words about them, read once when asked for.
+
+Words are written by hand in `bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above: everything
+that speaks of the game. Below: `facts`, which reads what was generated, and `words`, which fills in.
+"""
+
+from __future__ import annotations
+
+import functools
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Final
+
+from pydantic import Field
+
+from khala_bridge import data
+from khala_bridge.knowledge.facts import VERSION, ability_facts, buff_facts, unit_facts, upgrade_facts
+from khala_bridge.knowledge.words import Filler
+from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts
+
+RACES: Final = ("protoss", "terran", "zerg")
+
+
+def knowledge(version: str = VERSION) -> dict[str, UnitType]:
+    """Every known unit type by the name that PySC2 gives it, resources and obstacles too, in alphabetical order."""
+    return _units(version)
+
+
+def abilities(version: str = VERSION) -> dict[int, AbilityFacts]:
+    """Every known ability by its id, special and general ones, in the order of their ids."""
+    return _abilities(version)
+
+
+def upgrades(version: str = VERSION) -> dict[str, UpgradeFacts]:
+    """Every known upgrade by the name that PySC2 gives it, in alphabetical order."""
+    return _upgrades(version)
+
+
+def buffs(version: str = VERSION) -> dict[str, BuffFacts]:
+    """Every buff that changes anything or that observations tell of, by name, in alphabetical order."""
+    return buff_facts(version)
+
+
+def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFacts | None:
+    """What an ability, special or general, is for units of one type; None if they do not have it.
+
+    `ability_of(EFFECT_STIM, "Marine")` is what Stim is to a Marine, and so is the special ability's own number.
+    """
+    facts = abilities(version).get(number)
+    if facts is None:
+        return None
+    cases = [abilities(version)[special] for special in facts.special] or [facts]
+    return next((case for case in cases if unit_type in case.users), None)
+
+
+@functools.cache
+def stand_ins(name: str, version: str = VERSION) -> frozenset[str]:
+    """Types with which a requirement of this structure is met: itself, and what counts as it (a Hive as a Lair)."""
+    return frozenset({name, *(kind.name for kind in unit_facts(version).values() if name in kind.counts_as)})
+
+
+def is_armed(unit_type: str) -> bool:
+    """Whether a type has a weapon; a type that is not known is taken to have one."""
+    known = unit_facts(VERSION).get(unit_type)
+    return known is None or bool(known.weapons)
+
+
+# --- words ----------------------------------------------------------------------------------------------------
+
+
+class UnitWords(Frozen):
+    """What is written about one unit type, or about several that are alike."""
+
+    types: tuple[str, ...] = ()
+    """Types that it is written about; () for the one that it stands under."""
+    about: str
+    uses: str = ""
+    beats: tuple[str, ...] = ()
+    """Types that it counters; the other direction follows."""
+    traits: dict[str, str] = Field(default_factory=dict)
+    """What it can do without being told, a title and a sentence each."""
+
+
+class AbilityWords(Frozen):
+    """What is written about one ability."""
+
+    title: str = ""
+    """Short name under which a unit's own abilities list it; '' for what is no ability in the eyes of a player."""
+    about: str
+
+
+@functools.cache
+def unit_words() -> dict[str, UnitWords]:
+    """What is written about unit types, by name."""
+    files = [f"knowledge/words/{race}.yaml" for race in (*RACES, "neutral")]
+    entries = [entry for file in files for entry in data.table(file, UnitWords).items()]
+    return {name: words for heading, words in entries for name in words.types or (heading,)}
+
+
+@functools.cache
+def ability_words() -> dict[str, AbilityWords]:
+    """What is written about abilities: by name, or by kind in angle brackets."""
+    return data.table("knowledge/words/abilities.yaml", AbilityWords)
+
+
+@functools.cache
+def upgrade_words() -> dict[str, str]:
+    """What is written about upgrades, by name; a star stands for any end of it."""
+    written: dict[str, str] = data.document("knowledge/words/upgrades.yaml")
+    return written
+
+
+def words_of(ability: AbilityFacts) -> AbilityWords | None:
+    """What is written about an ability under its name, or else about its kind."""
+    return ability_words().get(ability.name) or ability_words().get(f"<{ability.does}>")
+
+
+# --- both -----------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _filler(version: str) -> Filler:
+    return Filler(unit_facts(version), ability_facts(version), buff_facts(version))
+
+
+@functools.cache
+def _units(version: str) -> dict[str, UnitType]:
+    beaten_by = _beaten_by()
+    return {name: _described(kind, beaten_by.get(name, ()), version) for name, kind in unit_facts(version).items()}
+
+
+def _beaten_by() -> dict[str, tuple[str, ...]]:
+    """What counters a type, by name: first those that name it first among what they counter."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for name, words in unit_words().items():
+        for rank, other in enumerate(words.beats):
+            found.setdefault(other, []).append((rank, name))
+    return {other: tuple(name for _, name in sorted(names)) for other, names in found.items()}
+
+
+def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> UnitType:
+    words, filler = unit_words()[kind.name], _filler(version)
+    traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
+    told = {
+        "allows": _allowed_by(version).get(kind.name, ()),
+        "about": filler.fill(words.about, kind),
+        "uses": filler.fill(words.uses, kind),
+        "counters": words.beats,
+        "countered_by": beaten_by,
+        "abilities": {**traits, **dict(_titled(kind, version))},
+    }
+    return kind.model_copy(update=told)
+
+
+@functools.cache
+def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
+    """Types and upgrades of melee games that require a structure, by its name."""
+    kinds, better = unit_facts(version).values(), upgrade_facts(version).values()
+    required = [(kind.name, kind.requires) for kind in kinds if kind.melee]
+    required += [(upgrade.name, upgrade.requires) for upgrade in better if upgrade.melee]
+    found: dict[str, list[str]] = {}
+    for name, needs in required:
+        for needed in needs:
+            found.setdefault(needed, []).append(name)
+    return {name: tuple(allowed) for name, allowed in found.items()}
+
+
+def _titled(kind: UnitType, version: str) -> Iterator[tuple[str, str]]:
+    """The abilities of a type that have a title, with what is said about them."""
+    for number in kind.ability_ids:
+        if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:
+            yield words.title, ability.about
+
+
+@functools.cache
+def _abilities(version: str) -> dict[int, AbilityFacts]:
+    return {number: _explained(ability, version) for number, ability in ability_facts(version).items()}
+
+
+def _explained(ability: AbilityFacts, version: str) -> AbilityFacts:
+    words = words_of(ability) if ability.melee else None
+    return ability.model_copy(update={"about": _filler(version).fill(words.about, ability)}) if words else ability
+
+
+@functools.cache
+def _upgrades(version: str) -> dict[str, UpgradeFacts]:
+    return {name: _praised(upgrade, version) for name, upgrade in upgrade_facts(version).items()}
+
+
+def _praised(upgrade: UpgradeFacts, version: str) -> UpgradeFacts:
+    said = next((said for name, said in upgrade_words().items() if fnmatchcase(upgrade.name, name)), "")
+    return upgrade.model_copy(update={"about": _filler(version).fill(said, upgrade)})

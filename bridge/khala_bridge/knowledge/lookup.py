@@ -1,0 +1,165 @@
+"""All that is known of a unit type, an upgrade or an ability, as text for people who look it up.
+
+`khala knowledge show` prints it. For prompts there are the few lines of `khala_bridge.knowledge.prompt`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING, TypeAlias
+
+from khala_bridge.knowledge import prompt
+from khala_bridge.knowledge.facts import VERSION
+from khala_bridge.knowledge.load import abilities, knowledge, upgrades
+from khala_bridge.knowledge.model import AbilityFacts, UnitType, UpgradeFacts
+from khala_bridge.knowledge.words import listed, price
+from khala_bridge.knowledge.words import number as n
+from khala_protocol.errors import KhalaError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+INDENT = "    "
+
+
+Known: TypeAlias = UnitType | UpgradeFacts | AbilityFacts
+
+
+class NotKnown(KhalaError):
+    """Nothing that is known has this name."""
+
+
+def find(name: str, version: str = VERSION) -> list[Known]:
+    """Every unit type, upgrade and ability with this name, or the ability with this number.
+
+    Upper case, blanks and underscores do not matter: `siege tank` is a SiegeTank.
+
+    Raises:
+        NotKnown: there is no such thing; the text names the nearest.
+    """
+    wanted = _plain(name)
+    everything: list[Known] = [
+        *knowledge(version).values(), *upgrades(version).values(), *abilities(version).values()
+    ]  # fmt: skip
+    found = [one for one in everything if _plain(one.name) == wanted]
+    found += [ability for ability in abilities(version).values() if str(ability.id) == name.strip()]
+    if found:
+        return found
+    plain = {_plain(one.name): one.name for one in everything if one.melee}
+    near = [plain[one] for one in difflib.get_close_matches(wanted, plain, n=3)]
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    raise NotKnown(f"nothing in version {version} of the game is called '{name}'{hint}")
+
+
+def long(known: Known, version: str = VERSION) -> str:
+    """All that is known of one thing."""
+    if isinstance(known, UnitType):
+        lines = _unit(known, version)
+    elif isinstance(known, UpgradeFacts):
+        lines = _upgrade(known, version)
+    else:
+        lines = _ability(known)
+    return "\n".join(lines) + "\n"
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
+
+
+def _unit(kind: UnitType, version: str) -> list[str]:
+    out = [f"{kind.name} ({'structure' if kind.structure else 'unit'}, {kind.race}, id {kind.id})"]
+    out += _told(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
+    out += [INDENT + prompt.body(kind) + f", sight {n(kind.sight)}"]
+    out += [INDENT + prompt.weapon(weapon) for weapon in kind.weapons]
+    out += [INDENT + said for said in _making(kind)]
+    out += [f"{INDENT}{what}: {', '.join(names)}" for what, names in _related(kind) if names]
+    out += [f"{INDENT}{title}: {said}" for title, said in kind.abilities.items()]
+    better = list(_upgrades(kind, version))
+    out += [f"{INDENT}Upgrades:"] * bool(better) + [INDENT * 2 + said for said in better]
+    orders = [abilities(version)[number] for number in kind.ability_ids if number in abilities(version)]
+    return [*out, f"{INDENT}Orders: {', '.join(f'{order.name} ({order.id})' for order in orders)}"] if orders else out
+
+
+def _upgrades(kind: UnitType, version: str) -> Iterator[str]:
+    """What makes a type better; levels that say the same share a line."""
+    said: dict[str, list[str]] = {}
+    for upgrade in upgrades(version).values():
+        if upgrade.melee and kind.name in upgrade.affects:
+            said.setdefault(upgrade.about, []).append(upgrade.name)
+    for about, names in said.items():
+        yield f"{', '.join(names)}: {about}"
+
+
+def _making(kind: UnitType) -> Iterator[str]:
+    if kind.producers:
+        needs = (*kind.requires, *((f"a {kind.addon} at the producer",) if kind.addon else ()))
+        needed = f"; needs {listed(needs)}" if needs else ""
+        yield f"Made by {listed(kind.producers)} in {n(kind.build_s)} s{needed}"
+    if kind.value or kind.supply:
+        yield f"Worth {price(kind.minerals, kind.vespene, kind.supply)}"
+    if kind.footprint:
+        yield f"Stands on {kind.footprint[0]} x {kind.footprint[1]} cells"
+    for words, value in (
+        ("Gives supply", kind.provides), ("Gives power within", kind.power_radius),
+        ("Places in a transport", kind.cargo_size), ("Carries places", kind.cargo_space),
+    ):  # fmt: skip
+        if value:
+            yield f"{words}: {n(value)}"
+    ground = (("power", kind.needs_power), ("creep", kind.needs_creep))
+    yield from (f"Needs {what}" for what, is_so in ground if is_so)
+
+
+def _related(kind: UnitType) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    return (
+        ("Counts also as", kind.counts_as),
+        ("Allows", kind.allows),
+        ("Good against", kind.counters),
+        ("Beaten by", kind.countered_by),
+    )
+
+
+def _upgrade(upgrade: UpgradeFacts, version: str) -> list[str]:
+    out = [f"{upgrade.name} (upgrade, {upgrade.race or 'no race'}, id {upgrade.id})"]
+    out += _told(upgrade.about, "" if upgrade.melee else "Not in melee games.")
+    if upgrade.at:
+        needs = f"; needs {listed(upgrade.requires)}" if upgrade.requires else ""
+        cost = price(upgrade.minerals, upgrade.vespene)
+        out.append(f"{INDENT}Researched at {listed(upgrade.at)} for {cost} in {n(upgrade.time_s)} s{needs}")
+    for name, changes in upgrade.changes.items():
+        out.append(f"{INDENT}{name}: " + ", ".join(f"{what} {more:+g}" for what, more in changes.items()))
+    allowed = [f"{abilities(version)[one].name} ({one})" for one in upgrade.enables if one in abilities(version)]
+    return [*out, f"{INDENT}Allows {listed(tuple(allowed))}"] if allowed else out
+
+
+def _ability(ability: AbilityFacts) -> list[str]:
+    out = [f"{ability.name} ({'general ' if ability.special else ''}ability {ability.id})"]
+    out += _told(ability.about, "" if ability.melee else "Not in melee games.")
+    out += [f"{INDENT}{what}: {said}" for what, said in _terms(ability) if said]
+    if ability.figures:
+        out.append(f"{INDENT}Numbers: " + ", ".join(f"{what} {value:g}" for what, value in ability.figures.items()))
+    return out
+
+
+def _terms(ability: AbilityFacts) -> Iterator[tuple[str, str]]:
+    """What it costs, asks for and gives, as a heading and a text each; an empty text is nothing to say."""
+    reach = "anywhere" if ability.range is None else n(ability.range)
+    cost = price(ability.minerals, ability.vespene, ability.supply)
+    yield "Users", ", ".join(ability.users)
+    yield "Target", ability.target.replace("_", " ") + (f", range {reach}" if ability.range != 0 else "")
+    yield "Target must be", ", ".join(ability.must)
+    yield "Target must not be", ", ".join(ability.must_not)
+    yield "Cost", cost if cost != "nothing" else ""
+    yield "Energy", n(ability.energy) if ability.energy else ""
+    yield "Health", n(ability.life) if ability.life else ""
+    yield "Ready again after", f"{n(ability.cooldown_s)} s" if ability.cooldown_s else ""
+    yield "Needs", listed((*ability.requires, *((f"a {ability.addon} of its own",) if ability.addon else ())))
+    yield "Makes", f"{ability.count} {ability.produces}" if ability.produces else ""
+    yield "Researches", ability.researches or ""
+    yield "Takes", f"{n(ability.time_s)} s" if ability.time_s else ""
+    yield "By itself", {"on": "yes, unless switched off", "off": "only if switched on", None: ""}[ability.autocast]
+    yield "Stands for", ", ".join(map(str, ability.special))
+    yield "A case of", str(ability.general or "")
+
+
+def _told(*sentences: str) -> list[str]:
+    return [INDENT + sentence for sentence in sentences if sentence]

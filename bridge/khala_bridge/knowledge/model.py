@@ -1,0 +1,231 @@
+"""What is known of unit types, abilities and upgrades: the shapes of the records, and nothing else.
+
+Facts of one version of the game, without upgrades, in seconds of the speed "faster" and in world units; names are
+PySC2's. Above: `khala_bridge.knowledge.load`, which makes the records out of the data files.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from pydantic import Field
+
+from khala_protocol.messages import Frozen
+
+Race: TypeAlias = Literal["protoss", "terran", "zerg", "neutral"]
+Target: TypeAlias = Literal["none", "point", "unit", "point_or_unit", "point_or_none"]
+
+
+class Weapon(Frozen):
+    """One weapon of a unit type."""
+
+    targets: Literal["ground", "air", "any"]
+    range: float
+    """World units between the edges of the two units."""
+    min_range: float = 0
+    """Nearer than this it does not fire."""
+    damage: float
+    """Of one hit, before armor."""
+    attacks: int = 1
+    """Hits per shot."""
+    period_s: float
+    """Seconds between two shots."""
+    bonus: dict[str, float] = Field(default_factory=dict)
+    """Damage that is added against an attribute."""
+    splash: float = 0
+    """Radius around the place of a hit in which others are hurt too; 0 for none."""
+
+    @property
+    def per_second(self) -> float:
+        """Damage per second against a target without armor and without the attribute of a bonus."""
+        return self.damage * self.attacks / self.period_s
+
+    def per_second_against(self, attribute: str) -> float:
+        """Damage per second against a target without armor and with this attribute."""
+        return (self.damage + self.bonus.get(attribute, 0)) * self.attacks / self.period_s
+
+
+class UnitType(Frozen):
+    """What is known of one type."""
+
+    name: str = ""
+    id: int
+    race: Race
+    about: str = ""
+    """What it is and does, in a sentence or two."""
+    uses: str = ""
+    """How to use it well."""
+    counters: tuple[str, ...] = ()
+    """Types that it beats, the clearest first."""
+    countered_by: tuple[str, ...] = ()
+    """Types that beat it; the other direction of `counters`."""
+    abilities: dict[str, str] = Field(default_factory=dict)
+    """What it can do besides moving, attacking and producing: a title and a sentence each."""
+    ability_ids: tuple[int, ...] = ()
+    """Every specific ability that it can be told to use, also to move, attack and produce."""
+    melee: bool = False
+    """Whether it occurs in melee games of the version; the others are left in the game's data."""
+    structure: bool = False
+    worker: bool = False
+    attributes: tuple[str, ...] = ()
+    flying: bool = False
+    planes: tuple[str, ...] = ()
+    """Where weapons find it: `ground`, `air`, both (Colossus), or nowhere."""
+    cloaked: bool = False
+    burrowed: bool = False
+    health: float = 0
+    shield: float = 0
+    energy: float = 0
+    """The most that it can have."""
+    energy_start: float = 0
+    armor: float = 0
+    speed: float = 0
+    """World units per second."""
+    sight: float = 0
+    detects: float = 0
+    """Radius in which it sees what is cloaked or burrowed; 0 for none."""
+    radius: float = 0
+    supply: float = 0
+    provides: float = 0
+    """Supply that it adds to the cap."""
+    minerals: float = 0
+    vespene: float = 0
+    """As the API counts: with what it was morphed from. What an order costs is told by its ability."""
+    cargo_size: int = 0
+    """Places that it takes in a transport; 0 if it can't be carried."""
+    cargo_space: int = 0
+    resource: str = ""
+    """What workers gather from it: `minerals` or `vespene`."""
+    producers: tuple[str, ...] = ()
+    """Types that make it or become it."""
+    made_by: tuple[int, ...] = ()
+    """Ids of the abilities by which they do."""
+    build_s: float = 0
+    """Seconds until it is finished, by the first of these ways."""
+    requires: tuple[str, ...] = ()
+    """Structures that have to stand; all of them. What may stand in for one is told by `stand_ins`."""
+    addon: str = ""
+    """What has to be attached to the producer: `TechLab`."""
+    allows: tuple[str, ...] = ()
+    """Types and upgrades that require it: what a structure opens."""
+    footprint: tuple[int, int] | None = None
+    """Width and height of the cells that it blocks."""
+    power_radius: float = 0
+    needs_power: bool = False
+    needs_creep: bool = False
+    makes_creep: bool = False
+    counts_as: tuple[str, ...] = ()
+    """Types that it stands in for where something requires them: a Hive for a Lair."""
+    weapons: tuple[Weapon, ...] = ()
+
+    @property
+    def value(self) -> float:
+        """Minerals and vespene that it costs."""
+        return self.minerals + self.vespene
+
+    def hits(self, other: UnitType) -> bool:
+        """Whether any of its weapons can be aimed at the other type."""
+        return any(weapon.targets == "any" or weapon.targets in other.planes for weapon in self.weapons)
+
+
+class AbilityFacts(Frozen):
+    """What is known of one ability.
+
+    A general one (`Effect_Stim`) stands for the special ones in `special`; it has the users of all of them, and those
+    of their facts in which all agree. What one type of unit pays is known by `ability_of`.
+    """
+
+    id: int
+    name: str
+    """As in PySC2's functions, without what it takes: `Effect_Blink_Stalker`."""
+    about: str = ""
+    """What it does, in a sentence with its numbers; empty for what no player of a melee game uses."""
+    does: str = ""
+    """The kind of thing that it does: `train`, `build`, `research`, `morph`, `cancel`, `blink`, …; `general` for a
+    general one, empty for what does nothing in this version."""
+    general: int | None = None
+    """The general ability that it is a case of."""
+    special: tuple[int, ...] = ()
+    melee: bool = False
+    """Whether a player can use it in a melee game of the version."""
+    users: tuple[str, ...] = ()
+    """Types that can be told to use it; () for every type."""
+    target: Target = "none"
+    range: float | None = 0
+    """World units from edge to edge; None where the whole map is in reach, 0 if it has no target or is at touch."""
+    energy: float = 0
+    life: float = 0
+    minerals: float = 0
+    vespene: float = 0
+    """What is charged, without what it is made of."""
+    supply: float = 0
+    """Supply that what it makes uses in all."""
+    cooldown_s: float = 0
+    charges: int = 0
+    requires: tuple[str, ...] = ()
+    """Structures and upgrades, all of them. What may stand in for a structure is told by `stand_ins`."""
+    addon: str = ""
+    """What has to be attached to the unit itself: `TechLab`."""
+    produces: str | None = None
+    """The unit type that it makes or that the unit becomes."""
+    count: int = 1
+    """How many of them."""
+    researches: str | None = None
+    time_s: float = 0
+    """Seconds until what it makes, becomes or researches is there."""
+    autocast: Literal["on", "off"] | None = None
+    """How it is set at first; None for what units never do by themselves."""
+    must: tuple[str, ...] = ()
+    """What a target has to be, all of it: `visible`, `structure`, `biological`, …"""
+    must_not: tuple[str, ...] = ()
+    """What a target may not be: `self`, `enemy`, `massive`, `structure`, …"""
+    figures: dict[str, float] = Field(default_factory=dict)
+    """Numbers of its effect: `damage`, `radius`, `duration_s`, …"""
+
+
+class UpgradeFacts(Frozen):
+    """What is known of one upgrade."""
+
+    name: str = ""
+    id: int
+    about: str = ""
+    race: Race | None = None
+    melee: bool = False
+    """Whether a player can research it in a melee game of the version."""
+    minerals: float = 0
+    vespene: float = 0
+    time_s: float = 0
+    at: tuple[str, ...] = ()
+    """Structures that research it."""
+    ability: int = 0
+    requires: tuple[str, ...] = ()
+    affects: tuple[str, ...] = ()
+    """Unit types that are better off with it."""
+    enables: tuple[int, ...] = ()
+    """Ids of the abilities that need it."""
+    changes: dict[str, dict[str, float]] = Field(default_factory=dict)
+    """By unit type, what is added: `speed`, `armor`, `health`, `range`, `damage`, `damage_against_light`, …;
+    `attack_speed` is a share of what it was."""
+
+
+class BuffFacts(Frozen):
+    """What is known of one buff: what lies on a unit for a time, and what it changes there."""
+
+    name: str = ""
+    """As observations call it; where they do not tell of it, as the game's data does."""
+    id: int = 0
+    """0 for one that clients are not told of."""
+    duration_s: float = 0
+    """0 for one without an end of its own."""
+    speed: float = 1
+    attack_rate: float = 1
+    work_rate: float = 1
+    """Factors of what its bearer has; the last one is of training, research and the like."""
+    stops_work: bool = False
+    armor: float = 0
+    damage_taken: float = 0
+    """What is added to each hit, of the kinds that it is about."""
+    absorbs: float = 0
+    """Damage that it takes in all."""
+    flags: tuple[str, ...] = ()
+    """What its bearer is meanwhile: `stunned`, `disarmed`, `rooted`, `invulnerable`, `cloak`, …"""

@@ -1,0 +1,48 @@
+"""Names of the numbers that the game speaks in: unit types, buffs, upgrades, orders, abilities, as PySC2 has them.
+
+Names only; what a unit can do is told by `khala_bridge.knowledge`. A number that PySC2 does not know (the game
+is newer than it) gets a name made of the number, never an error.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+
+from khala_bridge.compat import actions, buffs, units, upgrades
+
+_UNITS: dict[int, str] = {
+    int(member): member.name for race in (units.Neutral, units.Protoss, units.Terran, units.Zerg) for member in race
+}
+_COPIES = ("Colossus", "Stalker", "Zealot", "Marauder", "Marine", "Medivac", "Baneling", "Zergling", "Hydralisk")
+_UNITS |= dict(enumerate(_COPIES, start=1962))  # on SMAC's maps, in the simulator's numbers; PySC2's end there
+_BUFFS: dict[int, str] = {int(member): member.name for member in buffs.Buffs}
+_UPGRADES: dict[int, str] = {int(member): member.name for member in upgrades.Upgrades}
+_FORM = re.compile(r"_(pt|unit|quick|autocast)$")  # how a raw function takes its target
+
+
+def unit_name(unit_type: int) -> str:
+    """Name of a unit type without its race, `Stalker`."""
+    return _UNITS.get(unit_type) or f"Unit{unit_type}"
+
+
+def buff_name(buff: int) -> str:
+    """Name of a buff, `GravitonBeam`."""
+    return _BUFFS.get(buff) or f"Buff{buff}"
+
+
+def upgrade_name(upgrade: int) -> str:
+    """Name of an upgrade, `Blink`."""
+    return _UPGRADES.get(upgrade) or f"Upgrade{upgrade}"
+
+
+@functools.cache
+def order_name(ability: int) -> str:
+    """Name of an order, `Attack`, in its general form where there is one."""
+    function = actions.RAW_ABILITY_ID_TO_FUNC_ID.get(ability)
+    if function is None:
+        return f"Ability{ability}"
+    raw = actions.RAW_FUNCTIONS[function]
+    if raw.general_id:
+        return order_name(raw.general_id)
+    return _FORM.sub("", raw.name)

@@ -1,0 +1,198 @@
+"""Marks: the digits of a unit's tag beside it, so that what is seen can be named, put where they hide least.
+
+On large bodies they stand below the letters of the type, beside all others.
+
+    0x1_0014_0001    the mark is `014`
+
+A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before);
+the three digits before them tell units apart, four where two units on one picture would share three.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+
+from khala_bridge.observe.image import palette
+from khala_bridge.observe.image.lettering import written
+from khala_bridge.observe.image.palette import LIVERIES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_bridge.observe.image.lettering import Image, Stamp
+    from khala_bridge.observe.image.palette import Side
+
+_TAIL = 4
+"""Hexadecimal digits at the end of a tag that say nothing."""
+_CELL = 4
+"""Pixels of a cell of the plan of what is hidden."""
+_WORST = 0.5
+"""A mark of which more than this share would lie over other marks is left out."""
+_OVER_MARK, _OVER_BODY, _FAR = 4.0, 1.0, 0.15
+"""What it costs to lie over a mark or a body, as shares of the mark, and to be a ring further away."""
+_ROOMY_PX = 30
+"""Radius of a body that has room for its mark."""
+_RINGS_PX = (2, 13, 24)
+"""Free pixels between a body and its mark; from the second ring on a line leads to it."""
+
+
+class Marked(NamedTuple):
+    """A thing that wants a mark: what it is to say, in whose colours, and where the body is drawn, in pixels."""
+
+    text: str
+    side: Side
+    x: int
+    y: int
+    radius: int
+
+
+def marks_of(tags: Iterable[int]) -> dict[int, str]:
+    """The mark of each tag, three or four hexadecimal digits; different tags of one picture have different marks."""
+    digits = {tag: f"{tag:x}".zfill(_TAIL + 4)[:-_TAIL] for tag in tags}
+    shared = Counter(text[-3:] for text in digits.values())
+    return {tag: text[-3:] if shared[text[-3:]] == 1 else text[-4:] for tag, text in digits.items()}
+
+
+def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], height_px: int) -> list[Marked]:
+    """Draws marks beside what they are of, the first ones at the best places.
+
+    Args:
+        image: is drawn on.
+        marked: what gets a mark, most important first.
+        bodies: everything that should rather not be covered.
+        height_px: of the letters.
+
+    Returns:
+        Those for whose mark there was room.
+    """
+    height, width = image.shape[:2]
+    hidden, covered = _Plan(width, height), _Plan(width, height)
+    for one in bodies:
+        r = round(one.radius * 0.8)
+        covered.add(max(one.x - r, 0), max(one.y - r, 0), 2 * r, 2 * r)
+    spots = []
+    for one in marked:
+        stamp = written(one.text, height_px, LIVERIES[one.side].mark, palette.INK)
+        spot = _on_body(one, stamp, hidden) or _spot(one, stamp, hidden, covered)
+        if spot is not None:
+            hidden.add(spot.left, spot.top, *stamp.size)
+            spots.append((one, stamp, spot))
+    for one, _, spot in spots:
+        if spot.ring:
+            _lead(image, one, spot)
+    for _, stamp, spot in spots:
+        stamp.press(image, spot.left, spot.top)
+    return [one for one, _, _ in spots]
+
+
+class _Spot(NamedTuple):
+    left: int
+    top: int
+    ring: int
+    middle: tuple[int, int]
+
+
+class _Plan:
+    """Which cells of a picture are taken: one number with a bit a cell, so that a rectangle is looked up in no time."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self.stride = width // _CELL + 2
+        self.taken = 0
+
+    def at(self, left: int, top: int) -> int:
+        """Number of the cell of a pixel, which is how far the bits of a rectangle there are from the first one."""
+        return top // _CELL * self.stride + left // _CELL
+
+    def bits(self, width: int, height: int) -> tuple[int, int]:
+        """The bits of a rectangle in the first cell, and how many there are."""
+        return _rectangle(width // _CELL + 1, height // _CELL + 1, self.stride)
+
+    def add(self, left: int, top: int, width: int, height: int) -> None:
+        """Takes a rectangle that begins in the picture."""
+        self.taken |= self.bits(width, height)[0] << self.at(left, top)
+
+
+@functools.lru_cache(1024)
+def _rectangle(columns: int, rows: int, stride: int) -> tuple[int, int]:
+    line = (1 << columns) - 1
+    return sum(line << (row * stride) for row in range(rows)), columns * rows
+
+
+_WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
+"""Beside a body, right first: y downwards, so that bars above it stay free."""
+
+
+def _on_body(one: Marked, stamp: Stamp, hidden: _Plan) -> _Spot | None:
+    """Below the letters of a large body, if that is free."""
+    width, height = stamp.size
+    left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
+    is_inside = 0 <= left <= hidden.width - width and 0 <= top <= hidden.height - height
+    if one.radius < _ROOMY_PX or not is_inside or hidden.taken >> hidden.at(left, top) & hidden.bits(width, height)[0]:
+        return None
+    return _Spot(left, top, 0, (one.x, one.y))
+
+
+class _Try(NamedTuple):
+    """A place for a mark, from the middle of its body."""
+
+    left: int
+    top: int
+    ring: int
+    cost: float
+    """Of being there at all."""
+
+
+@functools.lru_cache(1024)
+def _tries(radius: int, width: int, height: int) -> tuple[_Try, ...]:
+    """Where a mark of this size may stand around a body of this radius, the handiest first."""
+    tries = []
+    for ring, gap in enumerate(_RINGS_PX):
+        beside, corner = radius + gap, round(0.72 * radius) + gap
+        for way, (right, down) in enumerate(_WAYS):
+            reach = corner if right and down else beside
+            x, y = right * (reach + width // 2), down * (reach + height // 2)
+            tries.append(_Try(x - width // 2, y - height // 2, ring, _FAR * ring + way / 100))
+    return tuple(tries)
+
+
+def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
+    """Where a mark hides least; None if every place is over other marks."""
+    width, height = stamp.size
+    bits, count = hidden.bits(width, height)
+    marks, bodies, stride = hidden.taken, covered.taken, hidden.stride
+    right_most, lowest = hidden.width - width, hidden.height - height
+    best, least = None, math.inf
+    for right, down, ring, cost in _tries(one.radius, width, height):
+        if cost >= least:
+            break  # all that follows is less handy than the best, whatever it hides
+        left, top = one.x + right, one.y + down
+        if not (0 <= left <= right_most and 0 <= top <= lowest):
+            continue
+        at = top // _CELL * stride + left // _CELL
+        over = marks >> at & bits
+        if over:
+            share = over.bit_count() / count
+            if share > _WORST:
+                continue
+            cost += _OVER_MARK * share  # noqa: PLW2901  # what it would cost here
+            if cost >= least:
+                continue
+        under = bodies >> at & bits
+        if under:
+            cost += _OVER_BODY * under.bit_count() / count  # noqa: PLW2901  # and this, too
+        if cost < least:
+            best, least = _Spot(left, top, ring, (left + width // 2, top + height // 2)), cost
+    return best
+
+
+def _lead(image: Image, one: Marked, spot: _Spot) -> None:
+    """A line from a body to its mark."""
+    colour = palette.mixed(LIVERIES[one.side].mark, palette.INK, 0.25)
+    cv2.line(image, (one.x, one.y), spot.middle, palette.INK, 2)
+    cv2.line(image, (one.x, one.y), spot.middle, colour, 1)

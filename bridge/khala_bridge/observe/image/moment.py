@@ -1,0 +1,217 @@
+"""What there is to be drawn at one moment: units, effects, power, creep and fog, taken from a snapshot once.
+
+Every picture of a step is drawn from the same `Moment`. Positions are those of the world; a picture puts them into its
+frame. It draws nothing, and knows no team.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from khala_bridge.compat import features
+from khala_bridge.knowledge import knowledge
+from khala_bridge.names import unit_name
+from khala_bridge.observe.image.codes import code_of
+from khala_bridge.observe.image.painting import Painting, Veil, upright
+from khala_bridge.state import Alliance
+from khala_bridge.state.ground import land_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from khala_bridge.frames import WorldPoint
+    from khala_bridge.observe.image.bodies import Shape
+    from khala_bridge.observe.image.palette import Side
+    from khala_bridge.state import Snapshot, Unit
+    from khala_bridge.state.ground import Land
+
+_SIDES: dict[Alliance, Side] = {
+    Alliance.OWN: "own",
+    Alliance.ALLY: "ally",
+    Alliance.ENEMY: "enemy",
+    Alliance.NEUTRAL: "neutral",
+}
+_EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
+_STRUCTURE_RADIUS = 1.0
+"""A type that nobody knows is taken for a structure if it is this large and does not fly."""
+_LEVELS: dict[Shape, int] = {
+    "field": 0, "stone": 1, "geyser": 1, "minerals": 1, "rich": 1, "structure": 2, "ground": 3, "air": 4
+}  # fmt: skip
+UNDRAWN = frozenset({"Larva", "KarakFemale", "CollapsiblePurifierTowerDiagonal"})
+"""Types without a body worth a place; larvae crawl under their hatchery in swarms."""
+
+
+class Subject(NamedTuple):
+    """One unit as it is drawn."""
+
+    tag: int
+    type_id: int
+    owner: int
+    x: float
+    y: float
+    radius: float
+    facing: float
+    name: str
+    code: str
+    side: Side
+    shape: Shape
+    ghost: bool
+    """Cloaked, burrowed, a hallucination, or remembered under the fog of war."""
+    built: float
+    health: float
+    """Health, shield and energy as shares of what is full, 0 to 1; negative where the unit has none."""
+    shield: float
+    energy: float
+    order: str
+    """Name of what it does; own units only."""
+    target: tuple[float, float] | None
+    """Where that leads, in the world."""
+
+    @property
+    def level(self) -> int:
+        """Its place in the order of drawing: what is flat first, flyers last."""
+        return _LEVELS[self.shape]
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """An effect on the ground, or a source of power."""
+
+    name: str
+    side: Side
+    radius: float
+    places: tuple[tuple[float, float], ...]
+
+
+class Moment:
+    """One snapshot for the eye."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        """Takes a snapshot; what is not asked for is not made."""
+        self.snapshot = snapshot
+
+    @cached_property
+    def painting(self) -> Painting:
+        """The map's ground."""
+        return Painting.of(self.snapshot.info)
+
+    @cached_property
+    def land(self) -> Land:
+        """What stands and lies on the ground."""
+        return land_of(self.snapshot)
+
+    @cached_property
+    def veil(self) -> Veil:
+        """Creep and fog."""
+        creep, sight = self.snapshot.creep.cells(), self.snapshot.visibility.cells()
+        return Veil(None if creep is None else upright(creep), None if sight is None else upright(sight))
+
+    @cached_property
+    def subjects(self) -> tuple[Subject, ...]:
+        """Every unit that is shown or remembered, in the order of drawing."""
+        units = self.snapshot.known
+        found = (_subject(unit, units) for unit in units.values())
+        drawn = [one for one in found if one.name not in UNDRAWN]
+        return tuple(sorted(drawn, key=lambda one: (one.level, -one.radius, one.tag)))
+
+    @cached_property
+    def places(self) -> NDArray[np.float64]:
+        """World positions and radii of the subjects, (n, 3)."""
+        return np.array([(one.x, one.y, one.radius) for one in self.subjects]).reshape(-1, 3)
+
+    def around(self, x: float, y: float, reach: float) -> list[Subject]:
+        """The subjects whose bodies come within `reach` of a point on both axes, in the order of drawing."""
+        off = np.abs(self.places[:, :2] - (x, y)).max(axis=1) - self.places[:, 2] if len(self.places) else np.empty(0)
+        return [self.subjects[index] for index in np.flatnonzero(off < reach).tolist()]
+
+    @cached_property
+    def effects(self) -> tuple[Patch, ...]:
+        """What lies on the ground: storms, biles, clouds."""
+        return tuple(
+            Patch(
+                _EFFECTS.get(effect.effect_id, f"Effect{effect.effect_id}"),
+                _SIDES[effect.alliance],
+                effect.radius or 0.5,
+                effect.places,
+            )
+            for effect in self.snapshot.effects
+        )
+
+    @cached_property
+    def power(self) -> tuple[Patch, ...]:
+        """The player's sources of power."""
+        return tuple(Patch("Power", "own", source.radius, (source.pos,)) for source in self.snapshot.power_sources)
+
+
+def _subject(unit: Unit, units: dict[int, Unit]) -> Subject:
+    side = _SIDES[unit.alliance]
+    name, code, shape = _kind(unit.unit_type, side, unit.is_flying, unit.radius >= _STRUCTURE_RADIUS)
+    order, target = _order(unit, units) if side == "own" else ("", None)
+    is_remembered = unit.is_remembered
+    return Subject(
+        tag=unit.tag,
+        type_id=unit.unit_type,
+        owner=unit.owner,
+        x=unit.pos.x,
+        y=unit.pos.y,
+        radius=unit.radius or 0.5,
+        facing=unit.facing,
+        name=name,
+        code=code,
+        side=side,
+        shape=shape,
+        ghost=is_remembered or unit.is_cloaked or unit.is_hallucination or unit.is_burrowed,
+        built=1.0 if is_remembered else unit.build_progress,
+        health=_share(unit.health, unit.health_max),
+        shield=_share(unit.shield, unit.shield_max),
+        energy=_share(unit.energy, unit.energy_max),
+        order=order,
+        target=target,
+    )
+
+
+@functools.lru_cache(4096)
+def _kind(unit_type: int, side: Side, is_flying: bool, is_large: bool) -> tuple[str, str, Shape]:  # a key
+    """Name, letters and shape of a type of unit."""
+    name = unit_name(unit_type)
+    shape: Shape = "ground"
+    known = knowledge().get(name)
+    if name == "ForceField":
+        shape = "field"
+    elif side == "neutral":
+        shape = _thing(name)
+    elif is_flying:
+        shape = "air"
+    elif known.structure if known else is_large:
+        shape = "structure"
+    return name, code_of(name) if shape in {"ground", "air", "structure"} else "", shape
+
+
+def _thing(name: str) -> Shape:
+    """The shape of what is nobody's."""
+    if "MineralField" in name:
+        return "rich" if "Rich" in name else "minerals"
+    return "geyser" if "Geyser" in name else "stone"
+
+
+def _share(value: float, full: float) -> float:
+    if not full:
+        return -1.0
+    return 1.0 if value >= full else value / full
+
+
+def _order(unit: Unit, units: dict[int, Unit]) -> tuple[str, WorldPoint | None]:
+    """What an own unit does, and where that leads; whom it fires at comes first."""
+    enemy = units.get(unit.engaged_target_tag)
+    if enemy is not None:
+        return "Attack", enemy.pos
+    if not unit.orders:
+        return "", None
+    order = unit.orders[0]
+    target = units.get(order.target_unit_tag)
+    return order.name, order.target_world_space_pos if target is None else target.pos

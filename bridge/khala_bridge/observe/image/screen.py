@@ -1,0 +1,188 @@
+"""The screen of a team: 24 by 24 world units around its camera, from above.
+
+It is drawn from what the raw interface tells, so that each team has a screen of its own, wherever the game's camera is.
+`draw` is the whole of it; what stands in a picture's title, `Legend` says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_bridge.frames import CAMERA_WIDTH
+from khala_bridge.observe.image import palette
+from khala_bridge.observe.image.bodies import LETTERS_FROM_PX, Look, body, direction_of
+from khala_bridge.observe.image.canvas import SMALL_PX, Canvas, inner_px
+from khala_bridge.observe.image.effects import draw_orders, draw_patches
+from khala_bridge.observe.image.marks import Marked, marks_of, place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from khala_bridge.frames import Camera
+    from khala_bridge.observe.image.lettering import Image
+    from khala_bridge.observe.image.moment import Moment, Subject
+    from khala_bridge.observe.image.palette import Colour, Side
+
+_BAR_PX = 3
+RANK: dict[Side, int] = {"team": 0, "enemy": 1, "own": 2, "ally": 3, "neutral": 4}
+"""Whose marks get the best places."""
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What there is to be said of a picture in words."""
+
+    sides: tuple[Side, ...] = ()
+    """Whose units are on it."""
+    codes: dict[str, str] = field(default_factory=dict)
+    """Letters on bodies → the types that they stand for."""
+    example: tuple[str, int] | None = None
+    """A mark, and the tag that it is of."""
+    unmarked: int = 0
+    """Units for whose mark there was no room."""
+    rendered: bool = False
+    """Whether the game drew it, in colours of its own; what was added has ours."""
+
+
+class _Drawn(NamedTuple):
+    """A subject, its side as this team sees it, and where it is in pixels."""
+
+    subject: Subject
+    side: Side
+    x: int
+    y: int
+    radius: int
+
+
+def draw(
+    moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, marks: bool = True, grid: bool = True
+) -> tuple[Image, Legend]:
+    """The screen of a team.
+
+    Args:
+        moment: what there is.
+        camera: the team's.
+        team: tags of its units.
+        size_px: of the picture on both axes, margins included.
+        marks: whether units carry the digits of their tags, and the letters of their types.
+        grid: whether grid lines are drawn.
+    """
+    ground = moment.painting.seen(camera, inner_px(size_px, camera.size), moment.veil)
+    canvas = Canvas.on(ground, size_px, camera.size)
+    if grid:
+        canvas.rule()
+    image, scale, place_of = canvas.inner, canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
+    draw_patches(image, moment.power, place_of, scale, names=False)
+    seen = _seen(canvas, moment, camera, team)
+    draw_orders(image, (one.subject for one in seen if one.side == "team"), place_of)
+    for one in seen:
+        stamp = body(_look(one, lettered=marks))
+        stamp.press(image, one.x - stamp.size[0] // 2, one.y - stamp.size[1] // 2)
+    draw_patches(image, moment.effects, place_of, scale, names=True)
+    for one in seen:
+        _bars(image, one)
+    return canvas.image, _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=marks)
+
+
+def draw_over(
+    pixels: Image,
+    moment: Moment,
+    camera: Camera,
+    team: frozenset[int],
+    size_px: int,
+    *,
+    marks: bool = True,
+    grid: bool = True,
+) -> tuple[Image, Legend]:
+    """The same from pixels of the game, on which units are drawn already: axes, grid and marks are added."""
+    canvas = Canvas.on(pixels, size_px, camera.size)
+    if grid:
+        canvas.rule()
+    seen = _seen(canvas, moment, camera, team)
+    legend = _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=False)
+    return canvas.image, replace(legend, sides=legend.sides if marks else (), rendered=True)
+
+
+def _placing(canvas: Canvas, camera: Camera) -> Callable[[float, float], tuple[int, int]]:
+    def place_of(x: float, y: float) -> tuple[int, int]:
+        return canvas.pixel(*camera.screen(x, y))
+
+    return place_of
+
+
+def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) -> list[_Drawn]:
+    """What is on the screen, in the order of drawing; a team's own lie on top of their like."""
+    scale, place_of = canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
+    seen = [
+        _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
+        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
+    ]
+    return sorted(seen, key=lambda one: (one.subject.level, one.side == "team"))
+
+
+def _look(one: _Drawn, *, lettered: bool) -> Look:
+    unit = one.subject
+    direction = direction_of(unit.facing, unit.shape)
+    return Look(unit.shape, one.side, one.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1)
+
+
+def _bars(image: Image, one: _Drawn) -> None:
+    """Construction, health and shield above a unit that is hurt, and the energy of the team's own."""
+    unit = one.subject
+    if one.side == "neutral" or unit.health < 0:
+        return
+    rows: list[tuple[float, Colour]] = []
+    if unit.built < 1:
+        rows.append((unit.built, palette.PROGRESS))
+    if unit.health < 1 or 0 <= unit.shield < 1:
+        rows += [(unit.shield, palette.SHIELD)] if unit.shield >= 0 else []
+        rows.append((unit.health, palette.health_colour(unit.health)))
+    if unit.energy >= 0 and one.side == "team":
+        rows.append((unit.energy, palette.ENERGY))
+    width = max(2 * one.radius, 12)
+    left, top = one.x - width // 2, one.y - one.radius - 2 - _BAR_PX * len(rows)
+    if rows:
+        _fill(image, left - 1, top - 1, width + 2, _BAR_PX * len(rows) + 1, palette.INK)
+    for number, (share, colour) in enumerate(rows):
+        _fill(image, left, top + number * _BAR_PX, round(width * share), _BAR_PX - 1, colour)
+
+
+def _fill(image: Image, left: int, top: int, width: int, height: int, colour: Colour) -> None:
+    """A rectangle; what is outside of the image is left away."""
+    image[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)] = colour
+
+
+class _Marks(NamedTuple):
+    """Which marks a picture got."""
+
+    example: tuple[str, int] | None = None
+    left_out: int = 0
+
+
+def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
+    """Draws the marks."""
+    image = canvas.inner
+    size = image.shape[0]
+    inside = [one for one in seen if 0 <= one.x < size and 0 <= one.y < size]
+    wanting = [one for one in inside if one.side != "neutral" and one.subject.shape != "field"]
+    wanting.sort(key=lambda one: (RANK[one.side], abs(2 * one.x - size) + abs(2 * one.y - size), one.subject.tag))
+    texts = marks_of(one.subject.tag for one in wanting)
+    tags = {text: tag for tag, text in texts.items()}
+    placed = place(
+        image,
+        [Marked(texts[one.subject.tag], one.side, one.x, one.y, one.radius) for one in wanting],
+        [Marked("", one.side, one.x, one.y, one.radius) for one in inside],
+        6 if canvas.image.shape[0] < SMALL_PX else 8,
+    )
+    example = (placed[0].text, tags[placed[0].text]) if placed else None
+    return _Marks(example, len(wanting) - len(placed))
+
+
+def _legend(seen: Sequence[_Drawn], marks: _Marks, *, lettered: bool) -> Legend:
+    """What the picture shows."""
+    sides = tuple(sorted({one.side for one in seen}, key=RANK.__getitem__))
+    readable = (one.subject for one in seen if lettered and one.subject.code and one.radius >= LETTERS_FROM_PX)
+    codes = {subject.code: subject.name for subject in readable}
+    ordered = dict(sorted(codes.items(), key=lambda item: item[1]))
+    return Legend(sides, ordered, marks.example, marks.left_out)

@@ -1,0 +1,124 @@
+"""Things on the map whose tags an action takes: power fields, free places for a base, free geysers, own structures.
+
+Functions of a scene. Where a base could stand is known by `khala_bridge.state.ground`; here a place gets the tag that an agent
+can name it by, which is that of the resource nearest to its middle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from khala_bridge.observe.body import rounded
+from khala_bridge.observe.chronicle import PASSING, is_structure
+from khala_bridge.observe.scene import on_screen, screen_of
+from khala_bridge.state.ground import land_of
+from khala_protocol.messages import Landmark
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Literal, TypeAlias
+
+    from khala_bridge.frames import Camera, WorldPoint
+    from khala_bridge.observe.body import Body
+    from khala_bridge.observe.scene import Scene
+    from khala_bridge.state.ground import Land
+    from khala_protocol.messages import OrderView
+
+    What: TypeAlias = Literal["base place", "geyser", "power field", "structure"]
+
+MAX_PLACES = 5
+"""Free places for a base that are told, the nearest ones."""
+BASE_TAKEN = 6.0
+"""World units from the middle of a base's place within which a town hall takes it."""
+POWERS = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing"})
+"""What structures and units can be warped in at; a Nexus or a Gateway only makes it faster."""
+GAS_OF_BASE = 10.0
+"""World units from a town hall within which a geyser is its own; as workers are counted."""
+ON_TOP = 1.0
+"""World units between the middles of a geyser and of the structure on it."""
+
+
+def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+    """What one can warp in at and build by, in the order of tags; with its place on the screen of a camera."""
+    sources = scene.snapshot.power_sources
+    radius = {source.tag: source.radius for source in sources}
+    for field in scene.power:
+        body = scene.bodies.get(field.tag)
+        if body is not None and body.name in POWERS:
+            states = (("warps in fast", field.fast), ("no room for a unit", not field.room))
+            states_now = [words for words, is_so in states if is_so]
+            yield _landmark("power field", body, camera, ", ".join([f"radius {radius[field.tag]:g}", *states_now]))
+
+
+def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+    """Free places for a base, the nearest to the own bases first, then the geysers of own bases that nobody uses."""
+    land = land_of(scene.snapshot)
+    halls = [unit.pos for unit in land.halls]
+    own = [unit.pos for unit in land.own_halls]
+    free = [base.place for base in land.bases if _nearest(base.place, halls) > BASE_TAKEN]
+    fields = [body for body in scene.resources if "Mineral" in body.name]
+    for place in sorted(free, key=lambda place: (_nearest(place, own), place))[:MAX_PLACES]:
+        yield from _base(scene, place, fields, own)
+    yield from _geysers(scene, camera, land)
+
+
+def _base(
+    scene: Scene, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
+) -> Iterator[Landmark]:
+    nearest = min(fields, key=lambda body: (math.dist((body.x, body.y), place), body.tag), default=None)
+    if nearest is not None:
+        far = _nearest(place, own)
+        about = f"{far:.0f} from your nearest base" if math.isfinite(far) else ""
+        middle = rounded(scene.world.minimap(*place), scene.world.minimap_size)
+        yield _landmark("base place", nearest, None, about).but(minimap=middle)
+
+
+def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landmark]:
+    built = [(b.x, b.y) for b in scene.bodies.values() if b.name.removesuffix("Rich") in GAS_STRUCTURES]
+    for body in scene.resources:
+        if "Geyser" not in body.name or _nearest((body.x, body.y), built) < ON_TOP:
+            continue
+        for hall in land.own_halls:
+            if math.dist((body.x, body.y), hall.pos) <= GAS_OF_BASE:
+                yield _landmark("geyser", body, camera, f"by your {scene.bodies[hall.tag].name} {hex(hall.tag)}")
+                break
+
+
+GAS_STRUCTURES = frozenset({"Assimilator", "Extractor", "Refinery"})
+
+
+def structures(scene: Scene) -> Iterator[Landmark]:
+    """The own structures with what they do, by type and tag."""
+    own = [b for b in scene.bodies.values() if b.is_own and is_structure(b.name) and b.name not in PASSING]
+    for body in sorted(own, key=lambda body: (body.name, body.tag)):
+        yield _landmark("structure", body, None, _busy(body))
+
+
+def _queue(orders: Sequence[OrderView]) -> str:
+    """What a structure makes, and what waits behind it by name."""
+    first, *waiting = orders
+    begun = f"{first.name} {100 * first.progress:.0f}%" if first.progress else first.name
+    return " then ".join([begun, *(f"{count} {name}" for name, count in Counter(o.name for o in waiting).items())])
+
+
+def _busy(body: Body) -> str:
+    view = body.view
+    if view.build_progress < 1:
+        return f"{100 * view.build_progress:.0f}% built"
+    parts = [_queue(view.orders)] if view.orders else []
+    if details := view.details:
+        parts += ["no power"] if details.unpowered else []
+        parts += [f"{details.harvesters[0]} of {details.harvesters[1]} workers"] if details.harvesters else []
+    parts += [f"{view.energy:.0f} energy"] if view.energy_max else []
+    return ", ".join(parts)
+
+
+def _landmark(what: What, body: Body, camera: Camera | None, about: str) -> Landmark:
+    screen = screen_of(camera, body) if camera is not None and on_screen(camera, body) else None
+    return Landmark(what=what, tag=body.view.tag, type=body.name, minimap=body.view.minimap, screen=screen, about=about)
+
+
+def _nearest(place: tuple[float, float], others: Sequence[tuple[float, float]]) -> float:
+    return min((math.dist(place, other) for other in others), default=math.inf)

@@ -1,0 +1,228 @@
+"""One snapshot while views are made of it: what stands on which team's screen.
+
+A team sees what its camera shows: a square of 24 world units around its head unit. The camera is virtual, it needs
+no move in the game and does not stop at the border of the map. The team's own units are listed wherever they are,
+with a position outside of the frame if the camera does not reach them; everything else only within it. Neutral units
+(resources, rocks) and larvae are left out; builders are shown resources apart. A team without units of its own, which
+orders those of the whole side, has no camera and sees nothing.
+
+What all teams see alike is made once per scene, and who is on a screen is found with arrays, since a dozen teams look
+at a hundred units in each step. Views of the whole side are made by `khala_bridge.observe.side`, words by
+`khala_bridge.observe.text`; `khala_bridge.observe.observer` is above.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_bridge.auto.warp import fields
+from khala_bridge.frames import CAMERA_WIDTH, Camera
+from khala_bridge.observe.body import body, rounded
+from khala_bridge.observe.events import Events, Witnessed
+from khala_bridge.observe.observation import TeamObservation
+from khala_bridge.observe.offers import Possible
+from khala_bridge.state import Alliance
+from khala_bridge.state.ground import land_of
+from khala_protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
+    from khala_bridge.auto.warp import PowerField
+    from khala_bridge.observe.body import Body
+    from khala_bridge.observe.offers import Choice
+    from khala_bridge.state import Snapshot
+    from khala_bridge.state.teams import Team
+    from khala_bridge.task.config import AgentConfig
+    from khala_protocol.messages import Alliance as Whose
+    from khala_protocol.messages import Frames, Point, UnitView
+
+    Floats: TypeAlias = NDArray[np.float64]
+
+UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
+_HALF = CAMERA_WIDTH / 2
+_NO_DETAILS = UnitDetails()
+
+
+class Scene:
+    """A snapshot, and what every team sees alike."""
+
+    def __init__(self, snapshot: Snapshot, frames: Frames, before: Scene | None = None) -> None:
+        """Takes a snapshot, the frames that its views are given in, and the scene before, which it does not keep."""
+        self.snapshot = snapshot
+        self.world = snapshot.info.frame(frames)
+        self._screen_size = frames.screen
+        units = [unit for unit in snapshot.units.values() if not unit.is_neutral]
+        self.bodies: dict[int, Body] = {unit.tag: body(unit, self.world) for unit in units}
+        """Every unit in sight but the neutral ones, in ascending order of tags."""
+        self.fallen = {tag: before.bodies[tag] for tag in snapshot.dead if before and tag in before.bodies}
+        """Those who died since the scene before, as they were in it."""
+        views = {b.view.tag: b.view for b in self.bodies.values()}
+        self.totals = {tag: view.health + view.shield for tag, view in views.items()}
+        """Health and shield by tag."""
+        self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
+        self.possible = Possible(snapshot, self.bodies, snapshot.upgrades)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Puts the bodies in order as arrays: one row a body, in ascending order of tags."""
+        order = self._order = tuple(self.bodies.values())
+        self._index = {b.tag: index for index, b in enumerate(order)}
+        self._tags = [b.view.tag for b in order]
+        self._places = np.array([(b.x, b.y) for b in order], dtype=float).reshape(-1, 2)  # world
+        ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
+        self._rank = np.array([ranks[b.name] for b in order], dtype=int)  # of the type, by name
+        foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
+        self._foe = np.array(foe, dtype=bool)
+        self._friend = np.array([b.alliance is not Alliance.ENEMY for b in order], dtype=bool)
+
+    @functools.cached_property
+    def resources(self) -> tuple[Body, ...]:
+        """Minerals and geysers as they are now or were seen last, in ascending order of tags."""
+        neutral = (unit for unit in self.snapshot.known.values() if unit.is_neutral)
+        return tuple(body(unit, self.world) for unit in neutral if unit.facts is not None and unit.facts.resource)
+
+    @functools.cached_property
+    def power(self) -> tuple[PowerField, ...]:
+        """The power fields of the player, in ascending order of tags."""
+        return fields(self.snapshot)
+
+    @functools.cached_property
+    def planned(self) -> dict[str, int]:
+        """Structures that workers are on their way to build, by type."""
+        if not any(order.name.startswith("Build_") for b in self._order if b.is_own for order in b.view.orders):
+            return {}
+        return dict(sorted(Counter(structure for structure, _ in land_of(self.snapshot).plans).items()))
+
+    @functools.cached_property
+    def view(self) -> View:
+        """What every agent is told alike."""
+        player = self.snapshot.player
+        return View(
+            time_s=round(self.snapshot.game_loop / LOOPS_PER_S, 3),
+            resources=Resources(
+                minerals=player.minerals,
+                vespene=player.vespene,
+                supply_used=player.food_used,
+                supply_cap=player.food_cap,
+                promised=self.possible.promised,
+            ),
+            upgrades=self.snapshot.upgrades,
+        )
+
+    def team(
+        self, agent: AgentConfig, team: Team, before: TeamObservation | None, *, resources: bool = False
+    ) -> TeamObservation:
+        """What one team sees.
+
+        Args:
+            agent: whose team it is.
+            team: its units; they are in the snapshot.
+            before: what the team saw before, for events; None if it saw nothing.
+            resources: whether it is told of minerals and geysers.
+        """
+        if not team.tags:
+            names = team.config.actions
+            return TeamObservation(team, None, _team_view(team.name, None, self.possible.for_side(names)))
+        members = np.array([self._index[tag] for tag in team.tags])
+        head = self._order[members[0]]
+        camera = Camera(head.x, head.y, self._screen_size)
+        looked = _Look(camera, self._places, members)
+        friends = np.flatnonzero(looked.others & self._friend)
+        foes = np.flatnonzero(looked.others & self._foe)
+        friends = friends[np.argsort(self._rank[friends], kind="stable")]
+        foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
+        bodies = [self._order[index] for index in members.tolist()]
+        view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies)).but(
+            units=self._skilled(agent, bodies, self._units(looked, members, "own")),
+            allies=self._units(looked, friends, "ally"),
+            enemies=self._units(looked, foes, "enemy"),
+            resources=self._resources_on(camera) if resources else (),
+            bounds=_edges(camera.bounds(self.world)),
+        )
+        tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
+        events = self.events.of_team(before.view, before.tags, tags) if before else ()
+        return TeamObservation(team, camera, view.but(events=events), tags)
+
+    def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
+        return tuple([self._tags[row] for row in rows.tolist()])
+
+    def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Whose) -> tuple[UnitView, ...]:
+        points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)
+        distances = looked.distance[rows].tolist() if alliance == "enemy" else [None] * len(rows)
+        units = []
+        for row, at, distance in zip(rows.tolist(), points, distances, strict=True):
+            view = self._order[row].view
+            values = view.__dict__.copy()
+            values["alliance"], values["screen"], values["distance"] = alliance, at, distance
+            units.append(view.having(values))
+        return tuple(units)
+
+    def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
+        """The units of a team with the skills that they could use: what one of them could, the others could not."""
+        skills = [self.possible.skills(agent, body) for body in bodies]
+        ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
+        if not ready_somewhere:
+            return views
+        return tuple([_with_skills(view, ready, ready_somewhere) for view, ready in zip(views, skills, strict=True)])
+
+    def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
+        """The resources on a camera's screen, by type and tag."""
+        seen = [b for b in self.resources if on_screen(camera, b)]
+        return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
+
+
+class _Look:
+    """Where all bodies are for one team's camera; one row a body in each array."""
+
+    def __init__(self, camera: Camera, places: Floats, members: NDArray[np.intp]) -> None:
+        """Takes a camera, (n, 2) places in the world, and the rows of those who are of the team."""
+        self.others: NDArray[np.bool_] = camera.sees(places)
+        """Who is on the screen and not of the team."""
+        self.others[members] = False
+        right, down = places[:, 0] - camera.x + _HALF, camera.y + _HALF - places[:, 1]
+        scale = camera.size / CAMERA_WIDTH
+        self.screen_x = _tenths(right * scale, camera.size)
+        self.screen_y = _tenths(down * scale, camera.size)
+        apart = places - places[members].sum(axis=0) / len(members)
+        self.distance = np.round(np.hypot(apart[:, 0], apart[:, 1]), 1)
+        """From the middle of the team, in world units."""
+
+
+def _tenths(values: Floats, size: float) -> Floats:
+    """To a tenth of a cell; a position within the frame stays within it, whose end is open."""
+    near = np.round(values, 1) + 0.0  # no negative zero
+    near[(values < size) & (near >= size)] = round(size - 0.1, 1)
+    return near
+
+
+def _with_skills(view: UnitView, ready: tuple[str, ...], ready_somewhere: Iterable[str]) -> UnitView:
+    unready = tuple([name for name in ready_somewhere if name not in ready])
+    return view.but(details=(view.details or _NO_DETAILS).but(ready=ready, unready=unready))
+
+
+def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:
+    return TeamView(name=name, minimap=minimap, actions=choice.actions, offers=choice.offers, barred=choice.barred)
+
+
+def on_screen(camera: Camera, seen: Body) -> bool:
+    """Whether a camera shows a body."""
+    right, down = seen.x - camera.x, camera.y - seen.y
+    return -_HALF <= right < _HALF and -_HALF <= down < _HALF
+
+
+def screen_of(camera: Camera, seen: Body) -> Point:
+    """Where a camera shows a body, to a tenth of a cell."""
+    return rounded(camera.screen(seen.x, seen.y), camera.size)
+
+
+def _edges(bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    x0, y0, x1, y1 = bounds
+    return round(x0, 1), round(y0, 1), round(x1, 1), round(y1, 1)

@@ -1,0 +1,63 @@
+"""An observation in words, as a model reads it: one function per section.
+
+A page is a heading at the left margin and indented lines below it; a section with nothing to say is left out. It says
+what a view says, adds what is known of the types in it, and repeats what became of the last reply. It decides nothing
+and reads no game: a page is a pure function of a sight, its task and what the agent said and heard.
+
+    page       how sections are registered, written and made shorter      tokens, words    the small things
+    general, units, known, actions, reply, whole_side                     the sections, by what they speak of
+
+`SECTIONS_OF` says which sections an agent's page has by its kind; a task may say it by name (`AgentConfig.sections`),
+and a program may register sections of its own.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_bridge.observe.text import actions, general, known, reply, units, whole_side
+from khala_bridge.observe.text.page import SECTIONS, Feedback, Page, Section, find_sections, render, section, shorter
+from khala_bridge.observe.text.tokens import tokens
+
+if TYPE_CHECKING:
+    from khala_bridge.task.config import AgentConfig, AgentKind
+
+__all__ = [
+    "SECTIONS",
+    "SECTIONS_OF",
+    "Feedback",
+    "Page",
+    "Section",
+    "actions",
+    "find_sections",
+    "general",
+    "known",
+    "render",
+    "reply",
+    "section",
+    "sections_of",
+    "shorter",
+    "tokens",
+    "units",
+    "whole_side",
+]
+
+_ACTING = ("valid_actions", "impossible", "arguments", "last_actions", "rejections")
+_ENDING = ("task", "messages", "communication", "answer")
+
+SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
+    "combat_group": ("game", "teams", "unit_knowledge", *_ACTING, *_ENDING),
+    "commander": ("game", "counts", "alerts", "events", "others", "teams", "unit_knowledge", *_ACTING, *_ENDING),
+    "developer": ("game", "counts", "events", "structures", "warp", "teams", *_ACTING, *_ENDING),
+    "builder": ("game", "teams", "counts", "events", "places", *_ACTING, *_ENDING),
+}
+"""Names of the sections of a page by the kind of the agent, in their order."""
+
+
+def sections_of(agent: AgentConfig) -> tuple[Section, ...]:
+    """The sections of an agent's page.
+
+    Raises:
+        ConfigError: its configuration names one that does not exist.
+    """
+    return find_sections(agent.sections or SECTIONS_OF[agent.kind])

@@ -1,0 +1,125 @@
+"""Sections about what can be done: valid actions with their costs, those that are not possible now, arguments."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from khala_bridge.frames import CAMERA_WIDTH
+from khala_bridge.observe.text.page import section, shorter
+from khala_bridge.observe.text.words import INDENT, INDENT2, n
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.observe.text.page import Page
+    from khala_protocol.messages import Offer, TeamView
+
+
+@section("valid_actions")
+def valid_actions(page: Page) -> Iterator[str]:
+    """What each team may be told now, what it does and what it costs."""
+    yield from _calls(page)
+    offers = _offers(page)
+    described = {action.name: action.description for team in page.teams for action in team.actions}
+    if described:
+        yield f"{INDENT}What they do:"
+    for name, about in described.items():
+        yield f"{INDENT2}{name}: {about}" + (f" {_price(offers[name])}" if name in offers else "")
+
+
+@shorter("valid_actions", rank=40, says="what the actions do")
+def valid_actions_in_short(page: Page) -> Iterator[str]:
+    """Only calls and costs."""
+    yield from _calls(page)
+    offers = _offers(page)
+    if offers:
+        yield f"{INDENT}What they cost:"
+    yield from (f"{INDENT2}{name}: {_price(offer)}" for name, offer in offers.items())
+
+
+def _calls(page: Page) -> Iterator[str]:
+    if page.teams:
+        yield "Valid actions"
+    for team in page.teams:
+        calls = ", ".join([f"<{action.name}({', '.join(action.args)})>" for action in team.actions])
+        yield f"{INDENT}Team {team.name}: {calls or 'none'}"
+
+
+def _offers(page: Page) -> dict[str, Offer]:
+    return {offer.action: offer for team in page.teams for offer in team.offers}
+
+
+def _price(offer: Offer) -> str:
+    parts = [f"{offer.minerals} minerals"] if offer.minerals else []
+    parts += [f"{offer.vespene} vespene"] if offer.vespene else []
+    parts += [f"{n(offer.supply)} supply"] if offer.supply else []
+    more = [f"enough for {offer.times}"] if offer.times > 1 else []
+    more += [f"takes {offer.footprint[0]} x {offer.footprint[1]} cells of ground"] if offer.footprint else []
+    more += ["you have none yet"] if offer.first else []
+    return f"Costs {'; '.join((', '.join(parts), *more))}."
+
+
+@section("impossible")
+def impossible(page: Page) -> Iterator[str]:
+    """What each team may be told, but not now, by the reason."""
+    teams = [team for team in page.teams if team.barred]
+    if teams:
+        yield "Not possible now"
+    for team in teams:
+        yield f"{INDENT}Team {team.name}"
+        yield from (f"{INDENT2}{reason}: {', '.join(names)}" for reason, names in _reasons(team).items())
+
+
+@shorter("impossible", rank=80, says="what is not possible now, and why")
+def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
+    """Nothing."""
+    yield from ()
+
+
+_TOO_FEW = re.compile(r"(\d+) (\w+) too few")
+
+
+def _reasons(team: TeamView) -> dict[str, list[str]]:
+    """Actions by what stands in their way; those that are only too dear stand together, with what is missing."""
+    reasons: dict[str, list[str]] = {}
+    for barred in team.barred:
+        if too_few := _TOO_FEW.fullmatch(barred.reason):
+            reasons.setdefault(f"too few {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
+        else:
+            reasons.setdefault(barred.reason, []).append(barred.action)
+    return reasons
+
+
+@section("arguments")
+def arguments(page: Page) -> Iterator[str]:
+    """How the arguments of the valid actions are written."""
+    kinds = {kind for team in page.teams for action in team.actions for kind in action.args}
+    if not kinds:
+        return
+    screen, minimap = n(page.task.frames.screen), n(page.task.frames.minimap)
+    yield "Arguments"
+    if "tag" in kinds:
+        yield f"{INDENT}tag: the tag of a unit that stands above{_example(page)}"
+    if "screen" in kinds:
+        step = n(CAMERA_WIDTH / page.task.frames.screen)
+        yield (
+            f"{INDENT}screen: [x, y] on the team's own screen, from 0 to {screen}; x grows to the right, y grows "
+            f"downwards, the team's first unit is in the middle, one step is {step} of distance"
+        )
+    if "minimap" in kinds:
+        yield (
+            f"{INDENT}minimap: [x, y] on the map of all, from 0 to {minimap}; x grows to the right, y grows downwards"
+        )
+
+
+@shorter("arguments", rank=50, says="how arguments are written")
+def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
+    """Nothing: a briefing explains them as well."""
+    yield from ()
+
+
+def _example(page: Page) -> str:
+    units = (unit.tag for team in page.teams for unit in (*team.enemies, *team.units))
+    tag = next(units, None) or next((landmark.tag for landmark in page.view.landmarks), None)
+    return f", for example {tag}" if tag else ""

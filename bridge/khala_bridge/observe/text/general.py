@@ -1,0 +1,74 @@
+"""Sections that every agent has: the game, the task, and how to answer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_bridge.observe.text.page import section
+from khala_bridge.observe.text.words import INDENT, n, one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.observe.text.page import Page
+    from khala_protocol.messages import Resources
+
+
+@section("game")
+def game(page: Page) -> Iterator[str]:
+    """Time, and resources for those who spend them."""
+    view, used = page.view, page.view.resources
+    yield "Game"
+    minutes, seconds = divmod(int(view.time_s), 60)
+    yield f"{INDENT}Time: {minutes}:{seconds:02}"
+    if used.minerals or used.vespene or page.sight.agent.kind != "combat_group":
+        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promised(used)}"
+        yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
+    if view.upgrades:
+        yield f"{INDENT}Upgrades: {', '.join(view.upgrades)}"
+    if page.sight.idle_teams:
+        yield f"{INDENT}Teams without units: {', '.join(page.sight.idle_teams)}"
+
+
+def _promised(resources: Resources) -> str:
+    amounts = zip(resources.promised, ("minerals", "vespene"), strict=True)
+    parts = [f"{amount} {what}" for amount, what in amounts if amount]
+    return f" ({' and '.join(parts)} of it for what workers are on their way to build)" if parts else ""
+
+
+@section("task")
+def task(page: Page) -> Iterator[str]:
+    """What is to be done, by all, by this agent, and by its teams at this time."""
+    yield "Task"
+    yield f"{INDENT}{one_line(page.task.task)}"
+    if page.sight.agent.task:
+        yield f"{INDENT}{one_line(page.sight.agent.task)}"
+    always = {team.team.config.name: team.team.config.task for team in page.sight.teams}
+    yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
+    yield from (f"{INDENT}Team {team.name}: {one_line(team.task)}" for team in page.teams if team.task)
+
+
+@section("answer")
+def answer(page: Page) -> Iterator[str]:
+    """The limit, one piece of advice, and the signal to begin."""
+    parts = ['"Analysis:"']
+    yield "Answer"
+    if page.teams:
+        limit = page.task.max_actions_of(page.sight.agent)
+        fights = page.sight.agent.kind == "combat_group"
+        advice = "; use abilities before moving or attacking." if fights else "."
+        yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team{advice}"
+        yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'
+        parts.append('"Actions:"')
+    else:
+        yield f"{INDENT}You have no team to order now" + (
+            ": write messages to those who have." if _talks(page) else "."
+        )
+    if _talks(page):
+        parts.append('"Communications:"')
+    words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
+    yield f"{INDENT}Now answer in the part{'s' if len(parts) > 1 else ''} {words}."
+
+
+def _talks(page: Page) -> bool:
+    return bool(page.correspondents or page.channels)

@@ -1,0 +1,86 @@
+"""Section about what is known of the types of units in sight; the words are those of `khala_bridge.knowledge`."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_bridge.knowledge import advice, knowledge, short
+from khala_bridge.observe.chronicle import is_structure
+from khala_bridge.observe.text.page import section, shorter
+from khala_bridge.observe.text.words import INDENT, INDENT2
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala_bridge.observe.text.page import Page
+
+
+@section("unit_knowledge")
+def unit_knowledge(page: Page) -> Iterable[str]:
+    """What is known of every type in sight; uses and abilities only of those under control."""
+    return _written(_types(page))
+
+
+@functools.lru_cache(1024)
+def _written(types: _Types) -> tuple[str, ...]:
+    """The lines about some types, which are seldom others than at the step before."""
+    friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
+    lines = ["Unit knowledge"] if any(types) else []
+    for name in _all(types):
+        heading, *more = short(name, _opponents(name, friends, foes))
+        lines.append(f"{INDENT}{heading}")
+        lines += [f"{INDENT2}{line}" for line in more]
+        if name in types.mine:
+            lines += [f"{INDENT2}{line}" for line in advice(name)]
+    return tuple(lines)
+
+
+@shorter("unit_knowledge", rank=20, says="weapons and abilities of the types in sight")
+def unit_knowledge_in_short(page: Page) -> Iterator[str]:
+    """One line a type."""
+    types = _types(page)
+    if any(types):
+        yield "Unit knowledge"
+    yield from (f"{INDENT}{short(name, frozenset())[0]}" for name in _all(types))
+
+
+@shorter("unit_knowledge", rank=30, says="what is known of the types in sight")
+def no_unit_knowledge(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
+    """Nothing."""
+    yield from ()
+
+
+class _Types(NamedTuple):
+    """Names of known types, each once and in the order of the page."""
+
+    mine: tuple[str, ...]
+    """Under control."""
+    allies: tuple[str, ...]
+    """Others of the own side; of its structures nothing needs to be known."""
+    enemies: tuple[str, ...]
+
+
+def _types(page: Page) -> _Types:
+    """Types that are in sight or heard of."""
+    view = page.view
+    mine = [unit.type for team in page.teams for unit in team.units]
+    allies = [unit.type for team in page.teams for unit in team.allies]
+    enemies = [unit.type for team in page.teams for unit in team.enemies]
+    allies += [name for team in view.others for name in team.units]
+    if view.others and view.counts:
+        enemies += [enemy.type for enemy in view.counts.enemies]
+    return _Types(_known(mine), _known(name for name in allies if not is_structure(name)), _known(enemies))
+
+
+def _known(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(name for name in dict.fromkeys(names) if name in knowledge())
+
+
+def _all(types: _Types) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*types.mine, *types.allies, *types.enemies)))
+
+
+def _opponents(name: str, friends: frozenset[str], foes: frozenset[str]) -> frozenset[str]:
+    """Types that it is worth comparing one with: those of the other side, of both for one that both sides have."""
+    return (foes if name in friends else frozenset()) | (friends if name in foes else frozenset())

@@ -1,0 +1,210 @@
+"""A page: what an agent is told at one step, and how its sections are found, written and made shorter.
+
+A section is a function from a page to lines; it has a name, and `@section` registers it. A section with nothing to
+say yields nothing and is left out. What an agent's page consists of is told by names: those of its configuration, or
+of its kind. A section may have shorter forms, registered by `@shorter` with a rank; a page that is over its budget
+takes them in ascending order of ranks until it fits. No line is ever cut.
+
+Sections are pure functions of the page: no clock, no game, no state.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from khala_bridge.observe.text.tokens import tokens
+from khala_bridge.observe.text.words import INDENT
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from khala_bridge.observe.observation import AgentObservation
+    from khala_bridge.task.config import TaskConfig
+    from khala_protocol.messages import Received, Rejection, TeamView, View
+
+    Write: TypeAlias = Callable[["Page"], Iterable[str]]
+
+Part: TypeAlias = Literal["counts", "events", "alerts", "others", "resources", "places", "power", "structures"]
+"""A part of the view that is made only for agents with a section that shows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """What an agent is told of its last reply, and what others said to it."""
+
+    accepted: tuple[str, ...] = ()
+    """Its calls that were carried out, `Stalker-1 <Attack_Unit(0x1)>`."""
+    rejections: tuple[Rejection, ...] = ()
+    messages: tuple[Received, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """All that a section may speak of."""
+
+    sight: AgentObservation
+    task: TaskConfig
+    feedback: Feedback
+    conditions: dict[str, str] = field(default_factory=dict)
+    """By tag, what was written of a unit's condition: the pages of one moment share it, see `units`."""
+
+    @property
+    def view(self) -> View:
+        """What the agent sees."""
+        return self.sight.view
+
+    @property
+    def teams(self) -> Sequence[TeamView]:
+        """The agent's teams that have units, or need none."""
+        return self.sight.view.teams
+
+    @property
+    def correspondents(self) -> list[tuple[str, str]]:
+        """Name and role of everybody this agent may write to."""
+        return [(agent.name, agent.role) for agent in self.task.correspondents(self.sight.agent)]
+
+    @property
+    def channels(self) -> Sequence[str]:
+        """Channels that it may write and listen to."""
+        return self.task.channels if self.task.communication else ()
+
+
+# --- sections -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Shorter:
+    """A shorter form of a section."""
+
+    rank: int
+    says: str
+    """What is missing then, as a page says it."""
+    write: Write
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section by its name."""
+
+    name: str
+    write: Write
+    parts: frozenset[Part] = frozenset()
+    """Of the view, those that it shows."""
+    shorter: list[Shorter] = field(default_factory=list)
+
+
+SECTIONS: dict[str, Section] = {}
+"""Every registered section by name."""
+
+
+def section(name: str, *, parts: Iterable[Part] = (), replace: bool = False) -> Callable[[Write], Write]:
+    """Registers a function as the section of this name.
+
+    Args:
+        name: by which configurations ask for it.
+        parts: of the view, those that it shows besides teams, time and resources.
+        replace: whether it takes the place of the section that has the name already, with its shorter forms.
+
+    Raises:
+        ValueError: the name is taken, and `replace` was not given.
+    """
+    if name in SECTIONS and not replace:
+        raise ValueError(f"there is a section '{name}' already; give replace=True to put another one in its place")
+
+    def register(write: Write) -> Write:
+        SECTIONS[name] = Section(name, write, frozenset(parts))
+        return write
+
+    return register
+
+
+def shorter(name: str, *, rank: int, says: str) -> Callable[[Write], Write]:
+    """Registers a function as a shorter form of a section.
+
+    Args:
+        name: of the section.
+        rank: when it is taken; the lowest first, over all sections of a page.
+        says: what is missing then, for the reader: `unit knowledge`.
+    """
+
+    def register(write: Write) -> Write:
+        SECTIONS[name].shorter.append(Shorter(rank, says, write))
+        return write
+
+    return register
+
+
+def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
+    """The sections of these names, `game`, or `my_module:game` for one that a module registers when it is imported.
+
+    Raises:
+        ConfigError: there is none of a name; the text says which there are.
+    """
+    return tuple(map(_find, names))
+
+
+def _find(reference: str) -> Section:
+    module, colon, name = reference.rpartition(":")
+    if colon:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise ConfigError(f"the module of section '{reference}' cannot be imported: {error}") from None
+    if name not in SECTIONS:
+        close = difflib.get_close_matches(name, SECTIONS, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(sorted(SECTIONS))}"
+        raise ConfigError(f"there is no section '{name}' of an observation: {hint}")
+    return SECTIONS[name]
+
+
+# --- writing --------------------------------------------------------------------------------------------------
+
+
+_BETWEEN = "\n\n"
+
+
+def render(page: Page, sections: Sequence[Section], budget: int | None = None) -> str:
+    """The text of a page.
+
+    Args:
+        page: what it may speak of.
+        sections: what it consists of, in their order.
+        budget: about how many tokens it may have; None for no limit. A page whose shortest form has more gets that.
+    """
+    blocks = [_block(section.write, page) for section in sections]
+    if budget is not None:
+        blocks = _shortened(page, sections, blocks, budget)
+    return _BETWEEN.join(block for block in blocks if block) + "\n"
+
+
+def _block(write: Write, page: Page) -> str:
+    return "\n".join(write(page))
+
+
+def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
+    """The blocks with shorter forms in the order of ranks, as many as are needed, and a notice of what is missing."""
+    costs = [tokens(block + _BETWEEN) for block in blocks]
+    missing: dict[str, str] = {}
+    notice = ""
+    steps = ((form, place) for place, section in enumerate(sections) for form in section.shorter)
+    for form, place in sorted(steps, key=lambda step: (step[0].rank, step[1])):
+        if sum(costs) + tokens(notice + _BETWEEN) <= budget:
+            break
+        block = _block(form.write, page)
+        cost = tokens(block + _BETWEEN)
+        if cost >= costs[place]:
+            continue
+        blocks[place], costs[place] = block, cost
+        missing[sections[place].name] = form.says
+        notice = "\n".join(_notice(missing.values()))
+    return [*blocks[:-1], notice, *blocks[-1:]]
+
+
+def _notice(missing: Iterable[str]) -> Iterator[str]:
+    """What was left out; it stands before the last section, which says what to do now."""
+    yield "Left out to keep this short"
+    yield from (f"{INDENT}{words}" for words in missing)

@@ -1,0 +1,74 @@
+"""Sections about the last reply, and about talking to others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_bridge.observe.text.page import section, shorter
+from khala_bridge.observe.text.words import INDENT, INDENT2, one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.observe.text.page import Page
+    from khala_protocol.messages import Received
+
+
+@section("last_actions")
+def last_actions(page: Page) -> Iterator[str]:
+    """What was carried out of the last reply."""
+    if page.feedback.accepted:
+        yield "Your last actions"
+        yield from (f"{INDENT}accepted: {call}" for call in page.feedback.accepted)
+        yield f"{INDENT}Check whether the accepted ones are done, go on by themselves, or need another order."
+
+
+@section("rejections")
+def rejections(page: Page) -> Iterator[str]:
+    """What was not carried out, and why."""
+    if page.feedback.rejections:
+        yield "Your last errors"
+    for fault in page.feedback.rejections:
+        words = f"{fault.team} {fault.text}" if fault.team else fault.text
+        yield f"{INDENT}rejected: {one_line(words)}: {one_line(fault.message)}"
+
+
+@section("messages")
+def messages(page: Page) -> Iterator[str]:
+    """What others said."""
+    if page.feedback.messages:
+        yield "Messages"
+    yield from (f"{INDENT}{_message(message, page.sight.agent.name)}" for message in page.feedback.messages)
+
+
+@section("communication")
+def communication(page: Page) -> Iterator[str]:
+    """To whom one may write, and how."""
+    yield from _communication(page, with_roles=True)
+
+
+@shorter("communication", rank=90, says="what the other agents are there for")
+def communication_in_short(page: Page) -> Iterator[str]:
+    """Names only."""
+    yield from _communication(page, with_roles=False)
+
+
+def _communication(page: Page, *, with_roles: bool) -> Iterator[str]:
+    people, channels = page.correspondents, page.channels
+    if not people and not channels:
+        return
+    yield "Communication"
+    if people:
+        yield f"{INDENT}You can write to:"
+        yield from (f"{INDENT2}{name}:{f' {one_line(role)}' if with_roles else ''}" for name, role in people)
+        yield f"{INDENT}To write: <MessageTo(name, '''text''')>"
+    if channels:
+        yield f"{INDENT}Channels, heard by all who listen: {', '.join(channels)}"
+        yield f"{INDENT}To write to all of them: <MessageTo(channel, '''text''')>; to listen: <ListenTo(channel)>"
+
+
+def _message(message: Received, name: str) -> str:
+    where = "" if message.recipient == name else f" in {message.recipient}"
+    lines = [line.strip() for line in message.text.splitlines()]
+    text = " / ".join(line for line in lines if line)  # on one line, so that none can pass for a heading
+    return f"Message from {message.sender}{where}: '''{text}'''"

@@ -1,0 +1,295 @@
+"""Sections about the agent's teams: who is on their screens and what happened there.
+
+Unit lines are fields between bars, so that programs can read them as well (the scripted players do):
+
+    Zealot | tag 0x100140001 | screen [17.5, 12] | distance 5.4 | health 100/100 | shield 12/50 | total 75%
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from khala_bridge.observe.chronicle import is_structure, is_worker
+from khala_bridge.observe.text.page import section, shorter
+from khala_bridge.observe.text.words import INDENT, INDENT2, n, percent, point, whole
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from khala_bridge.observe.text.page import Page
+    from khala_protocol.messages import Event, OrderView, TeamView, UnitDetails, UnitView
+
+NEAR = 9.0
+"""World units from the middle of a team within which enemies are told one by one on a shorter page; beyond the range
+of all weapons but those of siege."""
+FEW, FEWEST = 8, 3
+"""Enemies that are told one by one on still shorter pages, the nearest ones."""
+
+
+@section("teams", parts=("resources",))
+def teams(page: Page) -> list[str]:
+    """One block per team: where it is, who is there, what happened."""
+    return _blocks(page, _all_units, _tagged_events)
+
+
+@shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
+def near_units(page: Page) -> list[str]:
+    """Allies and far enemies only by type."""
+    return _blocks(page, lambda page, team: _near(page, team, _distance_within(team, NEAR)), _tagged_events)
+
+
+@shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
+def few_units(page: Page) -> list[str]:
+    """A few enemies, and events without tags."""
+    return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEW)), _counted_events)
+
+
+@shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
+def fewest_units(page: Page) -> list[str]:
+    """A handful of enemies, no events."""
+    return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEWEST)), _no_events)
+
+
+def _blocks(
+    page: Page, units: Callable[[Page, TeamView], list[str]], events: Callable[[Page, Sequence[Event]], list[str]]
+) -> list[str]:
+    size = page.task.frames.screen
+    lines: list[str] = []  # lists, since a dozen agents have some thousand lines in each step
+    for team in page.teams:
+        lines += ["", f"Team {team.name}"] if lines else [f"Team {team.name}"]
+        if team.minimap is None:
+            lines.append(f"{INDENT}Has no units of its own: its actions are carried out by units of your whole side.")
+            continue
+        lines.append(f"{INDENT}Minimap position: {point(team.minimap)}")
+        if team.bounds != (0.0, 0.0, size, size):
+            x0, y0, x1, y1 = map(n, team.bounds)
+            lines.append(f"{INDENT}Screen on the map: x {x0} to {x1}, y {y0} to {y1}")
+        lines += units(page, team)
+        lines += _listed("Resources on the screen:", _resource_lines(team.resources))
+        lines += _listed("Since the last observation:", events(page, team.events))
+    return lines
+
+
+def _listed(heading: str, lines: list[str]) -> list[str]:
+    """A heading with lines below it, which are indented already; nothing without lines."""
+    return [f"{INDENT}{heading}", *lines] if lines else lines
+
+
+# --- units ----------------------------------------------------------------------------------------------------
+
+
+def _all_units(page: Page, team: TeamView) -> list[str]:
+    if page.sight.agent.kind == "builder":
+        return _near(page, team, team.enemies)
+    workers = [unit for unit in team.allies if is_worker(unit.type)]
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied units:", _lines(page, _without(team.allies, workers) if workers else team.allies)),
+        *_listed("Allied workers:", _group_lines(workers)),
+        *_listed("Enemy units:", _lines(page, team.enemies)),
+    ]
+
+
+def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
+    """Own units and some enemies one by one, everybody else by type; but structures for those who build beside them."""
+    standing = [unit for unit in team.allies if is_structure(unit.type) and page.sight.agent.kind == "builder"]
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied structures:", _lines(page, standing)),
+        *_listed("Allied units by type:", _group_lines(_without(team.allies, standing))),
+        *_listed("Enemy units:", _lines(page, told)),
+        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
+    ]
+
+
+def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
+    """Own units and some enemies one by one; everybody else by type."""
+    return [
+        *_listed("Your units:", _own_lines(page, team)),
+        *_listed("Allied units by type:", _group_lines(team.allies)),
+        *_listed("Enemy units:", _lines(page, told)),
+        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
+    ]
+
+
+def _without(units: Sequence[UnitView], told: Sequence[UnitView]) -> list[UnitView]:
+    tags = {unit.tag for unit in told}
+    return [unit for unit in units if unit.tag not in tags]
+
+
+def _distance_within(team: TeamView, distance: float) -> list[UnitView]:
+    return [unit for unit in team.enemies if unit.distance is not None and unit.distance <= distance]
+
+
+def _nearest(team: TeamView, count: int) -> list[UnitView]:
+    """The nearest enemies, in the order in which all are listed."""
+    nearest = sorted(team.enemies, key=lambda unit: (unit.distance or 0.0, unit.tag))[:count]
+    tags = {unit.tag for unit in nearest}
+    return [unit for unit in team.enemies if unit.tag in tags]
+
+
+def _group_lines(units: Sequence[UnitView]) -> list[str]:
+    """How many of each type there are, and about where."""
+    by_type: dict[str, list[UnitView]] = {}
+    for unit in units:
+        by_type.setdefault(unit.type, []).append(unit)
+    return [_group_line(name, group) for name, group in by_type.items()]
+
+
+def _group_line(name: str, group: Sequence[UnitView]) -> str:
+    x, y = (round(sum(unit.screen[axis] for unit in group) / len(group), 1) for axis in (0, 1))
+    line = f"{INDENT2}{len(group)} {name} around screen {point((x, y))}"
+    distances = [unit.distance for unit in group if unit.distance is not None]
+    return line + (f", the nearest {n(min(distances))} away" if distances else "")
+
+
+def _own_lines(page: Page, team: TeamView) -> list[str]:
+    size = page.task.frames.screen
+    lines = _lines(page, team.units)
+    for index, unit in enumerate(team.units):
+        if unit.details is not None:
+            lines[index] += _skills(unit.details)
+        if not (0 <= unit.screen[0] < size and 0 <= unit.screen[1] < size):
+            place = point(unit.screen)
+            lines[index] = lines[index].replace(place, f"{place} (off screen)", 1)
+    return lines
+
+
+def _lines(page: Page, units: Sequence[UnitView]) -> list[str]:
+    conditions = page.conditions
+    lines = []
+    for unit in units:
+        tag = unit.tag
+        condition = conditions.get(tag)
+        if condition is None:
+            condition = conditions[tag] = _condition(unit)
+        x, y = unit.screen
+        distance = unit.distance
+        far = "" if distance is None else f" | distance {n(distance)}"
+        lines.append(f"{INDENT2}{unit.type} | tag {tag} | screen [{n(x)}, {n(y)}]{far}{condition}")
+    return lines
+
+
+def _condition(unit: UnitView) -> str:
+    """How a unit is: the same for every team that sees it."""
+    fields = [f"health {whole(unit.health)}/{whole(unit.health_max)}"]
+    if unit.shield_max:
+        fields.append(f"shield {whole(unit.shield)}/{whole(unit.shield_max)}")
+    if full := unit.health_max + unit.shield_max:
+        fields.append(f"total {whole(100 * (unit.health + unit.shield) / full)}%")
+    if unit.energy_max:
+        fields.append(f"energy {whole(unit.energy)}/{whole(unit.energy_max)}")
+    if unit.build_progress < 1:
+        fields.append(f"built {percent(unit.build_progress)}")
+    if (cooldown_s := unit.weapon_cooldown_s) is not None:
+        fields.append(f"weapon in {n(cooldown_s)} s" if cooldown_s else "weapon ready")
+    if unit.orders:
+        fields.append(f"order {orders(unit.orders)}")
+    fields += [word for word, is_so in (("cloaked", unit.cloaked), ("hallucination", unit.hallucination)) if is_so]
+    if unit.details is not None:
+        fields += _details(unit.details)
+    if unit.buffs:
+        fields.append(f"effects {', '.join(unit.buffs)}")
+    return "".join(f" | {field}" for field in fields)
+
+
+def _details(details: UnitDetails) -> Iterator[str]:
+    if details.cargo_max:
+        yield f"carries {', '.join(details.passengers) or 'nobody'}, room for {details.cargo_max} in all"
+    if details.harvesters is not None:
+        yield f"workers {details.harvesters[0]} of {details.harvesters[1]}"
+    if details.burrowed:
+        yield "burrowed"
+    if details.unpowered:
+        yield "without power"
+
+
+def _skills(details: UnitDetails) -> str:
+    """What a unit may be told to use now: part of no condition, since agents differ in it."""
+    ready = f" | ready {', '.join(details.ready)}" if details.ready else ""
+    return ready + (f" | not ready {', '.join(details.unready)}" if details.unready else "")
+
+
+def orders(queue: Sequence[OrderView]) -> str:
+    """What a unit does and will do: `Train_Marine 83%, then 4 Train_Marine`."""
+    if not queue:
+        return ""
+    waiting = [(words, len(list(same))) for words, same in groupby(map(_order, queue[1:]))]
+    return ", then ".join([_order(queue[0]), *(f"{count} {words}" if count > 1 else words for words, count in waiting)])
+
+
+def _order(order: OrderView) -> str:
+    target = f" {order.target}" if order.target else ""
+    place = f" minimap {point(order.minimap)}" if order.minimap else ""
+    return f"{order.name}{target}{place}" + (f" {percent(order.progress)}" if order.progress is not None else "")
+
+
+def _resource_lines(resources: Sequence[UnitView]) -> list[str]:
+    by_type: dict[str, list[str]] = {}
+    for unit in resources:
+        left = f" with {unit.details.contents}" if unit.details and unit.details.contents else ""
+        by_type.setdefault(unit.type, []).append(f"{unit.tag} {point(unit.screen)}{left}")
+    return [f"{INDENT2}{name}: {', '.join(found)}" for name, found in by_type.items()]
+
+
+# --- events ---------------------------------------------------------------------------------------------------
+
+_VERBS = {
+    "hurt": "was hit",
+    "healed": "recovered",
+    "died": "died",
+    "joined": "joined the team",
+    "appeared": "came into sight",
+    "disappeared": "went out of sight",
+}
+_PLACES = {what: place for place, what in enumerate(_VERBS)}
+_SIGNS = {"hurt": " -", "healed": " +"}
+
+
+def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
+    """What happened to which type, and the events, in the order of the verbs."""
+    groups: dict[tuple[str, str, str], list[Event]] = {}
+    for event in events:
+        key = event.what, event.alliance, event.type
+        if key in groups:
+            groups[key].append(event)
+        else:
+            groups[key] = [event]
+    order = sorted(groups, key=lambda key: (_PLACES[key[0]], key[1:]))
+    return [(f"{key[1]} {key[2]} {_VERBS[key[0]]}", groups[key]) for key in order if not _passing_by(*key)]
+
+
+def _passing_by(what: str, alliance: str, name: str) -> bool:
+    """Whether it only says that the team has passed what stays or works there."""
+    passed = alliance == "ally" and what in {"appeared", "disappeared"}
+    return passed and (is_structure(name) or is_worker(name))
+
+
+def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
+    """One line for all units of a type to which the same happened."""
+    words = page.conditions
+    lines = []
+    for what, members in _by_kind(events):
+        sign = _SIGNS.get(members[0].what)
+        if sign is None:
+            said = [event.tag for event in members]
+        else:
+            said = [words.get(sign + event.tag) or _amount(words, sign, event) for event in members]
+        lines.append(f"{INDENT2}{what}: {', '.join(said)}")
+    return lines
+
+
+def _amount(words: dict[str, str], sign: str, event: Event) -> str:
+    """A tag and what it lost or regained; several teams tell of it in the same words."""
+    said = words[sign + event.tag] = f"{event.tag}{sign}{whole(event.amount or 0.0)}"
+    return said
+
+
+def _counted_events(page: Page, events: Sequence[Event]) -> list[str]:  # noqa: ARG001  # a form of telling events
+    """The same without tags."""
+    return [f"{INDENT2}{what}: {len(members)}" for what, members in _by_kind(events)]
+
+
+def _no_events(page: Page, events: Sequence[Event]) -> list[str]:  # noqa: ARG001  # a form of telling events
+    return []

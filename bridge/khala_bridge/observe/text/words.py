@@ -1,0 +1,53 @@
+"""Small words of all sections: numbers, points, lists. No section, no unit, no game."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala_protocol.messages import Point
+
+INDENT = "    "
+INDENT2 = INDENT * 2
+
+
+@functools.lru_cache(4096)
+def n(value: float) -> str:
+    """A number without needless digits: 12, 12.5."""
+    return f"{value:.2f}".rstrip("0").rstrip(".")
+
+
+def whole(value: float) -> str:
+    """A whole number that is 0 only for nothing: what lives has at least 1."""
+    return str(max(1, round(value)) if value > 0 else 0)
+
+
+def percent(share: float) -> str:
+    """A share of one as `62%`."""
+    return f"{100 * share:.0f}%"
+
+
+def point(place: Point) -> str:
+    """A point in the form in which actions take it."""
+    return f"[{n(place[0])}, {n(place[1])}]"
+
+
+def one_line(text: str) -> str:
+    """A text without line breaks, so that no part of it can pass for a heading."""
+    return " ".join(text.split())
+
+
+def counted(numbers: dict[str, int]) -> str:
+    """`3 Stalker, 1 Zealot`."""
+    return ", ".join(f"{count} {what}" for what, count in numbers.items())
+
+
+def listed(heading: str, lines: Iterable[str]) -> Iterator[str]:
+    """A heading with lines below it; nothing without lines."""
+    found = list(lines)
+    if found:
+        yield f"{INDENT}{heading}"
+        yield from (f"{INDENT2}{line}" for line in found)

@@ -1,0 +1,35 @@
+"""State: what one player knows of the game at one moment, as values.
+
+    snapshot   `Snapshot`, one per player and step        unit       `Unit` and `Order`
+    episode    `EpisodeInfo`, one per episode             grid       creep, sight and ground as sent
+    read       messages of the SC2 API → these values     pictures   the game's own pixels
+
+Below are names, frames and what is known of types. Above is everything that sees or acts; none of it reads a message.
+"""
+
+from khala_bridge.state.episode import EpisodeInfo, PictureSizes
+from khala_bridge.state.grid import Grid
+from khala_bridge.state.pictures import Pictures
+from khala_bridge.state.read import read_info, read_snapshot, read_unit
+from khala_bridge.state.snapshot import ActionError, Effect, Player, PowerSource, Score, Snapshot
+from khala_bridge.state.unit import Alliance, Display, Order, Unit
+
+__all__ = [
+    "ActionError",
+    "Alliance",
+    "Display",
+    "Effect",
+    "EpisodeInfo",
+    "Grid",
+    "Order",
+    "PictureSizes",
+    "Pictures",
+    "Player",
+    "PowerSource",
+    "Score",
+    "Snapshot",
+    "Unit",
+    "read_info",
+    "read_snapshot",
+    "read_unit",
+]

@@ -1,0 +1,311 @@
+"""The land: what stands on the ground at one moment, what lies on it, and what has to stay free.
+
+Made of a snapshot, remembered for the last one. Grids are indexed `[x, y]` as those of `khala_bridge.state.ground.terrain`. Which
+of the free places is the best is the business of `khala_bridge.auto`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_bridge.catalogue.functions import functions_of
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, sites, stands_on
+from khala_bridge.state.ground.resources import base_places, coordinates, mark
+from khala_bridge.state.ground.terrain import Ground
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala_bridge.state import PowerSource, Snapshot, Unit
+    from khala_bridge.state.ground.footprints import Footprint
+    from khala_bridge.state.ground.resources import Base, Places
+    from khala_bridge.state.ground.terrain import Bools, Bytes
+
+POWER_RISE = 0.5
+"""Ground that lies so much higher than a Pylon is not powered by it: it does not reach up a cliff."""
+GIVE_POWER = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing", ""})
+"""What powers; a source of which nothing else is known does."""
+AROUND_HALL = 4
+"""Cells from the middle of a town hall that stay free on each side: its own 2, and 2 to walk on."""
+LINE_WIDTH = 1.0
+"""A cell is in the way of workers if the way over it is longer than the straight one by less than this."""
+LINE_REACH = 10.0
+"""Resources farther from a town hall are not its own."""
+SEEN_NOW = 2
+"""The game's number for a cell that is in sight; 1 was seen once, 0 never."""
+RESOURCES = ("mineral_field", "geyser")
+"""Footprints of resources; that of a gas structure is its geyser's."""
+_PLACES = "Build_"
+
+
+class Land:
+    """What is known of the ground at the moment of a snapshot."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.ground = Ground.of(snapshot.info)
+        self._snapshot = snapshot
+
+    @functools.cached_property
+    def _standing(self) -> list[tuple[str, Footprint, Unit]]:
+        """What takes ground, with its footprint, by ascending tags; what is only ordered is in `plans`."""
+        found = ((stands_on(unit.unit_type), unit) for unit in self._snapshot.known.values())
+        return [(*kind, unit) for kind, unit in found if kind]
+
+    @functools.cached_property
+    def _bodies(self) -> list[Unit]:
+        """Units of others that are on the ground and in the way of who builds."""
+        others = (unit for unit in self._snapshot.known.values() if not unit.is_own and not unit.is_flying)
+        return [unit for unit in others if stands_on(unit.unit_type) is None]
+
+    def unit(self, tag: int) -> Unit | None:
+        """A unit that is seen or remembered, by its tag."""
+        return self._snapshot.known.get(tag)
+
+    def standing(self, footprint: str) -> list[Unit]:
+        """What is known to stand on footprints of one name, by ascending tags."""
+        return [unit for name, _, unit in self._standing if name == footprint]
+
+    def standing_on(self, cells: Iterable[tuple[int, int]]) -> Unit | None:
+        """What stands on any of some cells; the one with the least tag."""
+        wanted = set(cells)
+        return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
+
+    # --- what stands there ------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def taken(self) -> Bools:
+        """(w, h) where something stands, or a unit of others is in the way, so that nothing can be built."""
+        taken = np.zeros(self.ground.size, np.bool_)
+        for footprint, cells in self._cells.values():
+            mark(taken, footprint.cells, cells, value=True)
+        mark(taken, ((0, 0),), [(int(unit.pos.x), int(unit.pos.y)) for unit in self._bodies], value=True)
+        return taken
+
+    @functools.cached_property
+    def _cells(self) -> dict[str, tuple[Footprint, list[tuple[int, int]]]]:
+        """By name of a footprint, where it is."""
+        found: dict[str, tuple[Footprint, list[tuple[int, int]]]] = {}
+        for name, footprint, unit in self._standing:
+            _, cells = found.setdefault(name, (footprint, []))
+            cells.append(footprint.cell(unit.pos.x, unit.pos.y))
+        return found
+
+    @functools.cached_property
+    def plans(self) -> tuple[tuple[str, WorldPoint], ...]:
+        """What own workers are on their way to build, and where its middle is going to be; nothing stands there yet.
+
+        The game takes the price when it is begun, so that these are not paid for.
+        """
+        return tuple(plan for unit in self._snapshot.own for plan in self._plans_of(unit))
+
+    def _plans_of(self, unit: Unit) -> Iterator[tuple[str, WorldPoint]]:
+        for order in unit.orders:
+            structure = built_by(order.ability_id)
+            footprint = footprint_of(structure) if structure is not None else None
+            if structure is None or footprint is None:
+                continue
+            target = self.unit(order.target_unit_tag)
+            if target is not None:
+                middle, begun = target.pos, target.is_own
+            else:
+                point = order.target_world_space_pos or WorldPoint(0.0, 0.0)
+                cell = footprint.cell(point.x, point.y)
+                middle, begun = footprint.middle(cell), self._is_begun(footprint, cell)
+            if not begun:
+                yield structure, middle
+
+    def _is_begun(self, footprint: Footprint, cell: tuple[int, int]) -> bool:
+        return self.ground.holds(*cell) and any(
+            unit.is_own and other.cell(unit.pos.x, unit.pos.y) == cell
+            for _, other, unit in self._standing
+            if other.size == footprint.size
+        )
+
+    @functools.cached_property
+    def planned(self) -> Bools:
+        """(w, h) where own units are on their way to build something."""
+        planned = np.zeros(self.ground.size, np.bool_)
+        for structure, middle in self.plans:
+            footprint = footprint_of(structure)
+            if footprint is not None:
+                mark(planned, footprint.cells, [footprint.cell(*middle)], value=True)
+        return planned
+
+    @functools.cached_property
+    def open(self) -> Bools:
+        """(w, h) where ground units can walk now."""
+        walls = np.zeros(self.ground.size, np.bool_)
+        for footprint, cells in self._cells.values():
+            if not footprint.flat:
+                mark(walls, footprint.cells, cells, value=True)
+        return self.ground.walkable & ~walls
+
+    @functools.cached_property
+    def free(self) -> Bools:
+        """(w, h) where a structure could stand now: buildable, and nothing there or planned to be there."""
+        return self.ground.buildable & ~self.taken & ~self.planned
+
+    @functools.cached_property
+    def clear(self) -> Bools:
+        """(w, h) where the game lets town halls stand, as far as resources go."""
+        clear = np.ones(self.ground.size, np.bool_)
+        for name, (footprint, cells) in self._cells.items():
+            if name in RESOURCES:
+                mark(clear, footprint.near, cells, value=False)
+        return clear
+
+    # --- what lies on it --------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def creep(self) -> Bools:
+        """(w, h) where creep is."""
+        return self._state(self._snapshot.creep.cells()) > 0
+
+    @functools.cached_property
+    def sight(self) -> Bytes:
+        """(w, h) 2 where the player sees, 1 where it once saw, 0 elsewhere."""
+        return self._state(self._snapshot.visibility.cells())
+
+    @functools.cached_property
+    def power_sources(self) -> tuple[PowerSource, ...]:
+        """The fields that power structures and take warped in units, by ascending tags.
+
+        The game may also tell of those that only hasten warping in, as a Nexus does.
+        """
+        found = (s for s in self._snapshot.power_sources if self._name(s.tag) in GIVE_POWER)
+        return tuple(sorted(found, key=lambda source: source.tag))
+
+    def _name(self, tag: int) -> str:
+        unit = self.unit(tag)
+        return "" if unit is None else unit.name
+
+    def powered(self, *, corner: bool, by: int | None = None) -> Bools:
+        """(w, h) in which cells a middle would be in a power field.
+
+        Args:
+            corner: whether the middle is the lower left corner of the cell, as of structures of 2 x 2, and not its
+                own middle.
+            by: tag of the only source that counts; None for all.
+        """
+        result = np.zeros(self.ground.size, np.bool_)
+        shift = 0.0 if corner else 0.5
+        for source in self.power_sources:
+            if by is not None and source.tag != by:
+                continue
+            reach = math.ceil(source.radius) + 1
+            x0, y0 = max(int(source.pos.x) - reach, 0), max(int(source.pos.y) - reach, 0)
+            part = np.s_[x0 : int(source.pos.x) + reach + 1, y0 : int(source.pos.y) + reach + 1]
+            height = self.ground.height[part]
+            x, y = coordinates((height.shape[0], height.shape[1]), (x0, y0))
+            inside = (x + shift - source.pos.x) ** 2 + (y + shift - source.pos.y) ** 2 <= source.radius**2
+            if source.tag not in self._flying:
+                inside = inside & (height <= self.ground.level(source.pos.x, source.pos.y) + POWER_RISE)
+            result[part] |= inside
+        return result
+
+    @functools.cached_property
+    def _flying(self) -> frozenset[int]:
+        units = self._snapshot.known.values()
+        return frozenset(unit.tag for unit in units if unit.is_flying or unit.name == "WarpPrismPhasing")
+
+    def _state(self, found: Bytes | None) -> Bytes:
+        return found if found is not None else np.zeros(self.ground.size, np.uint8)
+
+    # --- bases ------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def bases(self) -> tuple[Base, ...]:
+        """Every place for a town hall with its resources, by ascending coordinates."""
+        halls = [WorldPoint(round(u.pos.x, 3), round(u.pos.y, 3)) for u in self.own_halls]
+        return base_places(
+            self.ground, self._places("mineral_field"), self._places("geyser"), (*self.ground.starts, *halls)
+        )
+
+    def _places(self, footprint: str) -> Places:
+        found = {(round(u.pos.x, 3), round(u.pos.y, 3)) for name, _, u in self._standing if name == footprint}
+        return tuple(sorted(found))
+
+    @functools.cached_property
+    def halls(self) -> tuple[Unit, ...]:
+        """Every town hall that is known of, whoever's and also those under construction, by ascending tags."""
+        return tuple(self.standing("town_hall"))
+
+    @functools.cached_property
+    def own_halls(self) -> tuple[Unit, ...]:
+        """The player's own town halls, finished or not, by ascending tags."""
+        return tuple(unit for unit in self.halls if unit.is_own)
+
+    # --- what has to stay free --------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def kept(self) -> Bools:
+        """(w, h) where nothing should be built unasked: ways of workers, places of town halls, room for add-ons."""
+        kept = _lines(self.ground, self.bases, tuple((u.pos.x, u.pos.y) for u in self.own_halls)).copy()
+        for _, footprint, unit in self._standing:
+            site = sites().get(unit.name) if unit.is_own else None
+            if site is not None and site.addon and not unit.add_on_tag:
+                mark(kept, ADDON, [footprint.cell(unit.pos.x, unit.pos.y)], value=True)
+        return kept
+
+
+def _covered(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
+    x, y = footprint.cell(unit.pos.x, unit.pos.y)
+    return [(x + dx, y + dy) for dx, dy in footprint.cells]
+
+
+def addon_place(structure: WorldPoint) -> WorldPoint:
+    """Where the add-on of a structure stands."""
+    return WorldPoint(structure.x + ADDON_OFFSET[0], structure.y + ADDON_OFFSET[1])
+
+
+@functools.lru_cache(2048)
+def built_by(ability: int) -> str | None:
+    """The structure that a worker places with an ability; None for any other ability."""
+    for function in functions_of(ability):
+        name = function.stem.removeprefix(_PLACES)
+        if function.stem.startswith(_PLACES) and name in sites():
+            return name
+    return None
+
+
+_last: list[tuple[Snapshot, Land]] = []
+
+
+def land_of(snapshot: Snapshot) -> Land:
+    """The land at the moment of a snapshot; all who ask about one of the last two share it."""
+    for known, land in _last[:]:  # a copy: other matches of the process may ask from other threads
+        if known is snapshot:
+            return land
+    land = Land(snapshot)
+    _last[:] = [(snapshot, land), *_last[:1]]
+    return land
+
+
+@functools.lru_cache(maxsize=8)
+def _lines(ground: Ground, bases: tuple[Base, ...], halls: Places) -> Bools:
+    """(w, h) between town halls and their resources, and where town halls are going to stand."""
+    kept = np.zeros(ground.size, np.bool_)
+    resources = [place for base in bases for place in (*base.fields, *base.geysers)]
+    for place in dict.fromkeys((*(tuple(base.place) for base in bases), *halls)):
+        x, y = int(place[0]), int(place[1])
+        kept[max(x - AROUND_HALL, 0) : x + AROUND_HALL + 1, max(y - AROUND_HALL, 0) : y + AROUND_HALL + 1] = True
+        for resource in resources:
+            if math.dist(place, resource) <= LINE_REACH:
+                _mark_way(kept, place, resource)
+    return kept
+
+
+def _mark_way(kept: Bools, start: tuple[float, ...], end: WorldPoint) -> None:
+    """Marks the cells over which the way between two points is little longer than the straight one."""
+    x0, x1 = sorted((int(start[0]), int(end.x)))
+    y0, y1 = sorted((int(start[1]), int(end.y)))
+    x0, y0 = max(x0 - 2, 0), max(y0 - 2, 0)
+    part = kept[x0 : x1 + 3, y0 : y1 + 3]
+    x, y = coordinates((part.shape[0], part.shape[1]), (x0, y0))
+    way = np.hypot(x + 0.5 - start[0], y + 0.5 - start[1]) + np.hypot(x + 0.5 - end.x, y + 0.5 - end.y)
+    part |= way <= math.dist(start, end) + LINE_WIDTH

@@ -1,0 +1,156 @@
+"""The units of the player's side, sorted by what they are for: workers, army, town halls, producers.
+
+A reading of a snapshot that the rules share. It decides nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+from khala_bridge.catalogue.functions import functions, general
+from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import knowledge, stand_ins
+from khala_bridge.names import buff_name, unit_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_bridge.knowledge import UnitType
+    from khala_bridge.state import Snapshot, Unit
+
+NO_ARMY = frozenset({"Queen", "QueenBurrowed"})
+"""Armed, and yet at home: they heal, spread creep and make larvae."""
+
+
+UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "RavagerCocoon", "LurkerCocoon"})
+"""What is to become a unit, and does nothing until then."""
+
+
+def kind(unit: Unit) -> UnitType | None:
+    """What is known of the type of a unit."""
+    return _kind(unit.unit_type)
+
+
+@functools.lru_cache(2048)
+def _kind(unit_type: int) -> UnitType | None:
+    return knowledge().get(unit_name(unit_type))
+
+
+def name(unit: Unit) -> str:
+    """Name of the type of a unit."""
+    return unit.name
+
+
+def place(unit: Unit) -> WorldPoint:
+    """Where a unit is."""
+    return WorldPoint(unit.pos.x, unit.pos.y)
+
+
+def is_structure(unit: Unit) -> bool:
+    """Whether a unit is a structure."""
+    known = kind(unit)
+    return known is not None and known.structure
+
+
+def is_worker(unit: Unit) -> bool:
+    """Whether a unit gathers and builds."""
+    known = kind(unit)
+    return known is not None and known.worker and name(unit) != "MULE"
+
+
+def finished(units: Iterable[Unit]) -> list[Unit]:
+    """Those that are there completely."""
+    return [unit for unit in units if unit.build_progress >= 1]
+
+
+def of_types(snapshot: Snapshot, types: Iterable[str]) -> list[Unit]:
+    """Own units of some types, finished or not, by ascending tags."""
+    wanted = frozenset(types)
+    return [unit for unit in snapshot.own if name(unit) in wanted]
+
+
+def workers(snapshot: Snapshot) -> list[Unit]:
+    """Own workers, by ascending tags."""
+    return [unit for unit in finished(snapshot.own) if is_worker(unit)]
+
+
+def army(snapshot: Snapshot, *, home: bool = False) -> list[Unit]:
+    """Own units that fight or help to fight and can move, by ascending tags.
+
+    No workers, structures, larvae and Overlords; neither what stands rooted (a sieged tank, a burrowed Lurker) nor what
+    acts and vanishes by itself (Interceptors, Broodlings). Queens only at `home`.
+    """
+    return [unit for unit in finished(snapshot.own) if _fights(kind(unit)) and (home or name(unit) not in NO_ARMY)]
+
+
+def _fights(known: UnitType | None) -> bool:
+    return known is not None and not (known.structure or known.worker) and known.speed > 0 and known.supply > 0
+
+
+def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
+    """Enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
+
+    A Zealot hits no Overlord: what flies over an army on the ground is no aim. Neither are Larvae and eggs.
+    """
+    enemies = [u for u in snapshot.units.values() if u.is_enemy and name(u) not in UNBORN]
+    ours = tuple(sorted({unit.unit_type for unit in of}))
+    return [unit for unit in enemies if _hit(ours, unit.unit_type, flying=unit.is_flying)]
+
+
+@functools.lru_cache(4096)
+def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
+    """Whether a unit of any of some types hits one of another; unknown types are taken to, and to be hit."""
+    known = [kind for kind in map(_kind, ours) if kind is not None]
+    target = _kind(other)
+    if target is None or len(known) < len(ours) or not any(kind.weapons for kind in known):
+        return True
+    planes = target.planes or (("air",) if flying else ("ground",))
+    return any(weapon.targets in ("any", *planes) for kind in known for weapon in kind.weapons)
+
+
+def is_armed(unit: Unit) -> bool:
+    """Whether a unit fights, workers aside."""
+    known = kind(unit)
+    return known is None or (bool(known.weapons) and not known.worker)
+
+
+def enemy_structures(snapshot: Snapshot) -> list[Unit]:
+    """Enemy structures that are known, those remembered under the fog too, by ascending tags."""
+    found = (u for u in snapshot.known.values() if u.is_enemy and is_structure(u))
+    return sorted(found, key=lambda unit: unit.tag)
+
+
+def own_structures(snapshot: Snapshot) -> list[Unit]:
+    """Own structures, finished or not, by ascending tags."""
+    return [unit for unit in snapshot.own if is_structure(unit)]
+
+
+def bears_resources(unit: Unit) -> bool:
+    """Whether a worker carries something home."""
+    return any(buff_name(buff).startswith("Carry") for buff in unit.buff_ids)
+
+
+def is_doing(unit: Unit, *abilities: int) -> bool:
+    """Whether a unit's present order is one of these abilities, special or general."""
+    return bool(unit.orders) and _among(unit.orders[0].ability_id, abilities)
+
+
+@functools.lru_cache(4096)
+def _among(ability: int, wanted: tuple[int, ...]) -> bool:
+    return ability in wanted or general(ability) in wanted
+
+
+def ability(function: str) -> int:
+    """The ability that a function of PySC2 stands for."""
+    return functions()[function].ability_id
+
+
+def stands(snapshot: Snapshot, structure: str) -> bool:
+    """Whether the player has a structure, or what counts as it, finished."""
+    return any(True for _ in finished(of_types(snapshot, stand_ins(structure))))
+
+
+def has_upgrade(snapshot: Snapshot, upgrade: str) -> bool:
+    """Whether the player has researched an upgrade, by PySC2's name."""
+    return upgrade in snapshot.upgrades

@@ -1,0 +1,125 @@
+"""What one player knows of the game at one moment: one frozen value per player and step.
+
+Everything above the game is a function of snapshots. `khala_bridge.state.read` makes them; nothing else in Khala reads the
+messages of the SC2 API. A snapshot is no connection: it asks the game nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from khala_bridge.frames import WorldPoint
+    from khala_bridge.state.episode import EpisodeInfo
+    from khala_bridge.state.grid import Grid
+    from khala_bridge.state.pictures import Pictures
+    from khala_bridge.state.unit import Alliance, Unit
+    from khala_protocol.messages import Outcome
+
+
+class Player(NamedTuple):
+    """What the player has."""
+
+    player_id: int = 0
+    minerals: int = 0
+    vespene: int = 0
+    food_cap: int = 0
+    """Supply that there is room for."""
+    food_used: int = 0
+    food_army: int = 0
+    """Supply of the units that are no workers."""
+    food_workers: int = 0
+    """Supply of the workers, which is their number."""
+    idle_worker_count: int = 0
+    army_count: int = 0
+    """Units that the game counts as army."""
+
+
+class Score(NamedTuple):
+    """The game's own score of the player."""
+
+    total: float = 0.0
+    """The score itself."""
+    killed: float = 0.0
+    """Minerals and vespene of all that the player destroyed in the episode."""
+    lost: float = 0.0
+    """Minerals and vespene of all that the player lost in the episode."""
+
+
+class PowerSource(NamedTuple):
+    """A field that powers structures or hastens warping in."""
+
+    tag: int
+    """Of what it comes from."""
+    pos: WorldPoint
+    radius: float
+    """In world units."""
+
+
+class Effect(NamedTuple):
+    """Something that lies on the ground: a storm, a bile, a cloud."""
+
+    effect_id: int
+    alliance: Alliance
+    radius: float
+    """In world units; 0 for one that the game gives none."""
+    places: tuple[WorldPoint, ...]
+
+
+class ActionError(NamedTuple):
+    """What the game refused of what a unit was ordered."""
+
+    unit_tag: int
+    ability_id: int
+    result: str
+    """The reason by the API's name, `NotEnoughMinerals`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One observation, with what the game said when it was asked, and what earlier steps have to add."""
+
+    info: EpisodeInfo
+    """About the map; the same object for a whole episode."""
+    game_loop: int
+    """Game loops since the start of the episode."""
+    known: dict[int, Unit]
+    """Every unit that the player knows of by its tag, the remembered ones too, in ascending order of tags."""
+    units: dict[int, Unit]
+    """Those of them that are there now: in sight, or cloaked at a known place."""
+    own: tuple[Unit, ...]
+    """The player's own units, in ascending order of tags."""
+    player: Player
+    score: Score
+    upgrades: tuple[str, ...]
+    """Names of the upgrades that the player has, in ascending order of their numbers."""
+    power_sources: tuple[PowerSource, ...]
+    """In the order of the game."""
+    effects: tuple[Effect, ...]
+    """In the order of the game."""
+    alerts: tuple[str, ...]
+    """What the game warns of, by the API's names, `NuclearLaunchDetected`."""
+    camera: WorldPoint
+    """The middle of the game's own screen."""
+    creep: Grid
+    """1 where creep is."""
+    visibility: Grid
+    """2 where the player sees now, 1 where it once saw, 0 elsewhere."""
+    pictures: Pictures = field(repr=False, compare=False)
+    """The game's own pictures, decoded when they are asked for."""
+    abilities: Mapping[int, frozenset[int]] | None = None
+    """By tag of an own unit, the abilities that the game would take from it now, each as itself and in its general
+    form; None if the game was not asked."""
+    functions: frozenset[int] = frozenset()
+    """Ids of the PySC2 functions that the current selection allows."""
+    dead: frozenset[int] = frozenset()
+    """Tags of the units that died since the snapshot that agents saw before this one."""
+    errors: tuple[ActionError, ...] = ()
+    """What the game refused since then."""
+    ended: bool = False
+    """True if the episode is over: by a result, or because its steps are used up."""
+    outcome: Outcome | None = None
+    """The player's result; None while it plays, and after an end without one."""

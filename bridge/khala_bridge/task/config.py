@@ -1,0 +1,311 @@
+"""A task: a map, the agents that play it, which units answer to them and what they may do with them.
+
+The model of the files in `configs/tasks/`. It is checked against the map table, the catalogue and PySC2's unit
+names while it is read, so that a wrong name is an error with its line, not a surprise in the game. It holds no
+state: who has which unit in a running game is known by `khala_bridge.state.teams`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
+
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from khala_bridge.catalogue.action import GROUP_SELECTOR, Action
+from khala_bridge.catalogue.catalogue import alias_of, catalogue, chosen
+from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge.forms import forms_of
+from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
+from khala_bridge.task.maps import Difficulty, MapSpec, Race, known_maps
+from khala_protocol.errors import WrongKey
+from khala_protocol.keys import check_name
+from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+T = TypeVar("T")
+TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
+AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
+Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
+
+
+def _key_name(name: str) -> str:
+    try:
+        return check_name(name)
+    except WrongKey as error:
+        raise ValueError(str(error)) from None
+
+
+def _known(name: str, known: Iterable[str], what: str) -> str:
+    names = list(known)
+    if name in names:
+        return name
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f", did you mean '{close[0]}'?" if close else ""
+    raise ValueError(f"there is no {what} '{name}'{hint}")
+
+
+def _known_action(name: str) -> str:
+    """An action as the catalogue spells it; a group is left to those who know whom it is for."""
+    if name.startswith(GROUP_SELECTOR):
+        return name
+    action = alias_of(name)
+    return action.name if action else _known(name, catalogue(), "action")
+
+
+def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """What the forms of some types may be told: of what is listed for a type all that the form has as well."""
+    return {
+        form: tuple(name for name in chosen(names, form) if catalogue()[name].fits(form))
+        for unit_type, names in actions.items()
+        for form in forms_of(unit_type)
+    }
+
+
+def _some(values: tuple[T, ...]) -> tuple[T, ...]:
+    """At least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
+    if not values:
+        raise ValueError("at least one is needed")
+    return values
+
+
+KeyName: TypeAlias = Annotated[str, AfterValidator(_key_name)]
+UnitTypeName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, knowledge(), "unit type"))]
+ActionName: TypeAlias = Annotated[str, AfterValidator(_known_action)]
+MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: name and _known(name, known_maps(), "map"))]
+
+
+class Stage(Frozen):
+    """One part of a team's task, until the next one begins; the last part stays."""
+
+    task: str
+    at: Point | None = None
+    """Place on the minimap that ends the stage when the middle of the team's screen is there."""
+    within: float = Field(default=4.0, gt=0)
+    """Cells of the minimap that count as being there."""
+    until_s: float | None = Field(default=None, ge=0)
+    """Second of the game's clock that ends the stage."""
+
+
+class TeamConfig(Frozen):
+    """One team of an agent."""
+
+    name: KeyName
+    unit_types: tuple[UnitTypeName, ...] = ()
+    kind: TeamKind = "group"
+    """`select`: every unit is a team of its own, named `<name>-1`, `<name>-2`, …; `select_all_type`: the units of
+    a type around the first one; `group`: a control group, units are spread over the agent's teams; `side`: no units,
+    but orders to those of the whole side, its producers, workers or army, which the host chooses."""
+    actions: tuple[ActionName, ...] = ()
+    """What a team of the kind `side` may be told; `group:<name>` stands for a whole group of actions."""
+    control_group: int | None = Field(default=None, ge=0, le=9)
+    """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
+    task: str = ""
+    """What it has to do all the time."""
+    stages: tuple[Stage, ...] = ()
+    """What it has to do besides, one after the other: the line of time of a task."""
+
+    @field_validator("stages")
+    @classmethod
+    def _stages_end(cls, stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+        if any(stage.at is None and stage.until_s is None for stage in stages[:-1]):
+            raise ValueError("every stage but the last one needs an end: give at or until_s")
+        return stages
+
+    @field_validator("actions")
+    @classmethod
+    def _of_the_side(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        names = chosen(names)
+        if strange := [name for name in names if catalogue()[name].subject != "side" and catalogue()[name].function]:
+            raise ValueError(f"{strange[0]} is for units, and this is for the whole side")
+        return names
+
+    @model_validator(mode="after")
+    def _units_or_side(self) -> Self:
+        if self.kind == "side":
+            if self.unit_types or not self.actions:
+                raise ValueError(f"team {self.name} is of the kind side: it has actions and no unit_types")
+        elif self.actions or not self.unit_types:
+            raise ValueError(f"team {self.name} needs unit_types; what they may be told is listed by type of unit")
+        return self
+
+
+class AutoConfig(Frozen):
+    """What the host does by itself, with units that no agent has ordered in the same turn."""
+
+    gather: bool = False
+    """Sends idle workers to minerals and gas."""
+    train_workers: bool = False
+    """Trains workers while bases have room for them."""
+    warpgates: bool = False
+    """Turns Gateways into WarpGates once that is researched."""
+
+
+class AgentConfig(Frozen):
+    """One agent: who it is, its teams, and what each type of unit may be told."""
+
+    name: KeyName
+    role: str
+    kind: AgentKind = "combat_group"
+    """What it is for; decides what its observations speak of unless `sections` says it."""
+    sections: tuple[str, ...] = ()
+    """Names of the [sections](observations.md) of its observations, in their order; () for those of its kind.
+    `my_module:mine` is one that a module of yours registers."""
+    images: tuple[ImageSpec, ...] = ()
+    text_tokens: int | None = Field(default=None, ge=100)
+    """About how many tokens its observations may have; None for no limit. Longer ones leave things out and say so."""
+    talks_to: tuple[KeyName, ...] | None = None
+    """Agents that it may write to; None for all."""
+    admits: Admission = "combat"
+    """Which units it takes of those that its teams list; see `khala_bridge.state.teams`."""
+    teams: tuple[TeamConfig, ...] = ()
+    """One or more; a commander may have none, and only talk."""
+    actions: dict[UnitTypeName, tuple[ActionName, ...]] = Field(default_factory=dict)
+    """Names of text actions by unit type, in the order in which they are shown; `group:<name>` stands for those of a
+    group that the type has. A form of a type (sieged, burrowed, …) that is not listed may be told what the type may."""
+    task: str = ""
+    """What it has to do besides the task of all."""
+    max_actions: int | None = Field(default=None, ge=1)
+    """Actions that one of its teams may have in one reply; None for as many as the task says."""
+    required: bool = True
+    """Whether the match waits for it at the start."""
+
+    @field_validator("actions")
+    @classmethod
+    def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        found = {unit_type: chosen(names, unit_type) for unit_type, names in actions.items()}
+        for unit_type, names in found.items():
+            if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
+                raise ValueError(f"{unit_type} has no action {strange[0]}")
+        return found | {form: names for form, names in _of_forms(actions).items() if form not in found}
+
+    @model_validator(mode="after")
+    def _every_type_has_actions(self) -> Self:
+        _once((team.name for team in self.teams), "team")
+        if not self.teams and self.kind != "commander":
+            raise ValueError(f"agent {self.name} needs a team; only a commander may have none")
+        for team in self.teams:
+            if missing := [name for name in team.unit_types if name not in self.actions]:
+                raise ValueError(f"team {team.name} has units of type {missing[0]}, for which no actions are listed")
+        return self
+
+    def catalogue(self) -> tuple[Action, ...]:
+        """Every action that any of its units may be told, in the order in which they are first listed."""
+        lists = (*(team.actions for team in self.teams), *self.actions.values())
+        names = dict.fromkeys(name for listed in lists for name in listed)
+        return tuple(catalogue()[name] for name in names)
+
+    def team_specs(self) -> tuple[TeamSpec, ...]:
+        """Its teams as its briefing tells them."""
+        return tuple(TeamSpec(name=t.name, unit_types=t.unit_types, task=t.task) for t in self.teams)
+
+
+class Opponent(Frozen):
+    """The computer player; what is not given is as the map table says."""
+
+    race: Race | None = None
+    difficulty: Difficulty | None = None
+
+
+class TaskConfig(Frozen):
+    """What is played, by whom, under which rules."""
+
+    name: KeyName
+    description: str = ""
+    map: MapName = ""
+    own_map: MapSpec | None = None
+    """Instead of `map`: one that is not in the table, such as a scenario of your own."""
+    race: Race | None = None
+    """The agents' race; None for the map's own."""
+    opponent: Opponent = Opponent()
+    side: KeyName = "blue"
+    """Name of the agents' side in keys and reports."""
+    task: str
+    """What all agents have to do."""
+    agents: Annotated[tuple[AgentConfig, ...], AfterValidator(_some)]
+    channels: tuple[str, ...] = ()
+    """Names under which more than one agent can be written to."""
+    communication: bool = True
+    """Whether agents may write to each other."""
+    executor: Literal["raw", "screen"] = "raw"
+    clock: Clock = Clock()
+    frames: Frames = Frames()
+    auto: AutoConfig = AutoConfig()
+    default_reply: str = ""
+    """What an agent is taken to have said that said nothing in time; empty: its units go on with what they do."""
+    max_actions: int = Field(default=3, ge=1)
+    """Actions that one team may have in one reply."""
+    max_steps: int | None = Field(default=None, ge=1)
+    """Decisions after which an episode ends without a result; None leaves it to the map."""
+
+    @field_validator("clock")
+    @classmethod
+    def _clock(cls, clock: Clock) -> Clock:
+        if clock.rule != "frozen":
+            raise ValueError(f"the clock rule '{clock.rule}' is not there yet, only 'frozen' is")
+        return clock
+
+    @field_validator("agents")
+    @classmethod
+    def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
+        _once((agent.name for agent in agents), "agent")
+        names = [agent.name for agent in agents]
+        for agent in agents:
+            for name in agent.talks_to or ():
+                _known(name, names, "agent")
+        groups = [t.control_group for a in agents for t in a.teams if t.control_group is not None]
+        _once((str(group) for group in groups), "control group")
+        return agents
+
+    @model_validator(mode="after")
+    def _one_map(self) -> Self:
+        if bool(self.map) == (self.own_map is not None):
+            raise ValueError("give either map or own_map")
+        return self
+
+    @property
+    def map_spec(self) -> MapSpec:
+        """The map, with what this task changes of it."""
+        changed = {"race": self.race, "opponent": self.opponent.race, "difficulty": self.opponent.difficulty}
+        if self.own_map is None:
+            spec = known_maps()[self.map]
+        else:
+            spec = self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
+        return spec.model_copy(update={k: v for k, v in changed.items() if v is not None})
+
+    @property
+    def render_px(self) -> int | None:
+        """Size of the pictures that the game itself has to render; None if it need not."""
+        sizes = [image.size_px for agent in self.agents for image in agent.images if image.is_rendered]
+        return max(sizes, default=None)
+
+    def agent(self, name: str) -> AgentConfig:
+        """The agent of this name."""
+        return next(agent for agent in self.agents if agent.name == name)
+
+    def max_actions_of(self, agent: AgentConfig) -> int:
+        """Actions that one team of an agent may have in one reply."""
+        return self.max_actions if agent.max_actions is None else agent.max_actions
+
+    def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:
+        """The agents that this one may write to, in the order of the task."""
+        if not self.communication:
+            return ()
+        names = agent.talks_to
+        return tuple(a for a in self.agents if a.name != agent.name and (names is None or a.name in names))
+
+    def cards(self) -> tuple[AgentCard, ...]:
+        """The agents as the run card lists them."""
+        return tuple(
+            AgentCard(name=a.name, side=self.side, teams=tuple(t.name for t in a.teams), required=a.required)
+            for a in self.agents
+        )
+
+
+def _once(names: Iterable[str], what: str) -> None:
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        raise ValueError(f"there are two of {what} {twice[0]}")

@@ -1,0 +1,54 @@
+"""The maps that can be played: a typed reading of `bridge/khala_bridge/data/maps.yaml`.
+
+Where a map is, who plays on it and what for; what else stands on it is known by the game alone.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Literal, TypeAlias
+
+from khala_bridge import data
+from khala_protocol.messages import Frozen
+
+Race: TypeAlias = Literal["protoss", "terran", "zerg", "random"]
+Difficulty: TypeAlias = Literal[
+    "very_easy",
+    "easy",
+    "medium",
+    "medium_hard",
+    "hard",
+    "harder",
+    "very_hard",
+    "cheat_vision",
+    "cheat_money",
+    "cheat_insane",
+]
+
+
+class MapSpec(Frozen):
+    """One map and who plays on it."""
+
+    name: str = ""
+    file: str
+    """Below the directory `Maps` of the install."""
+    race: Race
+    """Of the agents' side."""
+    opponent: Race | None
+    """Of the computer player; None if the map is played alone."""
+    difficulty: Difficulty = "very_hard"
+    """Of the computer player; the paper's setting."""
+    limit_loops: int | None = None
+    """Game loop at which the map itself ends the game."""
+    goal: str = ""
+    """What has to be done there."""
+    units: tuple[str, ...] = ()
+    """Types of the agents' units, for a task that is made for the map."""
+    upgrades: tuple[str, ...] = ()
+    """What the map grants the agents' side, as far as actions need it; named as in `pysc2.lib.upgrades`."""
+
+
+@functools.cache
+def known_maps() -> dict[str, MapSpec]:
+    """Every map by name, in the order of the file."""
+    return {name: spec.model_copy(update={"name": name}) for name, spec in data.table("maps.yaml", MapSpec).items()}

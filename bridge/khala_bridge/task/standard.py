@@ -1,0 +1,73 @@
+"""The task that a map is played with when no task file is there for it: one commander for all of its units.
+
+So every map is a task. It is made of what `bridge/khala_bridge/data/maps.yaml` says of the map: what has to be done there, which
+types of units there are, and which upgrades the map grants. A file in `configs/tasks` of the map's name comes first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.knowledge import knowledge
+from khala_bridge.state.abilities import unmet
+from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_protocol.messages import Clock
+
+if TYPE_CHECKING:
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.task.maps import MapSpec
+
+AGENT = "Commander"
+BASE = "Base"
+GROUPS = ("basic", "orders", "skill", "macro", "build")
+"""Groups of actions that units have; what the catalogue makes by rule would fill a prompt and say nothing more."""
+SIDE_GROUPS = ("easy-build", "train", "research", "easy-warp", "chrono", "macro", "easy-control")
+STEP_LOOPS = 11
+"""Half a second of the game between two decisions, as in the other tasks."""
+
+
+def standard_task(spec: MapSpec) -> TaskConfig:
+    """The task that is made for a map."""
+    return TaskConfig(
+        name=spec.name,
+        description=spec.goal,
+        map=spec.name,
+        task=spec.goal,
+        clock=Clock(step_loops=STEP_LOOPS),
+        agents=(_commander(spec),),
+    )
+
+
+def _commander(spec: MapSpec) -> AgentConfig:
+    return AgentConfig(
+        name=AGENT,
+        role="You command the units of your side.",
+        admits="any",
+        teams=(*(TeamConfig(name=unit, unit_types=(unit,)) for unit in spec.units), *_base(spec)),
+        actions={unit: tuple(a.name for a in catalogue().values() if _usable(a, unit, spec)) for unit in spec.units},
+    )
+
+
+def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
+    """Where there are workers, the team of no units that trains and builds."""
+    if not _has_workers(spec):
+        return ()
+    known = {action.group for action in catalogue().values() if action.race in (spec.race, None)}
+    groups = tuple(f"group:{name}/{spec.race}" for name in SIDE_GROUPS if name in known)
+    return (TeamConfig(name=BASE, kind="side", actions=groups),)
+
+
+def _has_workers(spec: MapSpec) -> bool:
+    """Whether there is an economy, so that what is not there yet can be built and researched."""
+    return any(knowledge()[unit].worker for unit in spec.units)
+
+
+def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
+    """Whether units of a type are told the action on this map."""
+    return (
+        action.group in GROUPS
+        and action.subject != "side"
+        and action.fits(unit)
+        and (_has_workers(spec) or unmet(action.pysc2, unit, spec.upgrades) is None)
+    )

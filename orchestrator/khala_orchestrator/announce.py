@@ -1,0 +1,70 @@
+"""Publish what everybody may know: the run card, briefings, what agents write to each other, reports and results.
+
+Below it: the bus. Above it: `khala_orchestrator.match`, which says what, and this module where.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+from khala_orchestrator.roster import Seat
+from khala_protocol.bus import Delivery
+from khala_protocol.codec import encode
+from khala_protocol.keys import Topic, agent_key, run_key
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from types import TracebackType
+
+    from khala_protocol.bus import Bus, Publisher
+    from khala_protocol.messages import Briefing, Message, Report, Result, Run
+
+_DELIVERY = {Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT: Delivery.STATE}
+
+
+class Announcer:
+    """The host's publishers. An asynchronous context manager."""
+
+    def __init__(self, bus: Bus, run: str, seats: Iterable[Seat]) -> None:
+        self._bus = bus
+        self._run = run
+        self._seats = tuple(seats)
+        self._topics: dict[Topic, Publisher] = {}
+        self._briefings: dict[Seat, Publisher] = {}
+        self._messages: dict[Seat, Publisher] = {}
+
+    async def __aenter__(self) -> Self:
+        for topic, delivery in _DELIVERY.items():
+            self._topics[topic] = await self._bus.publisher(run_key(self._run, topic), delivery)
+        for seat in self._seats:
+            key = agent_key(self._run, seat.side, seat.agent, Topic.BRIEFING)
+            self._briefings[seat] = await self._bus.publisher(key, Delivery.STATE)
+            key = agent_key(self._run, seat.side, seat.agent, Topic.MESSAGE)
+            self._messages[seat] = await self._bus.publisher(key, Delivery.LOG)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for publisher in (*self._topics.values(), *self._briefings.values(), *self._messages.values()):
+            await publisher.close()
+
+    async def run(self, card: Run) -> None:
+        """Publish the run card."""
+        await self._topics[Topic.RUN].put(encode(card))
+
+    async def brief(self, briefing: Briefing) -> None:
+        """Publish what one agent has to know."""
+        await self._briefings[Seat(briefing.side, briefing.agent)].put(encode(briefing))
+
+    async def message(self, message: Message) -> None:
+        """Publish what one agent wrote to another or to a channel, under the name of the sender."""
+        await self._messages[Seat(message.side, message.agent)].put(encode(message))
+
+    async def report(self, report: Report) -> None:
+        """Publish what happened in a step."""
+        await self._topics[Topic.REPORT].put(encode(report))
+
+    async def result(self, result: Result) -> None:
+        """Publish how an episode ended."""
+        await self._topics[Topic.RESULT].put(encode(result))

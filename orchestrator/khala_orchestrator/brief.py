@@ -1,0 +1,57 @@
+"""What agents and everybody else are told before the first step: briefings and the run card."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from typing import TYPE_CHECKING
+
+from khala_bridge.catalogue.catalogue import catalogue_sha256
+from khala_protocol.messages import Briefing, Correspondent, Run
+
+if TYPE_CHECKING:
+    from khala_bridge.game.game import GameInfo
+    from khala_bridge.task.config import AgentConfig, TaskConfig
+    from khala_orchestrator.config import MatchConfig
+
+_PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
+
+
+def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Briefing:
+    """What one agent has to know besides its observations."""
+    others = task.correspondents(agent)
+    return Briefing(
+        run=run,
+        agent=agent.name,
+        side=task.side,
+        episode=episode,
+        role=agent.role,
+        task="\n".join(text for text in (task.task, agent.task) if text),
+        teams=agent.team_specs(),
+        actions=tuple(action.spec for action in agent.catalogue()),
+        correspondents=tuple(Correspondent(name=other.name, role=other.role) for other in others),
+        channels=task.channels if others else (),
+        frames=task.frames,
+        clock=task.clock,
+        max_actions=task.max_actions_of(agent),
+    )
+
+
+def run_card(config: MatchConfig, game: GameInfo) -> Run:
+    """All that one needs to know to repeat the run, or to trust its numbers."""
+    task = config.task
+    return Run(
+        run=config.run,
+        task=task.name,
+        map_name=task.map_spec.name,
+        map_sha256=game.map_sha256,
+        seed=config.seed,
+        episodes=config.episodes,
+        game=f"{config.game} {game.version}",
+        executor=task.executor,
+        clock=task.clock,
+        agents=task.cards(),
+        catalogue_sha256=catalogue_sha256(),
+        versions={"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES},
+        config=task.model_dump(mode="json"),
+    )

@@ -1,0 +1,145 @@
+"""The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala.cli` mounts.
+
+What goes wrong on the user's side is raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the
+front door's part.
+"""
+
+import asyncio
+import json
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
+
+from khala_orchestrator.config import all_tasks
+from khala_orchestrator.console import stderr_console
+from khala_protocol.bus.config import BusConfig
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
+Listen = Annotated[
+    list[str] | None,
+    typer.Option(help="Endpoint to listen on; may be given several times.", show_default="tcp/127.0.0.1:7447"),
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Listen without TLS where other machines can connect: your own network only.")
+]
+
+ROUTER_EPILOG = """
+Examples:\n
+    khala router\n
+    khala router --listen tcp/0.0.0.0:7447 --insecure\n
+    khala router --check --connect tcp/10.0.0.5:7447
+"""
+REPLAY_EPILOG = """
+Examples:\n
+    khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
+    khala replay recording.mcap --agent Stalkers --steps 10-20 --text\n
+    khala replay recording.mcap --steps 7 --images pictures
+"""
+
+
+def router(
+    *,
+    listen: Listen = None,
+    insecure: Insecure = False,
+    check: Annotated[bool, typer.Option("--check", help="Ask whether a router answers, and end.")] = False,
+    connect: Annotated[
+        str, typer.Option(help="With --check: the endpoint to ask.", metavar="ENDPOINT")
+    ] = "tcp/127.0.0.1:7447",
+    as_json: Json = False,
+) -> None:
+    """Join hosts and agents: a Zenoh router, until Ctrl-C.
+
+    It is needed when host and agents are on several machines; `khala run` has one of its own. A zenohd of the same
+    version works as well.
+    """
+    if check:
+        routers = asyncio.run(_probe(connect))
+        _out({"endpoint": connect, "routers": routers}, f"a router answers at {connect}", as_json=as_json)
+    else:
+        asyncio.run(_route(BusConfig(mode="router", listen=tuple(listen or ()), insecure=insecure), as_json=as_json))
+
+
+def tasks(*, as_json: Json = False) -> None:
+    """List what can be played."""
+    found = list(all_tasks())
+    if as_json:
+        rows = [
+            {"name": t.name, "map": t.map_spec.name, "agents": [a.name for a in t.agents], "description": t.description}
+            for t in found
+        ]
+        typer.echo(json.dumps({"tasks": rows}))
+        return
+    console = Console(highlight=False)
+    for task in found:
+        console.print(Text.assemble((task.name, "bold"), "  ", (people([a.name for a in task.agents]), "dim")))
+        console.print(Padding(task.description, (0, 0, 0, 4), expand=False))
+
+
+def people(names: Sequence[str]) -> str:
+    """Names of agents, those that only differ by a number together: `Commander, CombatGroup1 2 5`."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        stem = name.rstrip("0123456789")
+        groups.setdefault(stem, []).append(name.removeprefix(stem))
+    return ", ".join(f"{stem}{' '.join(numbers)}" for stem, numbers in groups.items())
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(help="A recording, such as `khala run` leaves behind.")],
+    *,
+    agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
+    steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
+    text: Annotated[bool, typer.Option("--text", help="Observations and replies word for word.")] = False,
+    images: Annotated[
+        Path | None, typer.Option(help="Write the pictures that agents were shown into this directory.", metavar="DIR")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Tell what was said and done in a recorded run."""
+    from khala_orchestrator.transcript import Selection, save_pictures, summary, transcript
+
+    selection = Selection.of(agent, steps)
+    if images is not None:
+        saved = save_pictures(file, selection, images)
+        data = {"pictures": [str(path) for path in saved]}
+        _out(data, f"{len(saved)} pictures are in {images}", as_json=as_json)
+        return
+    if as_json:
+        typer.echo(json.dumps(summary(file, selection)))
+        return
+    console = Console(highlight=False)
+    for part in transcript(file, selection, whole=text):
+        console.print(part, soft_wrap=isinstance(part, Text))
+
+
+async def _probe(endpoint: str) -> list[str]:
+    from khala_protocol.bus.zenoh import probe  # noqa: PLC0415  # loads the native library, which --help need not wait for
+
+    return list(await probe(BusConfig(connect=(endpoint,), connect_timeout_s=2.0)))
+
+
+async def _route(config: BusConfig, *, as_json: bool) -> None:
+    from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415
+
+    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    bus = await open_bus(config)
+    try:
+        _out({"endpoints": bus.endpoints}, f"router at {', '.join(bus.endpoints)}; Ctrl-C ends it", as_json=as_json)
+        await stop.wait()
+    finally:
+        await bus.close()
+
+
+def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(data))
+    else:
+        stderr_console().print(sentence)

@@ -1,0 +1,108 @@
+"""What a match is configured with: a task file, and what the command line changes of it.
+
+Task files are found by their name below `configs/tasks/`, or by a path. Their model is `khala_bridge.task.config.TaskConfig`. A map
+without a task file is a task, too: `khala_bridge.task.standard` makes it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import secrets
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field, ValidationError
+
+from khala_bridge.task.config import TaskConfig
+from khala_bridge.task.images import images_for
+from khala_bridge.task.maps import known_maps
+from khala_bridge.task.standard import standard_task
+from khala_protocol.configfile import load
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import check_name
+from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+"""The shipped configuration: beside the packages in a checkout and in an installed wheel alike."""
+
+
+class MatchConfig(Frozen):
+    """One run: a task, played for a number of episodes."""
+
+    task: TaskConfig
+    run: str
+    """Its name on the bus, in the recording and in every table."""
+    game: str = "StarCraft II"
+    """What plays; the simulator speaks the game's protocol so well that only whoever starts it knows."""
+    seed: int = Field(default=1, ge=0, lt=2**31)
+    """Of the first episode; each further one adds 1."""
+    episodes: int = Field(default=1, ge=1)
+    assemble_s: float = Field(default=60.0, gt=0)
+    """How long the host waits for its agents at the start."""
+    record: Path | None = None
+    """The MCAP file that every topic is written to; None writes none."""
+
+
+def task_files() -> Iterator[Path]:
+    """The shipped task files, in the order of their names."""
+    yield from sorted((CONFIGS / "tasks").rglob("*.yaml"), key=lambda path: (path.parent.name, path.stem))
+
+
+def all_tasks() -> Iterator[TaskConfig]:
+    """Everything that can be played by name: the shipped task files, then the maps that have none."""
+    files = {path.stem: path for path in task_files()}
+    yield from (load(path, TaskConfig) for path in files.values())
+    yield from (standard_task(spec) for name, spec in known_maps().items() if name not in files)
+
+
+def load_task(name: str) -> TaskConfig:
+    """The task of this name, or of the file at this path.
+
+    Raises:
+        ConfigError: there is none, or the file is wrong; the text says what and where.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return load(name, TaskConfig)
+    files = {path.stem: path for path in task_files()}
+    if name in files:
+        return load(files[name], TaskConfig)
+    if name in known_maps():
+        return standard_task(known_maps()[name])
+    close = difflib.get_close_matches(name, {*files, *known_maps()}, n=3)
+    hint = f"did you mean {', '.join(close)}? " if close else ""
+    raise ConfigError(f"there is no task {name!r}: {hint}`khala tasks` lists all; a path to a .yaml file works too")
+
+
+def change(task: TaskConfig, **changes: Any) -> TaskConfig:
+    """The task with fields replaced. None changes nothing.
+
+    `max_wait_s` and `step_loops` are those of its clock, `images` are words for all agents, see `images_for`.
+
+    Raises:
+        ConfigError: a value does not fit.
+    """
+    given = {name: value for name, value in changes.items() if value is not None}
+    fields = task.model_dump()
+    for name in ("max_wait_s", "step_loops"):
+        if name in given:
+            fields["clock"][name] = given.pop(name)
+    try:
+        if "images" in given:
+            asked = given.pop("images")
+            for agent in fields["agents"]:
+                agent["images"] = images_for(asked, agent["kind"])
+        return TaskConfig.model_validate(fields | given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise ConfigError(f"{place}: {words}", source="command line") from None
+
+
+def new_run_name(task: str) -> str:
+    """A name for a run that no other run has: the task, the time, four random digits."""
+    now = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    return check_name(f"{task[:40]}-{now}-{secrets.token_hex(2)}", "run")

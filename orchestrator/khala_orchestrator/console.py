@@ -1,0 +1,158 @@
+"""What a person sees of a match: a live line per agent while it runs, and a table at the end.
+
+It is fed with the same messages that go over the bus, and prints to stderr, so that stdout stays free for JSON.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Self
+
+from rich import box
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from khala_protocol.messages import LOOPS_PER_S, Report, Result, Run, Usage, Wire
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from types import TracebackType
+
+    from khala_protocol.messages import AgentReport
+
+STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "malformed": "red"}
+OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
+
+
+def stderr_console() -> Console:
+    """Return a console on stderr, where a person reads."""
+    return Console(stderr=True, highlight=False)
+
+
+class Progress:
+    """Shows a match while it runs. A context manager; call it with each message of the host."""
+
+    def __init__(self, screen: Console, max_steps: int | None = None) -> None:
+        self._screen = screen
+        self._max_steps = max_steps
+        self._run: Run | None = None
+        self._report: Report | None = None
+        self._counts: dict[str, Counter[str]] = {}
+        self._usage: dict[str, Usage] = {}
+        self._live = Live(console=screen, refresh_per_second=8, transient=True)
+
+    def __enter__(self) -> Self:
+        if self._screen.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def __call__(self, message: Wire) -> None:
+        """Takes a run card, a report or a result."""
+        match message:
+            case Run():
+                self._run = message
+                self._screen.print(card(message))
+            case Report():
+                self._add(message)
+            case Result():
+                self._screen.print(table(message))
+        if self._screen.is_terminal and self._report is not None:
+            self._live.update(self._picture(self._report))
+        elif isinstance(message, Report) and message.step % 20 == 0:
+            self._screen.print(f"step {message.step}, {clock(message.game_loop)}")
+
+    def _add(self, report: Report) -> None:
+        self._report = report
+        for agent in report.agents:
+            counts = self._counts.setdefault(agent.agent, Counter())
+            counts[agent.status] += 1
+            counts["accepted"] += len(agent.accepted)
+            counts["rejected"] += len(agent.rejections)
+            self._usage[agent.agent] = self._usage.get(agent.agent, Usage()) + agent.usage
+
+    def _picture(self, report: Report) -> Panel:
+        rows = Table(box=None, expand=True, pad_edge=False)
+        for name in ("agent", "status", "latency", "accepted", "rejected", "tokens"):
+            rows.add_column(name, no_wrap=True)
+        rows.add_column("last action", style="dim", no_wrap=True, overflow="ellipsis", ratio=1)
+        for agent in report.agents:
+            rows.add_row(*self._row(agent))
+        steps = f" of {self._max_steps}" if self._max_steps else ""
+        line = f"step {report.step}{steps}   game {clock(report.game_loop)}   score {report.score:g}"
+        title = f"{self._run.task} · {self._run.run}" if self._run else ""
+        return Panel(Group(Text(line), rows), title=title, border_style="blue")
+
+    def _row(self, agent: AgentReport) -> tuple[str | Text, ...]:
+        counts, usage = self._counts[agent.agent], self._usage[agent.agent]
+        return (
+            agent.agent,
+            Text(agent.status, STATUS[agent.status]),
+            "" if agent.latency_s is None else f"{agent.latency_s:.2f} s",
+            str(counts["accepted"]),
+            str(counts["rejected"]),
+            f"{usage.prompt_tokens + usage.completion_tokens:,}",
+            Text(agent.accepted[-1] if agent.accepted else agent.detail, overflow="ellipsis"),
+        )
+
+
+def card(run: Run) -> Panel:
+    """The run card."""
+    wait = "as long as it takes" if run.clock.max_wait_s is None else f"at most {run.clock.max_wait_s:g} s"
+    rows = Table.grid(padding=(0, 2))
+    rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
+    rows.add_row("game", f"{run.game}, {run.executor} executor")
+    rows.add_row("clock", f"{run.clock.rule}: {run.clock.step_loops} loops a step, waits {wait}")
+    rows.add_row("agents", ", ".join(f"{agent.name} ({', '.join(agent.teams)})" for agent in run.agents))
+    return Panel(rows, title=run.run, border_style="dim", box=box.ROUNDED)
+
+
+def table(result: Result) -> Panel:
+    """How an episode ended."""
+    rows = Table.grid(padding=(0, 2))
+    kd = "none lost" if result.kd is None else f"{result.kd:.2f}"
+    rows.add_row(
+        "K/D",
+        f"{kd}  (killed {_losses(result.killed.units, result.killed.value)}, "
+        f"lost {_losses(result.lost.units, result.lost.value)})",
+    )
+    took = f"{clock(result.game_loop)} of game in {result.wall_s:.1f} s, {result.env_steps} calls of SC2Env.step"
+    rows.add_row("steps", f"{result.steps}, {took}")
+    if result.latency_p50_s is not None and result.latency_p95_s is not None:
+        milliseconds = f"median {result.latency_p50_s * 1000:.0f} ms, 95 % below {result.latency_p95_s * 1000:.0f} ms"
+        rows.add_row("latency", milliseconds)
+    rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
+    rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
+    rows.add_row("tokens", _tokens(result.usage.values()))
+    for agent, statuses in sorted(result.statuses.items()):
+        rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
+    title = Text.assemble((result.outcome, OUTCOME[result.outcome]), f", {result.cause} (episode {result.episode})")
+    return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
+
+
+def _tokens(usages: Iterable[Usage]) -> str:
+    total = sum(usages, start=Usage())
+    text = f"{total.prompt_tokens:,} in"
+    if total.images:
+        text += f" (about {total.image_tokens:,} of them for {total.images} pictures)"
+    text += f", {total.completion_tokens:,} out, {total.requests} request(s)"
+    if total.unknown_requests:
+        text += f", {total.unknown_requests} of unknown size"
+    return text + (", no price known" if total.cost_usd is None else f", {total.cost_usd:.4f} USD")
+
+
+def _losses(units: int, value: float) -> str:
+    return f"{units} unit(s) worth {value:g}"
+
+
+def clock(game_loop: int) -> str:
+    """Minutes and seconds of the game."""
+    seconds = int(game_loop / LOOPS_PER_S)
+    return f"{seconds // 60}:{seconds % 60:02d}"

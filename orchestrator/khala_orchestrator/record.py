@@ -1,0 +1,117 @@
+"""Writes down every topic of a run: a bus that records what passes through it.
+
+The host records what it sends before it is sent, and what it gets when it takes it, so that the file holds
+the order in which the host acted, and cannot lose to congestion what the host saw. Below it: a bus and a
+`khala_protocol.recording.Recorder`. Above it: `khala_orchestrator.host`, which gives the recording bus to everything else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Self
+
+from khala_protocol.bus import Bus, Delivery, Liveness, Publisher, Sample, Subscription, Token
+from khala_protocol.keys import Topic, every_agent
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+    from types import TracebackType
+
+    from khala_protocol.recording import Recorder
+
+
+class RecordingBus:
+    """A `Bus` that writes every sample it publishes or hands out."""
+
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+        self._bus = bus
+        self._recorder = recorder
+
+    async def publisher(self, key: str, delivery: Delivery) -> Publisher:
+        """Declares a publisher whose samples are recorded before they are sent."""
+        return _RecordingPublisher(await self._bus.publisher(key, delivery), self._recorder)
+
+    async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
+        """Declares a subscription whose samples are recorded when they are taken."""
+        return _RecordingSubscription(await self._bus.subscribe(key_expr, delivery, depth=depth), self._recorder)
+
+    async def announce(self, key: str) -> Token:
+        """Declares a liveliness token; tokens are not recorded, reports say who was there."""
+        return await self._bus.announce(key)
+
+    async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
+        """Reports tokens."""
+        return await self._bus.watch(key_expr, depth=depth)
+
+    async def close(self) -> None:
+        """Closes the bus below; the recorder is its owner's."""
+        await self._bus.close()
+
+
+class Listener:
+    """Takes the topics that the host itself has no use for, so that they are recorded. A context manager."""
+
+    def __init__(self, bus: Bus, run: str) -> None:
+        self._bus = bus
+        self._run = run
+        self._subscription: Subscription[Sample] | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    async def __aenter__(self) -> Self:
+        self._subscription = await self._bus.subscribe(every_agent(self._run, Topic.EXCHANGE), Delivery.LOG)
+        self._task = asyncio.create_task(_drain(self._subscription), name="record exchanges")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._subscription is not None and self._task is not None
+        await self._subscription.close()
+        await self._task
+
+
+class _RecordingPublisher:
+    def __init__(self, publisher: Publisher, recorder: Recorder) -> None:
+        self._publisher = publisher
+        self._recorder = recorder
+
+    @property
+    def key(self) -> str:
+        return self._publisher.key
+
+    async def put(self, payload: bytes) -> None:
+        self._recorder.write(self._publisher.key, payload)
+        await self._publisher.put(payload)
+
+    async def close(self) -> None:
+        await self._publisher.close()
+
+
+class _RecordingSubscription:
+    def __init__(self, subscription: Subscription[Sample], recorder: Recorder) -> None:
+        self._subscription = subscription
+        self._recorder = recorder
+
+    @property
+    def dropped(self) -> int:
+        return self._subscription.dropped
+
+    @property
+    def missed(self) -> int:
+        return self._subscription.missed
+
+    def __aiter__(self) -> AsyncIterator[Sample]:
+        return self
+
+    async def __anext__(self) -> Sample:
+        sample = await self._subscription.__anext__()
+        self._recorder.write(sample.key, sample.payload)
+        return sample
+
+    async def close(self) -> None:
+        await self._subscription.close()
+
+
+async def _drain(samples: Subscription[Sample]) -> None:
+    async for _ in samples:
+        pass

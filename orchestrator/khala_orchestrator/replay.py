@@ -1,0 +1,111 @@
+"""Plays a recorded match again without its agents: they say what they said, and must be shown what they were shown.
+
+The match, the bridge and the game are the real ones; `RecordedTurn` takes the place of the bus. With the same map,
+seed and rules, the observations of the replay equal the recorded ones byte for byte, and every difference is returned.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_bridge.task.config import TaskConfig
+from khala_orchestrator.config import MatchConfig
+from khala_orchestrator.host import assemble
+from khala_orchestrator.match import SilentObserver
+from khala_orchestrator.roster import Seat
+from khala_orchestrator.turn import Answer, Answers
+from khala_protocol.codec import encode
+from khala_protocol.errors import RecordingError
+from khala_protocol.messages import Observation, Reply, Report
+from khala_protocol.recording.difference import Difference
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala_bridge.game.game import OneSide
+    from khala_orchestrator.turn import Question
+    from khala_protocol.messages import AgentReport
+    from khala_protocol.recording import Recording, Step
+
+
+def recorded_config(recording: Recording) -> MatchConfig:
+    """The match that a recording is of.
+
+    Raises:
+        RecordingError: it has no run card.
+    """
+    run = recording.run
+    if run is None:
+        raise RecordingError(f"{recording.path} has no run card: it was ended before the match began")
+    task = TaskConfig.model_validate(run.config)
+    return MatchConfig(task=task, run=run.run, seed=run.seed, episodes=run.episodes)
+
+
+async def replay(recording: Recording, game: OneSide) -> list[Difference]:
+    """Plays a recording again, up to its last complete step.
+
+    Args:
+        recording: of a match.
+        game: the game of `recorded_config`, started.
+
+    Returns:
+        every observation that is not the recorded one; a replay that went another way ends at its first step.
+    """
+    turn = RecordedTurn(recording)
+    match = assemble(recorded_config(recording), game, turn, SilentObserver())
+    try:
+        async for _ in match.play():
+            pass
+    except _EndOfRecording:
+        pass
+    return turn.differences
+
+
+class RecordedTurn:
+    """An `AgentPool` out of a recording: what was answered in time is answered at once."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.differences: list[Difference] = []
+        self._steps: Iterator[Step] = recording.by_step()
+        self._replies: dict[tuple[int, int, str], Reply] = {}
+        for reply in recording.of(Reply):
+            self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
+
+    async def ask(self, questions: Iterable[Question]) -> Answers:
+        """Compare the observations with the recorded ones, and give the recorded answers.
+
+        Pictures are compared by the hashes under which observations name them.
+        """
+        observations = [question.observation for question in questions]
+        step = next(self._steps, None)
+        if step is None or not step.of(Report):
+            raise _EndOfRecording
+        self._compare(step, observations)
+        if self.differences:
+            raise _EndOfRecording
+        (report,) = step.of(Report)
+        return Answers({Seat(agent.side, agent.agent): self._answer(report, agent) for agent in report.agents})
+
+    def _answer(self, report: Report, agent: AgentReport) -> Answer:
+        taken = agent.status in {"ok", "fallback"}
+        reply = self._replies[report.episode, report.step, agent.agent] if taken else None
+        return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
+
+    def _compare(self, step: Step, observations: Iterable[Observation]) -> None:
+        sent = {observation.agent: encode(observation).decode() for observation in observations}
+        for sample in step.samples:
+            message = sample.message
+            if not isinstance(message, Observation):
+                continue
+            now, recorded = sent.pop(message.agent, ""), sample.payload.decode()
+            if now != recorded:
+                self._differ(message.agent, step, recorded, now)
+        for agent, now in sent.items():
+            self._differ(agent, step, "", now)
+
+    def _differ(self, agent: str, step: Step, recorded: str, sent: str) -> None:
+        self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
+
+
+class _EndOfRecording(Exception):
+    """There is nothing more to compare."""

@@ -1,0 +1,129 @@
+"""Who is there: agents by their liveliness tokens.
+
+Below it: the bus. Above it: `khala_orchestrator.match`, which starts when all required agents are there, and
+`khala_orchestrator.turn`, which stops waiting for one that went away. Two instances of the same agent (a restart
+that overlaps, or two people with one name) are one presence here, and a warning in the log.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+from khala_protocol.errors import KhalaError, WrongKey
+from khala_protocol.keys import Topic, every_agent, parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from types import TracebackType
+
+    from khala_protocol.bus import Bus, Liveness, Subscription
+
+log = logging.getLogger(__name__)
+
+
+class Seat(NamedTuple):
+    """The place of one agent in a run."""
+
+    side: str
+    agent: str
+
+    def __str__(self) -> str:
+        return f"{self.side}/{self.agent}"
+
+
+class MissingAgents(KhalaError):
+    """Required agents did not come in time."""
+
+    def __init__(self, missing: Iterable[Seat], waited_s: float) -> None:
+        self.missing = tuple(missing)
+        names = ", ".join(str(seat) for seat in self.missing)
+        super().__init__(
+            f"no agent took the place of {names} within {waited_s:g} s: start one with "
+            f"`khala agent {self.missing[0].agent} --side {self.missing[0].side} --run … --connect …`"
+        )
+
+
+class Roster:
+    """The seats of a run, and which of them are taken. An asynchronous context manager."""
+
+    def __init__(self, bus: Bus, run: str, seats: Iterable[Seat]) -> None:
+        self.seats = tuple(seats)
+        self._bus = bus
+        self._run = run
+        self._instances: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
+        self._changed = asyncio.Condition()
+        self._on_gone: Callable[[Seat], None] = _ignore
+        self._subscription: Subscription[Liveness] | None = None
+        self._pump: asyncio.Task[None] | None = None
+
+    async def __aenter__(self) -> Self:
+        self._subscription = await self._bus.watch(every_agent(self._run, Topic.ALIVE))
+        self._pump = asyncio.create_task(self._follow(self._subscription), name="roster")
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._subscription is not None and self._pump is not None
+        await self._subscription.close()
+        await self._pump
+
+    def present(self, seat: Seat) -> bool:
+        """Whether at least one instance of this agent is there."""
+        return bool(self._instances[seat])
+
+    def missing(self) -> tuple[Seat, ...]:
+        """The seats that nobody has taken."""
+        return tuple(seat for seat in self.seats if not self.present(seat))
+
+    def on_gone(self, callback: Callable[[Seat], None]) -> None:
+        """Calls `callback` whenever the last instance of an agent goes away."""
+        self._on_gone = callback
+
+    async def assemble(self, required: Iterable[Seat], timeout_s: float) -> None:
+        """Waits until all required seats are taken.
+
+        Raises:
+            MissingAgents: some are not after `timeout_s` seconds.
+        """
+        wanted = tuple(required)
+        try:
+            async with asyncio.timeout(timeout_s), self._changed:
+                await self._changed.wait_for(lambda: all(self.present(seat) for seat in wanted))
+        except TimeoutError:
+            raise MissingAgents((s for s in wanted if not self.present(s)), timeout_s) from None
+
+    async def _follow(self, tokens: Subscription[Liveness]) -> None:
+        async for token in tokens:
+            if token.alive or token.link_up:  # with our own link down, everybody seems to go at once
+                self._note(token)
+                async with self._changed:
+                    self._changed.notify_all()
+
+    def _note(self, token: Liveness) -> None:
+        try:
+            address = parse(token.key)
+        except WrongKey as error:
+            log.warning("%s", error)
+            return
+        assert address.side is not None and address.agent is not None and address.instance is not None
+        seat = Seat(address.side, address.agent)
+        instances = self._instances.get(seat)
+        if instances is None:
+            log.warning("agent %s is not in this match", seat)
+        elif token.alive:
+            instances.add(address.instance)
+            if len(instances) > 1:
+                log.warning(
+                    "%d instances of agent %s are there: the first reply of a step counts", len(instances), seat
+                )
+        elif address.instance in instances:
+            instances.remove(address.instance)
+            if not instances:
+                self._on_gone(seat)
+
+
+def _ignore(seat: Seat) -> None:
+    """Nobody waits yet."""

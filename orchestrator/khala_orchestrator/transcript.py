@@ -1,0 +1,160 @@
+"""Turn a recording into a transcript for a person: what was seen, said and done, step by step.
+
+It reads the file once, in its order, and holds no more than one step of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+from rich.text import Text
+
+from khala_orchestrator.console import STATUS, card, clock, table
+from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
+from khala_protocol.recording import Recording, read
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from rich.console import RenderableType
+
+    from khala_protocol.messages import Wire
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which part of a recording is shown."""
+
+    agent: str | None = None
+    first: int = 0
+    last: int | None = None
+
+    @classmethod
+    def of(cls, agent: str | None, steps: str | None) -> Self:
+        """Of what stands on the command line; `steps` is `7`, `10-20`, `10-` or `-20`.
+
+        Raises:
+            ConfigError: `steps` is none of these.
+        """
+        if steps is None:
+            return cls(agent)
+        found = re.fullmatch(r"(\d*)(-?)(\d*)", steps)
+        if not found or not steps.strip("-"):
+            raise ConfigError(f"{steps!r} names no steps: write 7, 10-20, 10- or -20", source="--steps")
+        first, dash, last = found.groups()
+        end = last if dash else first
+        return cls(agent, int(first or 0), int(end) if end else None)
+
+    def holds(self, step: int, agent: str | None = None) -> bool:
+        """Whether a step is in it, and an agent, if one is given."""
+        in_time = step >= self.first and (self.last is None or step <= self.last)
+        return in_time and (agent is None or self.agent in {None, agent})
+
+
+def transcript(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[RenderableType]:
+    """Yield what is to be printed of a recording, in its order.
+
+    Args:
+        path: the recording.
+        selection: which part.
+        whole: observations and replies word for word, as well as what became of them.
+
+    Raises:
+        RecordingError: the file is no recording.
+    """
+    for recorded in read(path):
+        match recorded.message:
+            case Run() as run:
+                yield card(run)
+            case Result() as result:
+                yield table(result)
+            case Observation() as seen if whole and selection.holds(seen.step, seen.agent):
+                yield _words(f"step {seen.step}, {seen.agent} sees", seen.text, "cyan")
+                yield from (_picture(image) for image in seen.images)
+            case Reply() as reply if whole and selection.holds(reply.step, reply.agent):
+                yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
+            case Message() as said if selection.holds(said.step, said.agent):
+                yield Text.assemble((f"  {said.agent} → {said.recipient}: ", "magenta"), " ".join(said.text.split()))
+            case Report() as report if selection.holds(report.step):
+                yield from _report(report, selection)
+
+
+def summary(path: Path, selection: Selection) -> dict[str, Any]:
+    """The run card, the results and the reports of a recording, as JSON data."""
+    found: dict[str, list[Wire]] = {"run": [], "result": [], "report": []}
+    topics: Counter[str] = Counter()
+    for recorded in read(path):
+        message = recorded.message
+        topics[recorded.key] += 1
+        if isinstance(message, Run | Result) or (isinstance(message, Report) and selection.holds(message.step)):
+            found[message.kind].append(message)
+    plain = {kind: [message.model_dump(mode="json") for message in messages] for kind, messages in found.items()}
+    return {
+        "run": plain["run"][0] if plain["run"] else None,
+        "results": plain["result"],
+        "reports": plain["report"],
+        "samples": dict(sorted(topics.items())),
+    }
+
+
+def _report(report: Report, selection: Selection) -> Iterator[Text]:
+    yield Text(f"step {report.step}  {clock(report.game_loop)}  score {report.score:g}", "bold")
+    for agent in report.agents:
+        if selection.holds(report.step, agent.agent):
+            yield from _agent(agent)
+
+
+def _agent(agent: AgentReport) -> Iterator[Text]:
+    latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
+    ignored = f", {agent.ignored} ignored" if agent.ignored else ""
+    detail = f" ({agent.detail})" if agent.detail else ""
+    yield Text.assemble(f"  {agent.agent}: ", (agent.status, STATUS[agent.status]), f"{detail}{latency}{ignored}")
+    yield from (Text(f"    {call}", "green") for call in agent.accepted)
+    for fault in agent.rejections:
+        yield Text.assemble((f"    {fault.text}", "red"), f"  {fault.reason}: {fault.message}")
+
+
+def save_pictures(path: Path, selection: Selection, directory: Path) -> list[Path]:
+    """Writes the pictures that agents were shown into a directory, and returns their files.
+
+    Args:
+        path: the recording.
+        selection: which part.
+        directory: is made if it is not there; files are named after step, agent and picture.
+
+    Raises:
+        RecordingError: the file is no recording, or the directory cannot be written.
+    """
+    recording = Recording.open(path)
+    pictures = dict(recording.images())
+    saved = []
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for seen in recording.of(Observation):
+            if not selection.holds(seen.step, seen.agent):
+                continue
+            for image in seen.images:
+                if image.sha256 in pictures:
+                    kind = image.media_type.partition("/")[2]
+                    name = f"{seen.episode}-{seen.step:04}-{seen.agent}-{image.name}.{kind}"
+                    saved.append(directory / name)
+                    saved[-1].write_bytes(pictures[image.sha256])
+    except OSError as error:
+        raise RecordingError(f"{directory} cannot be written: {error.strerror}") from None
+    return saved
+
+
+def _picture(image: ImageRef) -> Text:
+    kind = image.media_type.partition("/")[2].upper()
+    size = f"{image.width} x {image.height} {kind}, {image.bytes / 1000:.0f} kB"
+    return Text.assemble(("  picture ", "bold cyan"), f"{image.name} ({size}): ", (image.title, "dim"))
+
+
+def _words(title: str, text: str, style: str) -> Text:
+    body = "\n".join(f"  │ {line}" for line in text.splitlines())
+    return Text.assemble((title, f"bold {style}"), "\n", (body, "dim"))

@@ -1,0 +1,81 @@
+"""Says in one sentence why a session could not be opened, and what to do.
+
+Zenoh reports a wrong host, a refused connection and a refused certificate alike, as a timeout; a plain connection
+attempt of our own tells them apart.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import socket
+from typing import TYPE_CHECKING
+
+from khala_protocol.bus.config import SECURE, address_of, host_port_of, transport_of
+
+if TYPE_CHECKING:
+    from khala_protocol.bus.config import BusConfig
+
+ATTEMPT_S = 1.0
+_LISTEN_ADVICE = (
+    ("Address already in use", "another process uses it; stop that one or take another port (0 is any free one)"),
+    ("Cannot assign requested address", "this machine has no such address; listen on one of its own"),
+    ("Permission denied", "not allowed; take a port above 1023, or a directory that you may write to"),
+    ("ENOENT", "its directory does not exist; make it first"),
+    ("EACCES", "not allowed; take a directory that you may write to"),
+    ("EAGAIN", "another process uses it; stop that one or take another path"),
+    ("resolve", "this host name is unknown; write an address"),
+    ("lookup", "this host name is unknown; write an address"),
+)
+_REASONS: tuple[tuple[type[OSError], str], ...] = (
+    (TimeoutError, "no answer; is a firewall between?"),
+    (ConnectionRefusedError, "nothing listens there"),
+    (FileNotFoundError, "there is no such socket"),
+    (socket.gaierror, "this host name is unknown"),
+)
+_INNER_MESSAGE = re.compile(r'(?:Str\(|msg: )"(.+?)"(?:\)|, location)')
+_SOURCE_PLACE = re.compile(r"\s+at /\S+\.rs:\d+\.?")
+
+
+async def why_not_connected(config: BusConfig) -> str:
+    """The sentence for a client that found no router."""
+    reasons = [f"{endpoint} ({await _attempt(endpoint)})" for endpoint in config.connect_to]
+    return (
+        f"no router answered within {config.connect_timeout_s:g} s at {', '.join(reasons)}: "
+        "start one there with `khala router`, or connect elsewhere"
+    )
+
+
+def why_not_listening(config: BusConfig, said: str) -> str:
+    """The sentence for a session that cannot listen, from what Zenoh said."""
+    endpoint = next((e for e in config.listen_on if address_of(e) in said), ", ".join(config.listen_on))
+    advice = next((advice for needle, advice in _LISTEN_ADVICE if needle in said), plain(said))
+    return f"cannot listen on {endpoint}: {advice}"
+
+
+def plain(said: str) -> str:
+    """An error text of Zenoh without the places in its source and the names of its types."""
+    said = _SOURCE_PLACE.sub("", said).strip()
+    inner = _INNER_MESSAGE.search(said)
+    return inner[1] if inner else said
+
+
+async def _attempt(endpoint: str) -> str:
+    try:
+        async with asyncio.timeout(ATTEMPT_S):
+            await _connect(endpoint)
+    except OSError as error:
+        return next((text for kind, text in _REASONS if isinstance(error, kind)), error.strerror or str(error))
+    if transport_of(endpoint) in SECURE:
+        return "something listens there, but it speaks no TLS or the certificates do not fit"
+    return "something listens there, but it is no Zenoh router without TLS"
+
+
+async def _connect(endpoint: str) -> None:
+    if transport_of(endpoint) == "quic":
+        raise TimeoutError  # over UDP, nothing can be told from an attempt
+    if transport_of(endpoint) == "unixsock-stream":
+        _, writer = await asyncio.open_unix_connection(address_of(endpoint))
+    else:
+        _, writer = await asyncio.open_connection(*host_port_of(endpoint))
+    writer.close()

@@ -1,0 +1,139 @@
+"""Key expressions of the bus, built and parsed in this one place.
+
+    khala/<run>/<topic>                          topic: run, report, result
+    khala/<run>/<side>/<agent>/<topic>           topic: briefing, observation, reply, message, exchange
+    khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
+    khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
+
+An agent may write only below its own name, which is what the access rules of a router enforce. Names of
+runs, sides, agents and instances are what `check_name` accepts, so that no name can widen a key expression.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+
+from khala_protocol.errors import WrongKey
+
+ROOT = "khala"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_PLACE = re.compile(r"0|[1-9][0-9]{0,3}")
+_LONGEST_SHOWN = 200
+
+
+class Topic(StrEnum):
+    """The last part of a key: what kind of message stands under it."""
+
+    RUN = "run"
+    REPORT = "report"
+    RESULT = "result"
+    BRIEFING = "briefing"
+    OBSERVATION = "observation"
+    IMAGE = "image"
+    REPLY = "reply"
+    MESSAGE = "message"
+    EXCHANGE = "exchange"
+    ALIVE = "alive"
+
+
+RUN_TOPICS = frozenset({Topic.RUN, Topic.REPORT, Topic.RESULT})
+AGENT_TOPICS = frozenset(Topic) - RUN_TOPICS
+NUMBERED_TOPICS = frozenset({Topic.ALIVE, Topic.IMAGE})
+"""Those of an agent that have one more part in their keys."""
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A parsed key.
+
+    `side` and `agent` are None on topics of the run; `instance` is the last part of a key of `alive` or `image`, and
+    None on others.
+    """
+
+    run: str
+    topic: Topic
+    side: str | None = None
+    agent: str | None = None
+    instance: str | None = None
+
+
+def check_name(name: str, what: str = "name") -> str:
+    """Returns `name` if it may stand in a key.
+
+    Raises:
+        WrongKey: it is empty, longer than 64 characters, or has other characters than letters, digits, `_`, `.`, `-`.
+    """
+    if not _NAME.fullmatch(name):
+        raise WrongKey(
+            f"{what} {name[:_LONGEST_SHOWN]!r} cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
+            "beginning with a letter or a digit"
+        )
+    return name
+
+
+def run_key(run: str, topic: Topic) -> str:
+    """Key of a topic of the whole run."""
+    if topic not in RUN_TOPICS:
+        raise WrongKey(f"{topic} belongs to an agent, not to the run")
+    return f"{ROOT}/{check_name(run, 'run')}/{topic}"
+
+
+def agent_key(run: str, side: str, agent: str, topic: Topic) -> str:
+    """Key of one agent's topic."""
+    if topic not in AGENT_TOPICS - NUMBERED_TOPICS:
+        raise WrongKey(f"{topic} is no topic of an agent")
+    return f"{_agent_root(run, side, agent)}/{topic}"
+
+
+def alive_key(run: str, side: str, agent: str, instance: str) -> str:
+    """Key of the liveliness token of one instance of an agent."""
+    return f"{_agent_root(run, side, agent)}/{Topic.ALIVE}/{check_name(instance, 'instance')}"
+
+
+def image_key(run: str, side: str, agent: str, place: int) -> str:
+    """Key of the picture that stands at this place, from 0, in each of an agent's observations."""
+    return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/{place}"
+
+
+def images_of(run: str, side: str, agent: str) -> str:
+    """Expression that matches all pictures of an agent."""
+    return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/*"
+
+
+def every_agent(run: str, topic: Topic) -> str:
+    """Expression that matches this topic of every agent of a run, on every side."""
+    if topic not in AGENT_TOPICS:
+        raise WrongKey(f"{topic} belongs to the run, not to an agent")
+    tail = f"{topic}/*" if topic in NUMBERED_TOPICS else str(topic)
+    return f"{ROOT}/{check_name(run, 'run')}/*/*/{tail}"
+
+
+def everything(run: str) -> str:
+    """Expression that matches every topic of a run; liveliness tokens are a space of their own."""
+    return f"{ROOT}/{check_name(run, 'run')}/**"
+
+
+def parse(key: str) -> Address:
+    """Takes a key apart.
+
+    Raises:
+        WrongKey: it is none of the forms at the top of this module.
+    """
+    parts = key.split("/")
+    if all(_NAME.fullmatch(part) for part in parts):
+        match parts:
+            case [root, run, topic] if root == ROOT and topic in RUN_TOPICS:
+                return Address(run, Topic(topic))
+            case [root, run, side, agent, Topic.ALIVE, instance] if root == ROOT:
+                return Address(run, Topic.ALIVE, side, agent, instance)
+            case [root, run, side, agent, Topic.IMAGE, place] if root == ROOT and _PLACE.fullmatch(place):
+                return Address(run, Topic.IMAGE, side, agent, place)
+            case [root, run, side, agent, topic] if root == ROOT and topic in AGENT_TOPICS - NUMBERED_TOPICS:
+                return Address(run, Topic(topic), side, agent)
+    raise WrongKey(f"{key[:_LONGEST_SHOWN]!r} is no key of this protocol")
+
+
+def _agent_root(run: str, side: str, agent: str) -> str:
+    return f"{ROOT}/{check_name(run, 'run')}/{check_name(side, 'side')}/{check_name(agent, 'agent')}"

@@ -1,0 +1,256 @@
+"""An MCAP file → messages; see `khala_protocol.recording`."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+import struct
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Self, TypeVar
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata, Statistics
+from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.writer import MCAP0_MAGIC
+
+from khala_protocol.codec import decode
+from khala_protocol.errors import PeerError, RecordingError
+from khala_protocol.keys import Topic, parse
+from khala_protocol.messages import Observation, Reply, Result, Run, Wire
+from khala_protocol.recording.recorder import KINDS, LIBRARY, METADATA, Recorder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from khala_protocol.keys import Address
+
+W = TypeVar("W", bound=Wire)
+
+_RUN_LEVEL = tuple(f"/{topic}" for topic in (Topic.RUN, Topic.RESULT))
+_LARGEST_RECORD = 2**30  # bytes; ours are a megabyte or one sample, a length beyond this is damage
+_BROKEN = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError, OverflowError, MemoryError)
+"""What mcap raises on bytes that are no MCAP file; found by cutting and flipping bytes of one."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One sample of a recording.
+
+    Attributes:
+        key: the key it was sent under.
+        payload: the bytes, as they went over the bus.
+        log_time_ns: wall time of the recorder, nanoseconds since 1970.
+        sequence: its place in the recording, from 0.
+    """
+
+    key: str
+    payload: bytes
+    log_time_ns: int
+    sequence: int
+
+    @cached_property
+    def address(self) -> Address | None:
+        """The key taken apart; None if it is none of this protocol."""
+        try:
+            return parse(self.key)
+        except PeerError:
+            return None
+
+    @cached_property
+    def message(self) -> Wire | None:
+        """The message; None if the bytes are none of this protocol, or a picture."""
+        if self.address is not None and self.address.topic is Topic.IMAGE:
+            return None
+        try:
+            return decode(self.payload)
+        except PeerError:
+            return None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an episode: the samples from its first observation to the first one of the next step.
+
+    A late reply stands in the step that it arrived in, not in the one that it answers.
+    """
+
+    episode: int
+    step: int
+    samples: tuple[Recorded, ...]
+
+    def of(self, kind: type[W]) -> tuple[W, ...]:
+        """The messages of one kind that were recorded during this step, in order."""
+        return tuple(sample.message for sample in self.samples if isinstance(sample.message, kind))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording that was looked through once; iterating reads the file again, sample by sample.
+
+    Attributes:
+        path: the file.
+        complete: False if it is torn or damaged, so that it may end in the middle of a run.
+        run: the run card; None if none was recorded.
+        results: how each episode ended.
+        counts: samples by key.
+        metadata: versions and whatever the recorder was given.
+    """
+
+    path: Path
+    complete: bool
+    run: Run | None
+    results: tuple[Result, ...]
+    counts: Mapping[str, int]
+    metadata: Mapping[str, str]
+
+    @classmethod
+    def open(cls, path: Path | str) -> Self:
+        """Looks through a recording.
+
+        Raises:
+            RecordingError: there is no such file, or it is no recording.
+        """
+        path = Path(path)
+        _require_recording(path)
+        counts: Counter[str] = Counter()
+        cards: list[Run] = []
+        results: list[Result] = []
+        metadata: dict[str, str] = {}
+        complete = ended = False
+        for record in _records(path):
+            match record:
+                case Recorded(key=key):
+                    counts[key] += 1
+                    if key.endswith(_RUN_LEVEL) and isinstance(record.message, Run):
+                        cards.append(record.message)
+                    elif key.endswith(_RUN_LEVEL) and isinstance(record.message, Result):
+                        results.append(record.message)
+                case Metadata() if record.name == METADATA:
+                    metadata |= record.metadata
+                case Statistics(message_count=expected):
+                    complete = counts.total() == expected
+                case Footer():
+                    ended = _ends_with_magic(path)
+        return cls(path, complete and ended, cards[0] if cards else None, tuple(results), dict(counts), metadata)
+
+    def __iter__(self) -> Iterator[Recorded]:
+        return read(self.path)
+
+    def of(self, kind: type[W], *, agent: str | None = None) -> Iterator[W]:
+        """All messages of one kind, of one agent or of all, in the order of the file."""
+        for sample in self:
+            address = sample.address
+            if address is None or KINDS.get(address.topic) is not kind or agent not in (None, address.agent):
+                continue
+            if isinstance(sample.message, kind):
+                yield sample.message
+
+    def images(self) -> Iterator[tuple[str, bytes]]:
+        """Every picture once, by the hash under which observations name it."""
+        seen: set[str] = set()
+        for sample in self:
+            if sample.address is None or sample.address.topic is not Topic.IMAGE:
+                continue
+            digest = hashlib.sha256(sample.payload).hexdigest()
+            if digest not in seen:
+                seen.add(digest)
+                yield digest, sample.payload
+
+    def observations(self, agent: str) -> Iterator[Observation]:
+        """What one agent was shown."""
+        return self.of(Observation, agent=agent)
+
+    def replies(self, step: int, episode: int = 0) -> tuple[Reply, ...]:
+        """All answers to one step, in order of arrival, late and repeated ones too."""
+        return tuple(reply for reply in self.of(Reply) if (reply.episode, reply.step) == (episode, step))
+
+    def by_step(self) -> Iterator[Step]:
+        """The samples step by step; what was recorded before the first observation belongs to no step."""
+        place: tuple[int, int] | None = None
+        samples: list[Recorded] = []
+        for sample in self:
+            if sample.key.endswith(f"/{Topic.OBSERVATION}") and isinstance(sample.message, Observation):
+                begun = (sample.message.episode, sample.message.step)
+                if place is None or begun > place:
+                    if place is not None:
+                        yield Step(*place, tuple(samples))
+                    place, samples = begun, []
+            if place is not None:
+                samples.append(sample)
+        if place is not None:
+            yield Step(*place, tuple(samples))
+
+
+def read(path: Path | str) -> Iterator[Recorded]:
+    """All samples in the order of the file, up to its end or to the first tear or damage.
+
+    Raises:
+        RecordingError: there is no such file, or it is no recording.
+    """
+    path = Path(path)
+    _require_recording(path)
+    return (record for record in _records(path) if isinstance(record, Recorded))
+
+
+def recover(path: Path | str, new_path: Path | str) -> Recording:
+    """Writes what can be read of a torn or damaged recording as a whole one, and returns it.
+
+    Raises:
+        RecordingError: `path` is no recording, or `new_path` exists or cannot be written.
+    """
+    old = Recording.open(path)
+    with Recorder(new_path, metadata=old.metadata) as recorder:
+        for sample in old:
+            recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    return Recording.open(new_path)
+
+
+def _require_recording(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            magic = file.read(MAGIC_SIZE)
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise RecordingError(f"{path} is a directory: name the recording in it") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror}") from None
+    if not magic:
+        raise RecordingError(f"{path} is empty: whatever recorded it was stopped before it wrote anything")
+    if magic != MCAP0_MAGIC:
+        raise RecordingError(f"{path} is no recording: it does not begin as an MCAP file")
+
+
+def _records(path: Path) -> Iterator[Recorded | McapRecord]:
+    """The records of the file, samples with their keys; ends quietly where the file is torn or damaged."""
+    keys: dict[int, str] = {}
+    expected: Iterator[int] = itertools.repeat(-1)
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file, validate_crcs=True, record_size_limit=_LARGEST_RECORD).records:
+                match record:
+                    case Header() if record.library.startswith(LIBRARY):
+                        expected = itertools.count()
+                    case Channel():
+                        keys[record.id] = record.topic
+                    case Message():
+                        if next(expected) not in (-1, record.sequence):
+                            return  # mcap skips a chunk whose head is damaged, as a record of unknown kind
+                        yield Recorded(keys[record.channel_id], record.data, record.log_time, record.sequence)
+                    case _:
+                        yield record
+        except _BROKEN:
+            return
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _ends_with_magic(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-MAGIC_SIZE, os.SEEK_END)
+        return file.read() == MCAP0_MAGIC

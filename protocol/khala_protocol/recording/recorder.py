@@ -1,0 +1,164 @@
+"""Messages → an MCAP file; see `khala_protocol.recording`."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import platform
+import time
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Self
+
+from mcap.writer import CompressionType, Writer
+
+from khala_protocol.errors import PeerError, RecordingError
+from khala_protocol.keys import Topic, parse
+from khala_protocol.messages import MESSAGE_TYPES, SCHEMA_VERSION, Wire
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from types import TracebackType
+
+KINDS: Mapping[Topic, type[Wire]] = {Topic(model.model_fields["kind"].default): model for model in MESSAGE_TYPES}
+"""The kind of message that stands under each topic."""
+
+LIBRARY = "khala"
+"""Name of the writer in a file's header; its samples are numbered from 0 without gaps, across all keys."""
+
+METADATA = "khala"
+"""Name of the metadata record that holds the versions."""
+
+
+class Recorder:
+    """Writes one recording. A context manager; a file that was left without `close` is readable up to the last flush.
+
+    Args:
+        path: the file, which must not exist yet; missing directories are made.
+        clock: wall time in nanoseconds since 1970, for the log times.
+        metadata: texts to keep with the versions of Khala, Python and the schema.
+
+    Raises:
+        RecordingError: the file exists or cannot be written.
+    """
+
+    def __init__(
+        self, path: Path | str, *, clock: Callable[[], int] = time.time_ns, metadata: Mapping[str, str] | None = None
+    ) -> None:
+        self.path = Path(path)
+        self._clock = clock
+        self._schemas: dict[type[Wire], int] = {}
+        self._channels: dict[str, int] = {}
+        self._count = 0
+        self._file = _create(self.path)
+        self._writer = Writer(self._file, compression=CompressionType.ZSTD)
+        try:
+            with _writing(self.path):
+                self._writer.start(library=f"{LIBRARY} {_khala_version()}")
+                self._writer.add_metadata(METADATA, _versions() | dict(metadata or {}))
+                self._flush()
+        except RecordingError:
+            with contextlib.suppress(OSError):  # it closes, but says once more what is wrong
+                self._file.close()
+            raise
+
+    def write(self, key: str, payload: bytes, *, log_time_ns: int | None = None) -> None:
+        """Writes bytes as they went over the bus; bytes that are no message are evidence and are kept too.
+
+        Raises:
+            RecordingError: the file cannot be written any more.
+        """
+        self._require_open()
+        now = self._clock() if log_time_ns is None else log_time_ns
+        with _writing(self.path):
+            channel = self._channels.get(key) or self._register(key)
+            self._writer.add_message(channel, now, payload, publish_time=now, sequence=self._count)
+        self._count += 1
+
+    def flush(self) -> None:
+        """Hands everything written so far to the operating system: from here on a killed process cannot lose it."""
+        self._require_open()
+        with _writing(self.path):
+            self._flush()
+
+    def close(self) -> None:
+        """Ends the file, with index and statistics. May be called twice."""
+        if self._file.closed:
+            return
+        with _writing(self.path), self._file:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap annotates no return here
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _flush(self) -> None:
+        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap annotates no return here
+
+    def _register(self, key: str) -> int:
+        model = _kind_of(key)
+        if model is None:
+            channel = self._writer.register_channel(key, "", 0)
+        else:
+            channel = self._writer.register_channel(
+                key, "json", self._schemas.get(model) or self._register_schema(model)
+            )
+        self._channels[key] = channel
+        return channel
+
+    def _register_schema(self, model: type[Wire]) -> int:
+        schema = json.dumps(model.model_json_schema()).encode()
+        self._schemas[model] = self._writer.register_schema(f"khala.{model.__name__}", "jsonschema", schema)
+        return self._schemas[model]
+
+    def _require_open(self) -> None:
+        if self._file.closed:
+            raise RecordingError(f"{self.path} was closed: open another recording to write more")
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(
+            f"{path} cannot be written: {error.strerror}; what was flushed before can still be read"
+        ) from error
+
+
+def _create(path: Path) -> IO[bytes]:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("xb")
+    except FileExistsError:
+        if path.is_dir():
+            raise RecordingError(f"{path} is a directory: name a file in it, such as {path / 'run.mcap'}") from None
+        if path.exists():
+            raise RecordingError(
+                f"{path} exists already: choose another name, recordings are not overwritten"
+            ) from None
+        raise RecordingError(f"{path} cannot be written: a part of its path is a file, not a directory") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written: {error.strerror}; choose another place") from None
+
+
+def _kind_of(key: str) -> type[Wire] | None:
+    try:
+        return KINDS.get(parse(key).topic)
+    except PeerError:
+        return None
+
+
+def _versions() -> dict[str, str]:
+    return {"khala": _khala_version(), "python": platform.python_version(), "schema": str(SCHEMA_VERSION)}
+
+
+def _khala_version() -> str:
+    try:
+        return version("khala")
+    except PackageNotFoundError:  # run from a checkout that was not installed
+        return "unknown"

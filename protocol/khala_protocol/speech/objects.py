@@ -1,0 +1,126 @@
+"""Calls and messages that are written as JSON: an object that names an action, its arguments and perhaps a team.
+
+    {"team": "Stalker-1", "action": "Attack_Unit", "args": ["0x1008c0001"]}
+    {"name": "Move_Screen", "arguments": {"screen": [3, 4]}}
+    {"to": "Commander", "text": "two Roaches"}
+
+Models that were trained on tool calls fall into it. An object counts only if the value for the action is a name, or a
+call without angle brackets; whatever else stands in JSON is read as text. Above it: `khala_protocol.speech.reader`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from khala_protocol.speech.arguments import read_arguments
+from khala_protocol.speech.marks import Malformed
+
+if TYPE_CHECKING:
+    from khala_protocol.messages import Point
+
+NAMES = ("action", "name", "function", "command", "tool")
+ARGUMENTS = ("args", "arguments", "parameters", "params", "input")
+TEAMS = ("team", "team_name", "group")
+RECIPIENTS = ("to", "recipient")
+TEXTS = ("text", "message", "content")
+LONGEST = 2_000
+"""Characters of an object that are looked at."""
+_LOOKS_LIKE_ONE = re.compile(
+    rf"\{{[^{{}}]{{0,200}}?\"(?:{'|'.join((*NAMES, *RECIPIENTS))})\"\s*+:\s*+[\"{{]", re.IGNORECASE
+)
+_CALL = re.compile(r"(?P<name>[A-Za-z]\w{0,80}+)(?:\((?P<inside>[^<>]*)\))?")
+_DECODER = json.JSONDecoder()
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectCall:
+    """A call as an object: what it says, and the offset behind it."""
+
+    name: str
+    args: tuple[str | Point, ...]
+    team: str | None
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectMessage:
+    """A message as an object."""
+
+    recipient: str
+    text: str
+    end: int
+
+
+def object_at(text: str, at: int) -> ObjectCall | ObjectMessage | None:
+    """What the object at this `{` stands for; None if it is neither a call nor a message."""
+    if not _LOOKS_LIKE_ONE.match(text, at):
+        return None
+    try:
+        found, length = _DECODER.raw_decode(text[at : at + LONGEST])
+    except (ValueError, RecursionError):
+        return None
+    to, words = _first(found, RECIPIENTS), _first(found, TEXTS)
+    if isinstance(to, str) and isinstance(words, str) and to.strip() and words.strip():
+        return ObjectMessage(to.strip(), words.strip(), at + length)
+    return _call(found, at + length)
+
+
+def _call(found: object, end: int) -> ObjectCall | None:
+    named = _first(found, NAMES)
+    if isinstance(found, dict) and isinstance(named, dict):  # {"function": {"name": …, "arguments": …}}
+        found, named = {**found, **named}, _first(named, NAMES)
+    call = _CALL.fullmatch(named.strip()) if isinstance(named, str) else None
+    if call is None or not (call["inside"] is not None or "_" in call["name"] or _has(found, ARGUMENTS)):
+        return None
+    given = _first(found, ARGUMENTS)
+    team = _first(found, TEAMS) or _first(given, TEAMS)
+    if isinstance(given, dict):
+        given = {key: value for key, value in given.items() if str(key).lower() not in TEAMS}
+    try:
+        args = read_arguments(call["inside"]) if call["inside"] else tuple(_values(given))
+    except Malformed:
+        return None
+    return ObjectCall(call["name"], args, team if isinstance(team, str) else None, end)
+
+
+def _has(found: object, keys: tuple[str, ...]) -> bool:
+    return isinstance(found, dict) and any(key in found for key in keys)
+
+
+def _first(found: object, keys: tuple[str, ...]) -> object:
+    if not isinstance(found, dict):
+        return None
+    lowered = {str(key).lower(): value for key, value in found.items()}
+    return next((lowered[key] for key in keys if key in lowered), None)
+
+
+def _values(given: object) -> list[str | Point]:
+    """Arguments as they stand in JSON: a list, an object of named ones, a single one, or text of one of these."""
+    if isinstance(given, str) and given.lstrip()[:1] in ("{", "["):
+        given = _loaded(given)
+    match given:
+        case None | "":
+            return []
+        case {"x": x, "y": y}:
+            return _values([x, y])
+        case dict():
+            return _values(list(given.values()))
+        case list() if not _is_point(given):
+            return [value for item in given for value in _values(item)]
+        case _:
+            return list(read_arguments(given if isinstance(given, str) else json.dumps(given)))
+
+
+def _loaded(given: str) -> object:
+    try:
+        found = json.loads(given)
+    except (ValueError, RecursionError):
+        return given.strip("{[ ")
+    return found if isinstance(found, dict | list) else given
+
+
+def _is_point(given: list[object]) -> bool:
+    return len(given) == len("xy") and all(isinstance(number, int | float) for number in given)

@@ -1,0 +1,347 @@
+"""One pass over a reply, from mark to mark and never back.
+
+Above it: `khala_protocol.speech`, which says the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting` and
+`objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from khala_protocol.messages import Call, Rejection
+from khala_protocol.speech.arguments import read_arguments
+from khala_protocol.speech.calls import (
+    LISTEN_NAMES,
+    MESSAGE_NAMES,
+    Opening,
+    close_bare,
+    close_parentheses,
+    closing_tags,
+    element_at,
+    in_words_at,
+    is_markup,
+    is_talk,
+    loose_arguments,
+    naked_at,
+    naked_talk_at,
+    opening_at,
+    refuse_words,
+    segment_end,
+    stands_alone,
+)
+from khala_protocol.speech.headings import (
+    JSON_KEY,
+    SENTENCE_END,
+    Heading,
+    Section,
+    Tone,
+    heading_at,
+    json_heading_at,
+    tag_heading_at,
+)
+from khala_protocol.speech.marks import SHORT, Malformed, to_ascii, unescaped
+from khala_protocol.speech.objects import ObjectMessage, object_at
+from khala_protocol.speech.quoting import MessageReader
+from khala_protocol.speech.said import Gathering, ListenTo, MessageTo, Speech
+from khala_protocol.speech.words import NEGATION
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_protocol.messages import Point
+    from khala_protocol.speech.quoting import Addressed
+
+
+def parse(text: str) -> Speech:
+    """Reads a reply. Never raises; see the table of `khala_protocol.speech`."""
+    walk = _Walk(text)
+    walk.run()
+    return walk.gathering.speech()
+
+
+_THINK = (
+    r"<\s*+{slash}\s*+(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)\s*+>|\[{slash}THINK\]|◁{slash}think▷"
+)
+_CHANNEL = r"<\|channel\|>\s*+"
+_THINKS = rf"{_THINK.format(slash='')}|<\|begin_of_thought\|>|{_CHANNEL}(?:analysis|commentary)\b[^<>\n]*+<\|message\|>"
+_THOUGHT = rf"{_THINK.format(slash='/')}|<\|end_of_thought\|>"
+_THINK_ENDS = re.compile(rf"{_THOUGHT}|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
+_MAY_BEGIN = re.compile(r"[\n<\[◁{\"'.!?;。]")
+"""First characters of what `_NEXT` matches; a search for one of them is ten times faster."""
+_NEXT = re.compile(
+    rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<think>{_THINKS})|(?P<comment><!--)"
+    r"|(?P<speaker><\|(?:im_)?start\|>\s*+user\b)|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
+    r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\())"
+    rf"|(?P<sentence>{SENTENCE_END}|{JSON_KEY})",
+    re.IGNORECASE,
+)
+_OBJECT_AHEAD = re.compile(r"[\s\[,]*+\{")
+_OTHER_SPEAKER = re.compile(r"[*_#]*+(?:user|human)[*_]*+:", re.IGNORECASE)
+_GENERIC = re.compile(r"[A-Za-z0-9]<")
+_NEGATED = re.compile(rf"(?:{NEGATION})[\s`*\"'_]*+$", re.IGNORECASE)
+_STRUCK = re.compile(r"~~[\s`*]*+$")
+_STRUCK_BEHIND = re.compile(r"[ \t`*]*+~~")
+_NO_HEADING = ("<", "\n", "")
+_LOOKED_BACK = 24
+_DIRECTLY_ABOVE = 80
+
+
+class _Walk:
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._plain = to_ascii(text)
+        self._messages = MessageReader(self._plain)
+        self._start_over()
+
+    def _start_over(self) -> None:
+        self.gathering = Gathering()
+        self._section = Section.NONE
+        self._aside_until = 0
+        self._team: str | None = None
+        self._team_above_section: str | None = None
+        self._team_end = -_DIRECTLY_ABOVE
+
+    def run(self) -> None:
+        at = self._line(0)
+        while place := _MAY_BEGIN.search(self._plain, at):
+            mark = _NEXT.match(self._plain, place.start())
+            at = place.end() if mark is None else _READS[str(mark.lastgroup)](self, mark)
+
+    @cached_property
+    def _closing_tags(self) -> frozenset[str]:
+        return closing_tags(self._plain)
+
+    # Each of the following takes what stands at one place and returns the offset behind it.
+
+    def comment(self, mark: re.Match[str]) -> int:  # S24
+        return max(mark.end(), self._plain.find("-->", mark.end()))
+
+    def speaker(self, mark: re.Match[str]) -> int:  # S26
+        return len(self._plain) if self.gathering else mark.end()
+
+    def line(self, mark: re.Match[str]) -> int:
+        return self._line(mark.end())
+
+    def sentence(self, mark: re.Match[str]) -> int:
+        return self._headings(mark.end(), line_start=False)
+
+    def object(self, mark: re.Match[str]) -> int:
+        end = self._object(mark.start())
+        return mark.end() if end is None else self._headings(end, line_start=False)
+
+    def quoted(self, mark: re.Match[str]) -> int:
+        return self._naked(mark.end()) or mark.end()
+
+    def angle(self, mark: re.Match[str]) -> int:
+        return self._angle(mark.start())
+
+    def _line(self, at: int) -> int:
+        if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
+            return len(self._plain)
+        at = self._headings(at, line_start=True)
+        if self._section is Section.ACTIONS and (words := in_words_at(self._plain, at)):
+            reason = f"a call stands in angle brackets: write <{words['name'][:SHORT]}(...)>"
+            self._fault(words.start(), words.end(), words["name"], reason)
+            return words.end()
+        return at
+
+    def _headings(self, at: int, *, line_start: bool) -> int:
+        while self._plain[at : at + 1] not in _NO_HEADING:
+            brace = _OBJECT_AHEAD.match(self._plain, at)
+            if brace and (end := self._object(brace.end() - 1)):
+                at = end
+            elif heading := heading_at(self._plain, at, line_start=line_start):
+                self._enter(heading, at)
+                at = heading.end
+            else:
+                break
+            line_start = False
+        while self._plain[at : at + 1] not in _NO_HEADING and (naked := self._naked(at)):
+            at = naked
+        return at
+
+    def _enter(self, heading: Heading, at: int) -> None:
+        if heading.section and heading.section is Section.ACTIONS and heading.tone is Tone.INSTEAD:
+            self.gathering.withdraw_orders(heading.team)
+        if heading.explains and self._section is Section.ACTIONS and self.gathering.has_orders():
+            line_end = self._plain.find("\n", heading.end)
+            rest = self._plain[heading.end : line_end if line_end >= 0 else None]
+            if rest.strip("*_#: \t"):
+                self._aside_until = heading.end + len(rest)
+            else:
+                self._section = Section.ANALYSIS
+        if heading.section:
+            self.gathering.open_block(self._plain[at : heading.end])
+            if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip('#*_> \t\n",{['):
+                self._team_above_section = self._team  # S14
+            elif (self._section, heading.section) != (Section.ANALYSIS, Section.ACTIONS):
+                self._team_above_section = None
+            self._team = self._team if heading.numbered else self._team_above_section
+            if heading.tone is Tone.SPEAK_OF and heading.section is Section.ACTIONS:
+                self._section = Section.ANALYSIS
+            else:
+                self._section = heading.section
+                self.gathering.headed.add(heading.section)
+        if heading.names_team:
+            self._team = heading.team
+            self._team_end = heading.end
+
+    def end_of_thoughts(self, end: re.Match[str]) -> int:  # S9
+        self._start_over()
+        return self._line(end.end())
+
+    def thoughts(self, begin: re.Match[str]) -> int:
+        end = _THINK_ENDS.search(self._plain, begin.end())
+        if end is not None:
+            return self._line(end.end())
+        reason = "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>"
+        self._section = Section.ACTIONS  # never a mention, wherever it stands
+        self._fault(begin.start(), begin.end(), "", reason)
+        return len(self._text)
+
+    def team(self, mark: re.Match[str]) -> int:
+        heading = json_heading_at(self._plain, mark.start())
+        if heading is None:
+            return mark.end()
+        self._enter(heading, mark.start())
+        return heading.end
+
+    def _object(self, start: int) -> int | None:
+        """A call or a message as an object of JSON; None if there is none at this `{`."""
+        found = object_at(self._plain, start)
+        if found is None:
+            return None
+        if isinstance(found, ObjectMessage):
+            self._add(MessageTo(found.recipient, found.text, start, found.end), Section.COMMUNICATIONS, start)
+            return found.end
+        self._add_call(found.name, found.args, start, found.end, team=found.team)
+        return found.end
+
+    def _naked(self, at: int) -> int | None:
+        """A call without angle brackets; None if there is none."""
+        talk, naked = naked_talk_at(self._plain, at), naked_at(self._plain, at)
+        if (found := talk or naked) is None:
+            return None
+        start, name = found.start("call"), found["name"]
+        try:
+            if talk:
+                return self._message(start, self._messages.read(talk.end(), naked=True))
+            if not stands_alone(self._plain, found.end()):
+                self._fault(start, found.end(), name, f"a call stands in angle brackets: write <{name[:SHORT]}(...)>")
+            elif is_talk(name):
+                self._listen(start, found.end(), name, found["inside"])
+            else:
+                self._add_call(name, read_arguments(found["inside"]), start, found.end(), team=found["team"])
+            return found.end()
+        except Malformed as error:
+            end = naked.end() if naked else found.end()
+            self._fault(start, end, name, str(error))
+            return end
+
+    def _angle(self, start: int) -> int:
+        if heading := tag_heading_at(self._plain, start):
+            self._enter(heading, start)
+            return self._headings(heading.end, line_start=False)
+        opening = opening_at(self._plain, start)
+        if opening is None or (not opening.has_parenthesis and _GENERIC.match(self._plain, start - 1)):  # S7
+            return start + 1
+        try:
+            end = self._call(start, opening)
+        except Malformed as error:
+            if opening.is_call_like:
+                self._fault(start, segment_end(self._plain, start), opening.name, str(error))
+            return opening.end
+        return self._headings(end, line_start=False)
+
+    def _call(self, start: int, opening: Opening) -> int:
+        if not opening.has_parenthesis:
+            return self._without_parentheses(start, opening)
+        name = opening.name
+        if name.lower() in MESSAGE_NAMES:
+            return self._message(start, self._messages.read(opening.end))
+        inner_end, end = close_parentheses(self._plain, opening)
+        inside = self._plain[opening.end : inner_end]
+        if is_talk(name):
+            self._listen(start, end, name, inside)
+        else:
+            self._add_call(name, read_arguments(inside), start, end)
+        return end
+
+    def _without_parentheses(self, start: int, opening: Opening) -> int:
+        name, end = opening.name, close_bare(self._plain, opening.end)
+        if name.lower() in MESSAGE_NAMES:
+            reader = self._messages
+            if found := reader.attributes(opening.end) if end is None else reader.element(end):
+                return self._message(start, found)
+        found_at = loose_arguments(self._plain, opening.end) if end is None else element_at(self._plain, end, name)
+        if found_at and "_" in name and (args := self._typed(*found_at[:2])):
+            self._add_call(name, args, start, found_at[2])
+            return found_at[2]
+        if end is None:
+            refuse_words(self._plain, opening)
+        if not is_markup(name, self._closing_tags):
+            if is_talk(name):
+                self._listen(start, end, name, "")
+            else:
+                self._add_call(name, (), start, end)
+        return end
+
+    def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
+        """Arguments at this place, if all of them are tags and points; otherwise none."""
+        args = read_arguments(self._plain[start:stop])
+        return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
+
+    def _message(self, start: int, found: Addressed) -> int:
+        text = unescaped(self._text[found.start : found.stop])
+        self._add(MessageTo(found.recipient, text, start, found.end), Section.COMMUNICATIONS, start)
+        return found.end
+
+    def _listen(self, start: int, end: int, name: str, inside: str) -> None:
+        if name.lower() not in LISTEN_NAMES:
+            raise Malformed("a message needs a recipient and a text: write <MessageTo(Name, '''text''')>")
+        channels = [channel for channel in read_arguments(inside) if isinstance(channel, str)]
+        if not channels:
+            raise Malformed("a channel is missing: write <ListenTo(Name)>")
+        for channel in channels:
+            self._add(ListenTo(channel.split("=")[-1].strip("\"' "), start, end), Section.COMMUNICATIONS, start)
+
+    def _add_call(
+        self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
+    ) -> None:
+        self._add(Call(name=name, args=args, team=team or self._team, start=start, end=end), Section.ACTIONS, start)
+
+    def _fault(self, start: int, end: int, name: str, reason: str) -> None:
+        text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
+        fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
+        kind = Section.COMMUNICATIONS if is_talk(name) else Section.ACTIONS
+        self.gathering.add(fault, kind, self._section_at(start))
+
+    def _add(self, item: Call | MessageTo | ListenTo, kind: Section, start: int) -> None:
+        before = self._plain[max(0, start - _LOOKED_BACK) : start]
+        before = before[before.rfind("\n") + 1 :]
+        taken_back = False
+        if before and not before.isspace():
+            struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
+            taken_back = bool(struck or _NEGATED.search(before))
+        self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
+
+    def _section_at(self, start: int) -> Section:
+        """The section that something at this place stands in."""
+        return Section.ANALYSIS if start < self._aside_until else self._section
+
+
+_READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {
+    "line": _Walk.line,
+    "sentence": _Walk.sentence,
+    "thought": _Walk.end_of_thoughts,
+    "think": _Walk.thoughts,
+    "comment": _Walk.comment,
+    "speaker": _Walk.speaker,
+    "object": _Walk.object,
+    "team": _Walk.team,
+    "quoted": _Walk.quoted,
+    "angle": _Walk.angle,
+}
+"""What reads on at each kind of mark; each returns the offset behind what it read."""

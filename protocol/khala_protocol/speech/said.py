@@ -1,0 +1,164 @@
+"""What a reply says, and what of all that stands in it counts.
+
+`khala_protocol.speech.reader` walks over the text and puts here what it finds; which calls are orders, which are only spoken
+of, and what was said twice is decided when the whole is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from khala_protocol.messages import Call, Rejection
+from khala_protocol.speech.headings import Section
+
+
+@dataclass(frozen=True, slots=True)
+class MessageTo:
+    """Words for another agent, or for everybody on a channel; `reply[start:end]` is the call."""
+
+    recipient: str
+    text: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class ListenTo:
+    """The wish to hear a channel; `reply[start:end]` is the call."""
+
+    channel: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Speech:
+    """What a reply says, in the order of the text.
+
+    Attributes:
+        calls: actions to carry out.
+        messages: messages to agents or channels.
+        listens: channels to listen to.
+        faults: what looked like one of these and is none, reason `malformed`.
+        mentions: actions that are only spoken of and not to be carried out (rules S10, S24, S25, S27, H18, H19).
+    """
+
+    calls: tuple[Call, ...] = ()
+    messages: tuple[MessageTo, ...] = ()
+    listens: tuple[ListenTo, ...] = ()
+    faults: tuple[Rejection, ...] = ()
+    mentions: tuple[Call, ...] = ()
+
+
+Item: TypeAlias = Call | MessageTo | ListenTo | Rejection
+
+
+@dataclass(slots=True)
+class _Found:
+    item: Item
+    kind: Section
+    """The section that it belongs under."""
+    section: Section
+    """The section that it stands in."""
+    block: int
+    taken_back: bool
+
+    @property
+    def in_prose(self) -> bool:
+        return self.section in (Section.NONE, Section.ANALYSIS)
+
+
+@dataclass(slots=True)
+class Gathering:
+    """All that was found in a reply so far."""
+
+    headed: set[Section] = field(default_factory=set)
+    """The sections that have a heading."""
+    _found: list[_Found] = field(default_factory=list)
+    _orders: dict[str | None, list[_Found]] = field(default_factory=dict)
+    """What was ordered and not withdrawn, by team."""
+    _gave_orders: bool = False
+    _titles: list[str] = field(default_factory=lambda: [""])
+    """Headings of the blocks of the reply, by their numbers; the first one has none."""
+
+    def __bool__(self) -> bool:
+        return bool(self._found)
+
+    def open_block(self, title: str) -> None:
+        """A section begins under this heading."""
+        self._titles.append("".join(filter(str.isalnum, title)).casefold())
+
+    def add(self, item: Item, kind: Section, section: Section, *, taken_back: bool = False) -> None:
+        """Something was found.
+
+        Args:
+            item: what it is.
+            kind: the section that it belongs under.
+            section: the section that it stands in.
+            taken_back: whether words around it say that it is not meant.
+        """
+        found = _Found(item, kind, section, len(self._titles) - 1, taken_back)
+        self._found.append(found)
+        if isinstance(item, Call | Rejection) and kind is Section.ACTIONS:
+            self._orders.setdefault(item.team, []).append(found)
+            self._gave_orders |= section is Section.ACTIONS
+
+    def has_orders(self) -> bool:
+        """Whether a section of actions gave any."""
+        return self._gave_orders
+
+    def withdraw_orders(self, team: str | None) -> None:
+        """What was ordered so far is not meant any more; of one team only, if it is named."""
+        for name in list(self._orders) if team is None else [team]:
+            for found in self._orders.pop(name, ()):
+                found.taken_back = True
+
+    def speech(self) -> Speech:
+        """What counts of it."""
+        repeated = self._repeated()
+        said: list[Item] = []
+        mentioned: list[Call] = []
+        for found in self._found:
+            unheeded = found.in_prose and found.kind in self.headed
+            if not (found.taken_back or unheeded or (found.kind, found.block) in repeated):
+                said.append(found.item)
+            elif isinstance(found.item, Call):
+                mentioned.append(found.item)
+        return Speech(
+            calls=tuple(item for item in said if isinstance(item, Call)),
+            messages=tuple(item for item in said if isinstance(item, MessageTo)),
+            listens=tuple(item for item in said if isinstance(item, ListenTo)),
+            faults=tuple(item for item in said if isinstance(item, Rejection)),
+            mentions=tuple(mentioned),
+        )
+
+    def _repeated(self) -> set[tuple[Section, int]]:
+        """Blocks that say under the same heading what an earlier one says (rule S27)."""
+        if len(set(self._titles)) == len(self._titles):
+            return set()
+        blocks: dict[tuple[Section, int], list[tuple[object, ...]]] = {}
+        for found in self._found:
+            if not (found.taken_back or found.in_prose):
+                blocks.setdefault((found.kind, found.block), []).append(_words(found.item))
+        seen: set[tuple[object, ...]] = set()
+        repeated = set()
+        for (kind, block), words in blocks.items():
+            page = (kind, self._titles[block], tuple(words))
+            if page in seen:
+                repeated.add((kind, block))
+            seen.add(page)
+        return repeated
+
+
+def _words(item: Item) -> tuple[object, ...]:
+    """What something says, without its place."""
+    match item:
+        case Call():
+            return item.team, item.name, item.args
+        case MessageTo():
+            return item.recipient, item.text
+        case ListenTo():
+            return (item.channel,)
+        case Rejection():
+            return item.team, item.text

@@ -1,0 +1,365 @@
+"""What players and the debug interface may ask of the world, already validated.
+
+The way in for orders: the API resolves which ability is meant and for which units; here an order becomes the units'
+current one or waits in their queues. Everything takes effect when the world next advances. Units that can't do what
+is asked are left alone, and the slots that took the order are returned.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.combat import lifecycle
+from khala_simulator.combat.targets import disengage, engage, weapon_for
+from khala_simulator.combat.traits import refresh
+from khala_simulator.economy import harvesting
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import (
+    ATTACK,
+    HOLD_POSITION,
+    LOOKS_AROUND,
+    MOVE,
+    NEEDS_TARGET,
+    PATROL,
+    SCAN_MOVE,
+    WALKS,
+    Order,
+    OrderKind,
+)
+from khala_simulator.world.players import GameResult
+from khala_simulator.world.world import NO_TAG
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_simulator.tables.catalog import UnitType
+    from khala_simulator.world.world import World
+
+QUEUE_LIMIT = 32
+
+Point = tuple[float, float]
+
+
+def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Walk to a point and look at nobody on the way."""
+    order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
+    return give(world, [s for s in slots if can_move(world, s)], order, queue=queue)
+
+
+def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Walk after another unit (a tag)."""
+    takers = [s for s in slots if can_move(world, s) and world.tag_of(s) != target]
+    return give(world, takers, Order(OrderKind.FOLLOW, MOVE, target=target), queue=queue)
+
+
+def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Walk to a point and fight what is met; a unit without a weapon scan-moves."""
+    taken: list[int] = []
+    for slot in slots:
+        if can_attack(world, slot):
+            order = Order(OrderKind.ATTACK_MOVE, ATTACK, point=_inside(world, point))
+        elif can_move(world, slot):
+            order = Order(OrderKind.SCAN_MOVE, SCAN_MOVE, point=_inside(world, point))
+        else:
+            continue
+        taken += give(world, [slot], order, queue=queue)
+    return taken
+
+
+def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Attack one unit (a tag) until it is dead; allies too, when told so."""
+    victim = world.slot_of(target)
+    if victim == NOBODY:
+        return []
+    takers = [s for s in slots if s != victim and can_reach(world, s, victim)]
+    return give(world, takers, Order(OrderKind.ATTACK_UNIT, ATTACK, target=target), queue=queue)
+
+
+def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
+    """Go back and forth between here and a point, fighting what is met."""
+    taken: list[int] = []
+    for slot in slots:
+        if can_move(world, slot):
+            x, y = world.pos[slot]
+            order = Order(OrderKind.PATROL, PATROL, point=_inside(world, point), origin=(float(x), float(y)))
+            taken += give(world, [slot], order, queue=queue)
+    return taken
+
+
+def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Drop all orders; queued, it ends the queue there."""
+    taken = [s for s in slots if _commandable(world.unit_type(s))]
+    if not queue:
+        for slot in taken:
+            world.queue[slot] = []
+            if not world.bound[slot]:
+                begin(world, slot, None)
+    return taken
+
+
+def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Stay on the spot and fight only what is in reach."""
+    takers = [s for s in slots if can_move(world, s)]
+    return give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
+
+
+def smart(
+    world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
+) -> list[int]:
+    """The right click: attack an enemy, harvest a resource, drop off a load, follow anybody else, walk to a point."""
+    victim = world.slot_of(target)
+    if victim == NOBODY:
+        return [] if point is None else move(world, slots, point, queue=queue)
+    slots = list(slots)
+    foes = [s for s in slots if is_enemy(world, int(world.owner[s]), int(world.owner[victim]))]
+    taken = attack_unit(world, foes, target, queue=queue) + gather(world, slots, target, queue=queue)
+    if harvesting.is_drop_off(world, victim):
+        loaded = [s for s in slots if world.load[s] and world.owner[s] == world.owner[victim]]
+        taken += return_cargo(world, loaded, queue=queue)
+    rest = [s for s in slots if s not in taken]
+    return taken + follow(world, rest, target, queue=queue)
+
+
+def gather(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
+    """Harvest a mineral field or a gas structure (a tag) until told otherwise."""
+    resource = world.slot_of(target)
+    taken: list[int] = []
+    for slot in slots:
+        if harvesting.can_harvest(world, slot, resource):
+            ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][0]
+            taken += give(world, [slot], Order(OrderKind.GATHER, ability.id if ability else 0, target), queue=queue)
+    return taken
+
+
+def return_cargo(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
+    """Carry what is loaded to the nearest town hall, and go on harvesting."""
+    taken: list[int] = []
+    for slot in slots:
+        ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][1]
+        if ability is not None and (queue or world.load[slot]):
+            taken += give(world, [slot], Order(OrderKind.RETURN, ability.id), queue=queue)
+    return taken
+
+
+def surrender(world: World, player: int) -> None:
+    """Give up: defeat for the player, and victory for the last one who has not given up."""
+    world.players[player].surrendered = True
+    playing = [p for p in world.players[1:] if not p.surrendered]
+    if len(playing) <= 1:
+        results = {p.id: GameResult.DEFEAT if p.surrendered else GameResult.VICTORY for p in world.players[1:]}
+        world.end(results)
+
+
+def debug_kill(world: World, tags: Iterable[int]) -> None:
+    """Kill units; unknown tags are ignored. They die when the world next advances, credited to nobody."""
+    for tag in tags:
+        slot = world.slot_of(tag)
+        if slot != NOBODY:
+            world.life[slot] = 0.0
+            world.attacker[slot] = NOBODY
+
+
+def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:
+    """Create complete units exactly at a point, all on each other; returns their slots."""
+    unit = world.catalog.unit(type_id)
+    return [lifecycle.spawn(world, unit, owner, point) for _ in range(quantity)]
+
+
+def debug_set_value(world: World, tag: int, *, life: float | None = None, shields: float | None = None,
+                    energy: float | None = None) -> None:  # fmt: skip
+    """Set a unit's life, shields or energy, within what its type can have; unknown tags are ignored."""
+    slot = world.slot_of(tag)
+    if slot == NOBODY:
+        return
+    at = (int(world.owner[slot]), int(world.type[slot]))
+    if life is not None:
+        world.life[slot] = min(life, world.stats.life_max[at])
+    if shields is not None:
+        world.shields[slot] = min(shields, world.stats.shields_max[at])
+    if energy is not None:
+        world.energy[slot] = min(energy, world.stats.energy_max[at])
+
+
+def debug_switch(world: World, player: int, name: str) -> None:
+    """Switch a debug state of a player's on, or off again."""
+    cheats = world.players[player].cheats
+    if name in cheats:
+        cheats.remove(name)
+    else:
+        cheats.append(name)
+    for slot in world.units_of(player).tolist():
+        refresh(world, slot)
+
+
+def debug_upgrade(world: World, player: int) -> None:
+    """Give a player every upgrade that can be researched."""
+    for ability in world.catalog.abilities:
+        if ability.effect == "research":
+            grant_upgrade(world, player, world.catalog.upgrade(ability.upgrade).id)
+
+
+def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
+    """Give a player a finished upgrade; its numbers count from now on, and more life is there at once."""
+    owned = world.players[player].upgrades
+    if upgrade_id not in owned:
+        owned.append(world.catalog.upgrade(upgrade_id).id)
+        owned.sort()
+        world.stats.apply(player, owned)
+        for slot in np.flatnonzero(world.alive & (world.owner == player)).tolist():
+            before = float(world.life_max[slot])
+            refresh(world, slot)
+            world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
+
+
+# what a unit can do ---------------------------------------------------------------------------------------------------
+
+
+def _soon(world: World, slot: int) -> UnitType:
+    """The type of a unit, or the one that it is about to be of when it is in the midst of a morph."""
+    if world.bound[slot] and world.casts[slot]:
+        row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
+        if row is not None:
+            return world.catalog.units[row]
+    return world.unit_type(slot)
+
+
+def can_move(world: World, slot: int) -> bool:
+    """Whether a unit takes movement orders: what it is or is about to be has a speed, or an upgrade gives it one."""
+    unit = _soon(world, slot)
+    return bool(world.stats.step[world.owner[slot], unit.row] > 0.0) and _commandable(unit)
+
+
+def can_attack(world: World, slot: int) -> bool:
+    """Whether the unit has a weapon that it can aim now."""
+    armed = world.ground_weapon[slot] >= 0 or world.air_weapon[slot] >= 0
+    return bool(armed) and _commandable(world.unit_type(slot))
+
+
+def can_reach(world: World, slot: int, victim: int) -> bool:
+    """Whether the unit has a weapon that it can aim at ``victim`` now."""
+    if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
+        return False
+    return weapon_for(world, slot, victim) >= 0
+
+
+def is_enemy(world: World, player: int, other: int) -> bool:
+    """Whether two owners fight each other; nobody fights the neutral player by himself."""
+    return player != other and 0 not in (player, other) and len(world.players) > max(player, other)
+
+
+def _commandable(unit: UnitType) -> bool:
+    return not unit.uncommandable
+
+
+def _inside(world: World, point: Point) -> Point:
+    x0, y0, x1, y1 = world.map.terrain.playable
+    return min(max(point[0], x0), x1), min(max(point[1], y0), y1)
+
+
+def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
+    """Make an order the units' current one, or let it wait in their queues; returns the slots that took it."""
+    taken = []
+    wanted = order
+    for slot in slots:
+        if world.carrier[slot] != NOBODY:
+            continue  # a passenger takes no orders
+        order = _of_its_own(world, slot, wanted)
+        if queue and world.order_kind[slot] != OrderKind.IDLE:
+            if len(world.queue[slot]) >= QUEUE_LIMIT:
+                continue
+            world.queue[slot].append(order)
+        elif world.bound[slot]:
+            world.queue[slot] = [order]
+        else:
+            world.queue[slot] = []
+            begin(world, slot, order)
+        taken.append(slot)
+    return taken
+
+
+ORDINARY = {
+    OrderKind.MOVE: "move",
+    OrderKind.FOLLOW: "move",
+    OrderKind.ATTACK_MOVE: "attack",
+    OrderKind.ATTACK_UNIT: "attack",
+    OrderKind.HOLD: "hold_position",
+    OrderKind.PATROL: "patrol",
+    OrderKind.SCAN_MOVE: "scan_move",
+}
+
+
+GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
+
+
+def _of_its_own(world: World, slot: int, order: Order) -> Order:
+    """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
+    effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
+    own = None if effect is None else world.catalog.ordinary[int(world.type[slot])].get(effect)
+    return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
+
+
+def begin(world: World, slot: int, order: Order | None) -> None:
+    """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
+    order = order or Order(OrderKind.IDLE, 0)
+    target = world.slot_of(order.target)
+    if world.harvest[slot]:
+        _end_harvest(world, slot)
+    world.order_kind[slot] = order.kind
+    world.order_ability[slot] = order.ability
+    world.order_target[slot] = target
+    world.order_point[slot] = world.pos[slot] if order.point is None else order.point
+    world.order_aimed[slot] = order.point is not None
+    world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
+    if order.kind is not OrderKind.ATTACK_UNIT or target == NOBODY or not engage(world, slot, target):
+        disengage(world, slot)
+    world.walks[slot] = order.kind in WALKS
+    world.looks_around[slot] = order.kind in LOOKS_AROUND
+    world.holds[slot] = order.kind is OrderKind.HOLD
+    world.needs_target[slot] = order.kind in NEEDS_TARGET or (order.kind is OrderKind.CAST and target != NOBODY)
+    world.casts[slot] = order.kind is OrderKind.CAST
+    world.cast_at[slot] = -1.0
+    world.channels[slot] = world.bound[slot] = False
+    world.scan_now = world.orders_changed = True
+    world.guard[slot] = world.pos[slot]
+    world.backswing[slot] = 0.0
+    world.returning[slot] = world.nav_end[slot] = False
+    world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
+    if order.kind in (OrderKind.GATHER, OrderKind.RETURN):
+        _begin_harvest(world, slot, order.kind, target)
+
+
+def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> None:
+    """Begin a round of harvesting; other bodies are no obstacle on it."""
+    world.harvesting = True
+    if kind is OrderKind.GATHER and target != NOBODY:
+        harvesting.head_for_resource(world, slot, target)
+    elif not harvesting.head_for_hall(world, slot):
+        begin(world, slot, None)
+        return
+    refresh(world, slot)
+
+
+def _end_harvest(world: World, slot: int) -> None:
+    harvesting.leave(world, slot)
+    world.harvest[slot] = harvesting.Phase.NONE
+    refresh(world, slot)
+
+
+def begin_next(world: World, slot: int) -> None:
+    """Begin the next order of a unit; a patrol turns round, targets that are gone are skipped."""
+    waiting = world.queue[slot]
+    if world.order_kind[slot] == OrderKind.PATROL and not waiting:
+        here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
+        world.order_point[slot], world.order_origin[slot] = there, here
+        world.nav_end[slot] = False
+        world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = 0
+        return
+    order: Order | None = None
+    while waiting and order is None:
+        order = waiting.pop(0)
+        if order.target != NO_TAG and world.slot_of(order.target) == NOBODY:
+            order = None
+    begin(world, slot, order)

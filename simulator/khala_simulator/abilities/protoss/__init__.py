@@ -1,0 +1,1 @@
+"""The abilities of the Protoss, a module for each unit or theme."""

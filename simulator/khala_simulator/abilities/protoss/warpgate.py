@@ -1,0 +1,95 @@
+"""The skill of Warp Gates: warping a unit into a power field, from far away.
+
+The unit is there at once, helpless and vulnerable, until it is finished: soon in a field that a Nexus, a Gateway or a
+Warp Prism is near, later in others. The gate then needs its time before the next one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.abilities.skill import Skill
+from khala_simulator.economy import construction, payments, power
+from khala_simulator.movement import pathfinding
+from khala_simulator.tables import prices
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.layers import layer_of
+
+if TYPE_CHECKING:
+    from khala_simulator.abilities.skill import UnitRule
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.tables.records import UnitType
+    from khala_simulator.world.casts import Cast, Point
+    from khala_simulator.world.world import World
+
+FAST_LOOPS: Final = 80.0
+TIMER: Final = "WarpGateTrain"
+
+
+def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
+    """Warp a unit in from the first gate that is ready."""
+    if point is None:
+        return []
+    slot = slots[0]
+    owner, unit = int(world.owner[slot]), world.catalog.unit(ability.unit)
+    source = power.best(world, owner, point)
+    if source is None or not _is_free(world, unit, point):
+        return []
+    paid = payments.charge(world, owner, prices.cost_of(ability))
+    slow = ability.numbers.get("slow_time_loops", ability.loops)
+    loops = ability.numbers.get("fast_time_loops", FAST_LOOPS) if source.fast else slow
+    construction.begin(world, unit, owner, point, loops=loops, paid=paid)
+    if ability.charges is not None:
+        world.timers.setdefault(slot, {})[ability.timer] = world.loop + ability.charges.loops
+    return [slot]
+
+
+def _can_warp_in(world: World, cast: Cast) -> ActionResult:
+    if cast.point is None:
+        return ActionResult.CANT_FIND_PLACEMENT_LOCATION
+    return refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
+
+
+def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
+    """Why a player can't warp a unit in at a point, or success."""
+    if power.best(world, player, point) is None:
+        return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
+    return ActionResult.SUCCESS if _is_free(world, unit, point) else ActionResult.CANT_WARP_IN_UNITS_THERE
+
+
+def _is_free(world: World, unit: UnitType, point: Point) -> bool:
+    """Whether a unit's body touches nobody and no wall at a point."""
+    at = np.array([point])
+    surface = pathfinding.surface(world.ground, layer_of(unit))
+    if not surface.flat[surface.cell(at)][0]:
+        return False
+    live = world.live
+    bodies = live[(world.layer[live] != 2) & ~world.walled[live] & (world.separation[live] > 0.0)]
+    offset = world.pos[bodies] - at
+    apart = (world.separation[bodies] + unit.separation) * 0.98
+    return not bool((offset[:, 0] ** 2 + offset[:, 1] ** 2 < apart**2).any())
+
+
+def _hurry(world: World, slots: list[int]) -> None:
+    """Let a gate be ready sooner as long as its work passes faster, as under Chrono Boost."""
+    if not len(world.buffs):
+        return
+    for slot in slots:
+        waits, rate = world.timers.get(slot, {}), float(world.work_rate[slot])
+        if rate != 1.0 and waits.get(TIMER, 0.0) > world.loop:
+            waits[TIMER] -= rate - 1.0
+
+
+PASSIVES: Final[dict[str, UnitRule]] = {"WarpGate": _hurry}
+SKILLS: Final = {
+    "warp_in": Skill(
+        give=_warp_in,
+        refuse=_can_warp_in,
+        estimates=(
+            "Of several Warp Gates the first that is ready warps in.",
+            "A unit that is being warped in has all its life and shields from the beginning.",
+        ),
+    )
+}

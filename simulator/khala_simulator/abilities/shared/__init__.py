@@ -1,0 +1,1 @@
+"""What the abilities of several races share: morphing, producing, carrying, building."""

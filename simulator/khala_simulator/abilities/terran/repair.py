@@ -1,0 +1,122 @@
+"""Repair: SCVs and MULEs mend machines and structures for a quarter of their price.
+
+One worker mends a whole unit in the time that the tables give; several add up. Every loop costs its share of the
+price, and a player who can't pay it stops the work.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from khala_simulator.abilities import commands
+from khala_simulator.abilities.skill import Skill, distance, nearest_hurt, number, touching
+from khala_simulator.abilities.terran.medivacs import resume
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.stats import ATTRIBUTES
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import Order, OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.abilities.skill import SmartRule
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.world.casts import Cast, Point
+    from khala_simulator.world.world import World
+
+DONE: Final = 1e-9
+REPAIRS: Final = ("repair", "mule_repair")
+MECHANICAL: Final = 1 << ATTRIBUTES.index("mechanical")
+
+
+def _can_repair(world: World, cast: Cast) -> ActionResult:
+    target = cast.target
+    if target == NOBODY:
+        return ActionResult.MUST_TARGET_UNIT
+    if world.life[target] >= world.life_max[target] - DONE or _loops(world, target) <= 0.0:
+        return ActionResult.REQUIRES_REPAIR_TARGET
+    return _unaffordable(world, cast)
+
+
+def _unaffordable(world: World, cast: Cast) -> ActionResult:
+    """Whether the player lacks what the next loop of work costs."""
+    player = world.players[int(world.owner[cast.slot])]
+    if "free" in player.cheats:
+        return ActionResult.SUCCESS
+    minerals, vespene = _price(world, cast)
+    if player.minerals < minerals:
+        return ActionResult.NOT_ENOUGH_MINERALS
+    return ActionResult.NOT_ENOUGH_VESPENE if player.vespene < vespene else ActionResult.SUCCESS
+
+
+def _loops(world: World, slot: int) -> float:
+    """Loops in which one worker mends a unit from nothing."""
+    return world.unit_type(slot).repair_loops
+
+
+def _price(world: World, cast: Cast) -> tuple[float, float]:
+    """Minerals and vespene for one loop of work."""
+    share = number(cast, "cost_fraction_full_repair") / _loops(world, cast.target)
+    minerals, vespene = world.unit_type(cast.target).cost
+    return minerals * share, vespene * share
+
+
+def _mend(world: World, cast: Cast) -> bool:
+    """Mend for one loop; go after a unit that drives away, stop when it is whole or the money is gone."""
+    slot, target = cast.slot, cast.target
+    if target == NOBODY or not world.targetable[target] or world.life[target] >= world.life_max[target] - DONE:
+        return False
+    x, y = world.pos[target].tolist()
+    if distance(world, slot, (x, y)) > touching(world, slot, target) + 2.0 * cast.ability.slop:
+        resume(world, slot)
+        return True
+    if _unaffordable(world, cast) is not ActionResult.SUCCESS:
+        return False
+    missing = float(world.life_max[target] - world.life[target])
+    whole = float(world.life_max[target]) / _loops(world, target)
+    mended = min(whole, missing)
+    player = world.players[int(world.owner[slot])]
+    if "free" not in player.cheats:
+        minerals, vespene = _price(world, cast)
+        player.minerals -= minerals * mended / whole
+        player.vespene -= vespene * mended / whole
+    world.life[target] += mended
+    player.score.healed.life += mended
+    return missing - mended > DONE
+
+
+def _begin(world: World, cast: Cast) -> None:
+    """Mend a machine or a structure, loop by loop, for a quarter of its price and as long as it took to make it."""
+    _mend(world, cast)
+
+
+def _pick(world: World, slot: int, ability: Ability) -> int:
+    """The nearest machine or structure of the owner's that needs repair."""
+    return next(iter(nearest_hurt(world, slot, ability.autocast_range, MECHANICAL)), NOBODY)
+
+
+def _repair_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
+    """A right click of workers on a damaged machine or structure of their own sends them to repair it."""
+    if target == NOBODY or "mechanical" not in world.unit_type(target).attributes:
+        return []
+    if world.build_progress[target] < 1.0 or world.life[target] >= world.life_max[target] - DONE:
+        return []
+    taken: list[int] = []
+    for slot in slots:
+        card = world.catalog.abilities_of(int(world.type[slot]))
+        ability = next((a for a in card if a.effect in REPAIRS), None)
+        if ability is not None and slot != target and world.owner[slot] == world.owner[target]:
+            order = Order(OrderKind.CAST, ability.id, target=world.tag_of(target))
+            taken += commands.give(world, [slot], order, queue=queue)
+    return taken
+
+
+SMARTS: Final[tuple[SmartRule, ...]] = (_repair_by_click,)
+SKILLS: Final = {
+    name: Skill(
+        _begin,
+        refuse=_can_repair,
+        hold=_mend,
+        pick=_pick,
+        estimates=("Repair is given and paid for evenly in every loop; the game's rounding is not known.",),
+    )
+    for name in REPAIRS
+}

@@ -1,0 +1,89 @@
+"""The Queen's Transfusion, and creep tumors: the Queen's first one, and those that tumors plant themselves."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from khala_simulator.abilities import commands
+from khala_simulator.abilities.skill import Skill, number, place_of
+from khala_simulator.combat import buffs, lifecycle
+from khala_simulator.economy import building_sites, construction
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.orders import Order, OrderKind
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from khala_simulator.world.casts import Cast
+    from khala_simulator.world.world import World
+
+TRANSFUSION = 1664
+PLANT, BURROW = 1733, 1662
+
+
+# Transfusion ----------------------------------------------------------------------------------------------------------
+
+
+def _transfuse(world: World, cast: Cast) -> None:
+    """Heal a biological friend at once, and some more over time."""
+    _heal(world, cast.target, number(cast, "instant_life"))
+    buffs.apply(world, cast.target, "Transfusion", source=cast.slot)
+
+
+def _needs_life(world: World, cast: Cast) -> ActionResult:
+    hurt = world.life[cast.target] < world.life_max[cast.target]
+    return ActionResult.SUCCESS if hurt else ActionResult.REQUIRES_HEAL_TARGET
+
+
+def _heal_tick(world: World, slot: int, _: np.void) -> None:
+    ability = world.catalog.ability(TRANSFUSION)
+    _heal(world, slot, number(ability, "hot_life_total") / number(ability, "hot_duration_loops"))
+
+
+def _heal(world: World, slot: int, amount: float) -> None:
+    before = float(world.life[slot])
+    world.life[slot] = min(before + amount, float(world.life_max[slot]))
+    world.players[int(world.owner[slot])].score.healed.life += float(world.life[slot]) - before
+
+
+# creep tumors ---------------------------------------------------------------------------------------------------------
+
+
+def _plant(world: World, cast: Cast) -> None:
+    """Plant a creep tumor, which grows by itself and then burrows."""
+    slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
+    place = building_sites.centre(world, unit, place_of(world, cast))
+    construction.begin(world, unit, int(world.owner[slot]), place, loops=cast.ability.loops, paid=(0.0, 0.0))
+    if cast.ability.id == PLANT:
+        world.timers.setdefault(slot, {})[cast.ability.timer] = math.inf  # a tumor plants one other in its life
+
+
+def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
+    """Creep without a structure on it; the tumor's own must be in sight."""
+    unit = world.catalog.unit(cast.ability.unit)
+    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
+
+
+def _burrow_when_grown(world: World, slots: list[int]) -> None:
+    """A finished tumor goes under the ground by itself."""
+    for slot in slots:
+        if world.build_progress[slot] >= 1.0 and world.order_kind[slot] == OrderKind.IDLE:
+            commands.begin(world, slot, Order(OrderKind.CAST, BURROW))
+
+
+def _burrow_tumor(world: World, cast: Cast) -> None:
+    """Go under the ground, and be able to plant another tumor after a while."""
+    slot = cast.slot
+    lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
+    plant = world.catalog.ability(PLANT)
+    world.timers.setdefault(slot, {})[plant.timer] = world.loop + number(plant, "first_use_after_loops")
+
+
+SKILLS: Final = {
+    "transfusion": Skill(_transfuse, refuse=_needs_life),
+    "creep_tumor": Skill(_plant, refuse=_room_for_tumor),
+    "burrow_tumor": Skill(_burrow_tumor, binds=True),
+}
+TICKS: Final = {"Transfusion": _heal_tick}
+PASSIVES: Final = {"CreepTumor": _burrow_when_grown, "CreepTumorQueen": _burrow_when_grown}

@@ -1,0 +1,282 @@
+"""Commands: which ability a requested id means to each unit, how the world is told, and what came of it.
+
+Clients name an ability by its general or by its specific id. A general one stands for whichever specific one each
+unit has: Attack (3674) is an attack (23) to a Stalker and a scan-move (19) to an Observer. What a command was in the
+end is reported back with the specific id.
+
+Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves and fights), `casting.py` (the rest).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, TypeAlias
+
+from s2clientprotocol import error_pb2
+
+from khala_simulator.abilities import casting, commands
+from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.world import NO_TAG, NOBODY
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_simulator.tables.catalog import Ability
+    from khala_simulator.world.world import World
+
+    Point = tuple[float, float]
+    Result: TypeAlias = error_pb2.ActionResult.ValueType
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Command:
+    """What a player asked for: an ability id of either kind, for units by tag, at a unit, a point or nothing."""
+
+    ability: int
+    tags: tuple[int, ...]
+    target: int = NO_TAG
+    point: Point | None = None
+    queue: bool = False
+    clicked: Point | None = None  # where on the screen the target was clicked, world units
+
+    @property
+    def aim(self) -> Aim:
+        """The kind of its target."""
+        if self.target != NO_TAG:
+            return Aim.UNIT
+        return Aim.NONE if self.point is None else Aim.POINT
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Plan:
+    """A command as it was judged: its result, and what to do if that is a success.
+
+    Args:
+        asked: The command.
+        result: How it goes.
+        ability: The specific id by which it is reported.
+        target: The unit (tag) that it is aimed at; a snapshot's is the unit that it shows.
+        point: Where it is aimed.
+        parts: The specific abilities, by ascending id, and who is to use each at what.
+    """
+
+    asked: Command
+    result: Result
+    ability: int = 0
+    target: int = NO_TAG
+    point: Point | None = None
+    parts: tuple[tuple[Ability, tuple[Cast, ...]], ...] = ()
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a command: how it went, as which specific ability, and which units took it."""
+
+    result: Result
+    ability: int = 0
+    slots: tuple[int, ...] = ()
+
+
+def result_of(why: ActionResult) -> Result:
+    """The API's word for a refusal."""
+    result: Result = error_pb2.ActionResult.Value(error_pb2.ActionResult.Name(int(why)))  # type: ignore[arg-type]  # same numbers
+    return result
+
+
+def meant(world: World, slot: int, requested: int) -> Ability | None:
+    """What a requested id, general or specific, means to a unit; None for nothing.
+
+    Of several that one general id stands for, such as the ways to cancel, the first that the unit can use now.
+    """
+    return _meant(world, slot, requested)[0]
+
+
+def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
+    """As ``meant``, and whether the unit can use it now; None where that did not have to be looked at."""
+    card = world.catalog.abilities_of(int(world.type[slot])) if requested > 0 else ()
+    exact = next((a for a in card if a.id == requested), None)
+    if exact is not None:
+        return exact, None
+    first: tuple[Ability | None, ActionResult | None] = None, None
+    for ability in card:
+        if ability.general == requested and casting.is_modelled(ability):
+            why = casting.refusal(world, slot, ability)
+            if why is ActionResult.SUCCESS:
+                return ability, why
+            first = first if first[0] is not None else (ability, why)
+    return first
+
+
+def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
+    """What a unit can be told to do now, by ascending id; ``free`` looks at no cost and no cooldown."""
+    card = world.catalog.abilities_of(int(world.type[slot]))
+    return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
+
+
+def judge(world: World, player: int, command: Command) -> Plan:
+    """How a command goes now, and what it comes to; nothing is done yet."""
+    slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
+    all_obey = "control_enemy" in world.players[player].cheats
+    own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
+    if not own:
+        return _refused(command, ActionResult.YOU_CANT_CONTROL_THAT_UNIT if slots else ActionResult.ERROR)
+    aimed = _without_snapshot(world, player, command)
+    if aimed.point is not None and not all(map(math.isfinite, aimed.point)):
+        return _refused(command, ActionResult.MUST_TARGET_VISIBLE_LOCATION)
+    groups = _groups(world, own, command.ability)
+    if not groups:
+        return _refused(command, ActionResult.NOT_SUPPORTED)
+    parts: list[tuple[Ability, tuple[Cast, ...]]] = []
+    why = ActionResult.ERROR
+    for ability, some in groups:
+        results = [_judged(world, player, slot, ability, aimed, known) for slot, known in some]
+        casts = tuple(result for result in results if isinstance(result, Cast))
+        if casts:
+            parts.append((ability, casts))
+        elif not parts and isinstance(results[0], ActionResult):
+            why = results[0]
+    if not parts:
+        return _refused(command, why)
+    return Plan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
+
+
+def carry_out(world: World, plan: Plan) -> Outcome:
+    """Give a command to the units that can take it, as it was judged in the world as it is now."""
+    if plan.result != error_pb2.Success:
+        return Outcome(plan.result)
+    taken: list[int] = []
+    for ability, casts in plan.parts:
+        if ability.effect not in GIVE and taken:  # what an earlier part has cost may be missing now
+            slots = [cast.slot for cast in casts]
+            queue = plan.asked.queue
+            taken += casting.use(world, slots, ability, target=plan.target, point=plan.point, queue=queue)
+        else:
+            taken += _give(world, ability, casts, plan)
+    if not taken:
+        return Outcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if plan.asked.queue else ActionResult.ERROR))
+    return Outcome(error_pb2.Success, plan.ability, tuple(taken))
+
+
+def _refused(command: Command, why: ActionResult) -> Plan:
+    return Plan(command, result_of(why))
+
+
+def _without_snapshot(world: World, player: int, command: Command) -> Command:
+    """A command at a snapshot as one at what it shows: a resource that still lies there, or else its place."""
+    snapshot = world.memories[player].find(command.target) if command.target != NO_TAG else None
+    if snapshot is None:
+        return command
+    if world.catalog.units[snapshot.row].resource and world.slot_of(snapshot.unit) != NOBODY:
+        return dataclasses.replace(command, target=snapshot.unit)
+    return dataclasses.replace(command, target=NO_TAG, point=snapshot.pos)
+
+
+def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
+    """The id by which a command of several kinds is reported: that of a fight before that of a walk."""
+    return max(parts, key=lambda part: (part[0].effect == "attack", -part[0].id))[0].id
+
+
+def _groups(
+    world: World, slots: list[int], requested: int
+) -> list[tuple[Ability, list[tuple[int, ActionResult | None]]]]:
+    """The specific abilities that a requested id stands for, by ascending id.
+
+    With each go the units that have it, and whether they can use it now where that is known already.
+    """
+    groups: dict[int, tuple[Ability, list[tuple[int, ActionResult | None]]]] = {}
+    for slot in slots:
+        ability, known = _meant(world, slot, requested)
+        if ability is not None and casting.is_modelled(ability):
+            groups.setdefault(ability.id, (ability, []))[1].append((slot, known))
+    return [groups[number] for number in sorted(groups)]
+
+
+def _judged(
+    world: World, player: int, slot: int, ability: Ability, command: Command, known: ActionResult | None
+) -> Cast | ActionResult:
+    """What a unit is to do with its ability, or why it can't; ``known`` is what is known of the latter."""
+    if not command.aim & ability.aim:
+        aimless = Aim.POINT not in ability.aim
+        return ActionResult.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
+            ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
+        )  # fmt: skip
+    target = NOBODY
+    if command.aim is Aim.UNIT:
+        target = world.slot_of(command.target)
+        remembered = target != NOBODY and command.target in world.memories[player].of_unit
+        if target == NOBODY or not (remembered or world.visible[player, target]):
+            return ActionResult.MUST_TARGET_VISIBLE_UNIT
+    why = casting.refusal(world, slot, ability) if known is None else known
+    cast = Cast(slot, casting.as_is(world, slot, ability), target, command.point)
+    if why is ActionResult.SUCCESS and ability.effect == "attack" and target != NOBODY:
+        why = _cant_attack(world, slot, target)
+    elif why is ActionResult.SUCCESS and ability.effect not in casting.ORDINARY:
+        why = casting.aim_refusal(world, cast)
+    return cast if why is ActionResult.SUCCESS else why
+
+
+def _cant_attack(world: World, slot: int, target: int) -> ActionResult:
+    if slot != target and commands.can_reach(world, slot, target):
+        return ActionResult.SUCCESS
+    flies = world.unit_type(target).flying
+    return ActionResult.CANT_TARGET_AIR_UNITS if flies else ActionResult.CANT_TARGET_THAT_UNIT
+
+
+# giving ---------------------------------------------------------------------------------------------------------------
+
+
+def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: Plan) -> list[int]:
+    give = GIVE.get(ability.effect)
+    if give is None:
+        return casting.order(world, casts, ability, queue=plan.asked.queue)
+    return give(world, [cast.slot for cast in casts], plan)
+
+
+def _move(world: World, slots: list[int], plan: Plan) -> list[int]:
+    if plan.point is not None:
+        return commands.move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _patrol(world: World, slots: list[int], plan: Plan) -> list[int]:
+    x, y = plan.point or world.pos[world.slot_of(plan.target)].tolist()
+    return commands.patrol(world, slots, (x, y), queue=plan.asked.queue)
+
+
+def _attack(world: World, slots: list[int], plan: Plan) -> list[int]:
+    if plan.point is not None:
+        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.attack_unit(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _scan_move(world: World, slots: list[int], plan: Plan) -> list[int]:
+    if plan.point is not None:
+        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _stop(world: World, slots: list[int], plan: Plan) -> list[int]:
+    return commands.stop(world, slots, queue=plan.asked.queue)
+
+
+def _hold(world: World, slots: list[int], plan: Plan) -> list[int]:
+    return commands.hold(world, slots, queue=plan.asked.queue)
+
+
+def _smart(world: World, slots: list[int], plan: Plan) -> list[int]:
+    return casting.smart(world, slots, point=plan.point, target=plan.target, queue=plan.asked.queue)
+
+
+GIVE: dict[str, Callable[[World, list[int], Plan], list[int]]] = {
+    "smart": _smart,
+    "stop": _stop,
+    "move": _move,
+    "patrol": _patrol,
+    "hold_position": _hold,
+    "attack": _attack,
+    "scan_move": _scan_move,
+}
+"""What is no skill; everything else goes through ``casting.order``."""

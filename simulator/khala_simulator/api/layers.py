@@ -1,0 +1,249 @@
+"""Feature layers of the screen and of the minimap.
+
+What is drawn where is decided here, from what a player perceives; how a disc becomes pixels and pixels become bytes
+is `raster.py`. Terrain that does not change is drawn once per camera position. Heights have the scale of
+`terrain_height`: z = -16 + 32 v / 255. That is a choice: the API's own text and a recorded frame contradict each other.
+
+Above: `observation.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import spatial_pb2
+
+from khala_simulator.api import wire
+from khala_simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
+from khala_simulator.api.raster import Layer, draw_discs, sample
+from khala_simulator.api.sight import Cloak, Display
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from google.protobuf.message import Message
+    from numpy.typing import NDArray
+    from s2clientprotocol import sc2api_pb2
+
+    from khala_simulator.api.projection import View
+    from khala_simulator.api.raster import Discs
+    from khala_simulator.api.sight import Sight
+    from khala_simulator.api.types import Types
+    from khala_simulator.api.wire import Part
+    from khala_simulator.world.world import World
+
+    Bools = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
+
+SCREEN_BITS = {
+    "height_map": 8, "visibility_map": 8, "creep": 1, "power": 1, "player_id": 8, "unit_type": 32, "selected": 1,
+    "unit_hit_points": 32, "unit_hit_points_ratio": 8, "unit_energy": 32, "unit_energy_ratio": 8,
+    "unit_shields": 32, "unit_shields_ratio": 8, "player_relative": 8, "unit_density_aa": 8, "unit_density": 8,
+    "effects": 8, "hallucinations": 1, "cloaked": 1, "blip": 1, "buffs": 32, "buff_duration": 8, "active": 1,
+    "build_progress": 8, "buildable": 1, "pathable": 1, "placeholder": 1,
+}  # fmt: skip
+MINIMAP_BITS = {
+    "height_map": 8, "visibility_map": 8, "creep": 1, "camera": 1, "player_id": 8, "player_relative": 8,
+    "selected": 1, "alerts": 1, "buildable": 1, "pathable": 1, "unit_type": 32,
+}  # fmt: skip
+VALUES = (
+    "player_id", "player_relative", "unit_type", "selected", "unit_hit_points", "unit_hit_points_ratio",
+    "unit_shields", "unit_shields_ratio", "unit_energy", "unit_energy_ratio", "hallucinations", "cloaked", "active",
+    "build_progress", "placeholder", "buffs", "buff_duration",
+)  # fmt: skip
+"""Layers that show a value of the topmost unit at each pixel."""
+
+CHEATING = frozenset({"unit_type"})
+"""Minimap layers that are sent only when the client asks for cheating ones."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """What the feature layers of one observation show."""
+
+    world: World
+    types: Types
+    player: int
+    sight: Sight
+    selected: Bools  # [n] rows of the sight
+    camera: tuple[float, float]
+    attacked: Floats  # [k, 2] places of alerts since the last observation
+    fogged: bool  # what the player does not see is dark
+
+
+class FeatureLayers:
+    """The feature layers that one client asked for; keeps what stays the same from frame to frame."""
+
+    def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, view: View) -> None:
+        self.screen, self.minimap = screen, minimap = view.screen, view.minimap
+        hidden = frozenset() if setup.allow_cheating_layers else CHEATING
+        shown = {name: bits for name, bits in MINIMAP_BITS.items() if name not in hidden}
+        self._screen = _Image(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
+        self._minimap = _Image(spatial_pb2.FeatureLayersMinimap, shown, minimap.columns, minimap.rows)
+
+    def encode(self, frame: Frame) -> list[Part]:
+        """The parts of an `ObservationFeatureLayer`."""
+        values = unit_values(frame)
+        return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
+
+    def _encode_screen(self, frame: Frame, values: Ints) -> list[Part]:
+        screen, image = self.screen, self._screen
+
+        def axes() -> tuple[Floats, Floats]:
+            corner, pixels = np.zeros(1), np.arange(max(screen.columns, screen.rows), dtype=np.float64)
+            columns, _ = screen.to_world(pixels[: screen.columns], corner, frame.camera)
+            _, lines = screen.to_world(corner, pixels[: screen.rows], frame.camera)
+            return columns, lines
+
+        x, y = screen.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1], frame.camera)
+        radius = frame.sight.radius / screen.scale
+        near = _near(x, y, radius + 1, screen.columns, screen.rows)
+        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
+        layers = image.layers
+        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
+        parts += layers["unit_density"].encode(discs.density) + layers["unit_density_aa"].encode(discs.smooth)
+        return parts + self._effects(frame) + self._power(frame) + self._blips(frame)
+
+    def _effects(self, frame: Frame) -> list[Part]:
+        """Effect ids at their places; of two at one pixel the younger one."""
+        layer = self._screen.layers["effects"]
+        if not frame.world.area_effects:
+            return layer.blank
+        areas = seen_area_effects(frame.world, frame.player, through_fog=not frame.fogged)
+        spots = [(x, y, area.radius, area.effect) for area in areas for x, y in area.points]
+        table = np.array(spots, np.float64).reshape(-1, 4)
+        return self._spots(layer, Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
+
+    def _power(self, frame: Frame) -> list[Part]:
+        layer, sources = self._screen.layers["power"], power(frame.sight, frame.types)
+        if sources is None:
+            return layer.blank
+        spots = Spots(frame.sight.pos[sources.row], sources.radius)
+        return self._spots(layer, spots, np.ones(len(sources.row), np.int32), frame)
+
+    def _blips(self, frame: Frame) -> list[Part]:
+        layer, places = self._screen.layers["blip"], blips(frame.world, frame.types, frame.player)
+        if not len(places):
+            return layer.blank
+        spots = Spots(places, np.full(len(places), BLIP_RADIUS))
+        return self._spots(layer, spots, np.ones(len(places), np.int32), frame)
+
+    def _spots(self, layer: Layer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
+        """Discs of the world with a value each."""
+        screen = self.screen
+        x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
+        radius = spots.radius / screen.scale
+        near = _near(x, y, radius + 1, screen.columns, screen.rows)
+        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
+        return layer.encode_pixels(discs.pixels, values[near].take(discs.rows))
+
+    def _encode_minimap(self, frame: Frame, values: Ints) -> list[Part]:
+        minimap, image = self.minimap, self._minimap
+
+        def axes() -> tuple[Floats, Floats]:
+            corner, pixels = np.zeros(1), np.arange(max(minimap.columns, minimap.rows), dtype=np.float64)
+            columns, _ = minimap.to_world(pixels[: minimap.columns], corner)
+            _, lines = minimap.to_world(corner, pixels[: minimap.rows])
+            return columns, lines
+
+        x, y = minimap.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1])
+        known = np.flatnonzero(frame.sight.display != Display.HIDDEN.value)
+        radius = frame.sight.radius[known] / minimap.scale
+        discs = draw_discs(np.stack([x[known], y[known]], axis=1), radius, minimap.columns, minimap.rows)
+        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, known])
+        return parts + self._camera(frame) + self._alerts(frame)
+
+    def _camera(self, frame: Frame) -> list[Part]:
+        view = self.screen.view(frame.camera)
+        x0, y0 = self.minimap.to_pixels(view.x0, view.y1)
+        x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
+        image = np.zeros((self.minimap.rows, self.minimap.columns), np.bool_)
+        image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
+        return self._minimap.layers["camera"].encode(image)
+
+    def _alerts(self, frame: Frame) -> list[Part]:
+        layer = self._minimap.layers["alerts"]
+        if not len(frame.attacked):
+            return layer.blank
+        x, y = self.minimap.to_pixels(frame.attacked[:, 0], frame.attacked[:, 1])
+        spots = draw_discs(np.stack([x, y], axis=1), np.zeros(len(x)), self.minimap.columns, self.minimap.rows)
+        return layer.encode_pixels(spots.pixels, np.ones(len(spots.pixels), np.int32))
+
+
+class _Image:
+    """The layers of the screen or of the minimap, and how they are drawn alike."""
+
+    def __init__(self, message: type[Message], bits: dict[str, int], columns: int, rows: int) -> None:
+        fields = message.DESCRIPTOR.fields_by_name
+        self.layers = {name: Layer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
+        self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
+        self._camera: tuple[float, float] | None = None
+        self._walk: Bools | None = None
+        self._creep: Bools | None = None
+        self._terrain: list[Part] = []
+        self._visibility: list[Part] = []
+
+    def encode_units(self, discs: Discs, values: Ints) -> list[Part]:
+        """The layers that show units, from the values [k, n] of the discs' rows."""
+        shown: list[bool] = np.any(values, axis=1).tolist()
+        parts: list[Part] = []
+        for k, layer in self._of_units:
+            parts += layer.encode_pixels(discs.pixels, values[k].take(discs.rows)) if shown[k] else layer.blank
+        return parts
+
+    def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
+        """Terrain and visibility; drawn again only when the camera moved, the ground changed, or fog may have."""
+        world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
+        changed = self._walk is not world.ground.walk or self._creep is not world.creep
+        moved = changed or self._camera != frame.camera
+        if moved or world.fog:
+            x, y = axes()
+            self._visibility = layers["visibility_map"].encode(sample(world.visibility[frame.player], x, y))
+            if moved:
+                self._camera, self._walk, self._creep = frame.camera, world.ground.walk, world.creep
+                grids = {"height_map": terrain.height, "pathable": world.ground.walk, "buildable": terrain.build,
+                         "creep": world.creep}  # fmt: skip
+                self._terrain = [
+                    part for name, grid in grids.items() for part in layers[name].encode(sample(grid, x, y))
+                ]
+        return self._terrain + self._visibility
+
+
+def unit_values(frame: Frame) -> Ints:
+    """[len(VALUES), n] value of each unit in each layer that shows units.
+
+    Hit points, shields and energy are whole points, their ratios 0 to 255; the progress of a structure is 0 to 255
+    while it is being built and 0 afterwards. Of several buffs on a unit the last one is shown, its duration as the
+    part that remains, 0 to 255; one without an end stays at 255.
+    """
+    sight = frame.sight
+    values = np.zeros((len(VALUES), len(sight)), np.int32)
+    values[0] = sight.owner
+    values[1] = sight.alliance
+    values[2] = sight.type_id
+    values[3] = frame.selected
+    values[4], values[5] = sight.life, _ratio(sight.life, sight.life_max)
+    values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
+    values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
+    values[10] = sight.hallucination
+    values[11] = (sight.cloak != Cloak.NOT_CLOAKED.value) & (sight.cloak != Cloak.UNKNOWN.value)
+    values[12] = sight.active
+    values[13] = (sight.build_progress < 1) * sight.build_progress * 255
+    values[14] = sight.display == Display.PLACEHOLDER.value
+    worn = seen_buffs(frame.world, sight)
+    if worn is not None:
+        values[15, worn.row] = worn.id
+        values[16, worn.row] = np.where(worn.total > 0, _ratio(worn.remain, worn.total), 255)
+    return values
+
+
+def _ratio(part: Floats, whole: Floats) -> Floats:
+    return np.minimum(part / np.maximum(whole, 1e-9), 1.0) * 255
+
+
+def _near(x: Floats, y: Floats, margin: Floats, columns: int, rows: int) -> NDArray[np.intp]:
+    inside = (x > -margin) & (x < columns + margin) & (y > -margin) & (y < rows + margin)
+    return np.flatnonzero(inside)

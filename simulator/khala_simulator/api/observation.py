@@ -1,0 +1,141 @@
+"""The answer to `observation`: everything that a player knows at this loop.
+
+Small parts are messages; units, images and the frame around them are joined as bytes (`wire.py`), because an
+observation with feature layers is half a megabyte and is asked for after every step.
+
+Above: `play.py`. Below: `raw.py`, `layers.py`, `ui.py`, `score.py`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from s2clientprotocol import raw_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from khala_simulator.api import ui, wire
+from khala_simulator.api.abilities import result_of, usable
+from khala_simulator.api.effects import seen_buffs
+from khala_simulator.api.layers import Frame
+from khala_simulator.api.raw import Units, write_image
+from khala_simulator.api.raw_effects import write_effects, write_power, write_radar
+from khala_simulator.api.score import Holdings
+from khala_simulator.api.sight import Alliance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from khala_simulator.api.game import Game
+    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.sight import Sight
+    from khala_simulator.api.wire import Part
+
+_OBSERVATION = sc.ResponseObservation.DESCRIPTOR.fields_by_name["observation"].number
+_LAYERS = sc.Observation.DESCRIPTOR.fields_by_name["feature_layer_data"].number
+_RENDERS = sc.Observation.DESCRIPTOR.fields_by_name["render_data"].number
+_ALARM_PAUSE_LOOPS = 160
+"""Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
+
+
+def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
+    """The parts of a `ResponseObservation`; takes along what is to be told only once."""
+    world = game.world
+    sight = seat.look(through_fog=disable_fog)
+    selected = seat.selection.rows(sight)
+    attacked = _attacked(seat, sight)
+    told = sc.ResponseObservation(
+        actions=seat.hands.echoes,
+        action_errors=[*seat.hands.errors, *_mishaps(seat)],
+        player_result=game.results(),
+        chat=seat.hands.chat,
+    )
+    holdings = Holdings(world, game.types, seat.player)
+    observation = sc.Observation(game_loop=world.loop, player_common=holdings.common())
+    observation.ui_data.CopyFrom(ui.panel(world, game.types, seat.selection, seat.player))
+    _write_abilities(observation, seat)
+    observation.alerts.extend(_alerts(seat, sight, attacked))
+    if seat.options.score:
+        observation.score.CopyFrom(holdings.score())
+    if seat.options.raw:
+        _write_raw(observation.raw_data, seat, sight, selected)
+        write_effects(observation.raw_data, seat, through_fog=disable_fog or seat.sees_all)
+        write_power(observation.raw_data, seat, sight)
+        write_radar(observation.raw_data, seat)
+    images: list[Part] = []
+    if seat.views:
+        fogged = world.fog and not (disable_fog or seat.sees_all)
+        frame = Frame(world, game.types, seat.player, sight, selected, seat.camera, sight.pos[attacked], fogged)
+        if seat.layers is not None:
+            images += wire.embed(_LAYERS, seat.layers.encode(frame))
+        if seat.renders is not None:
+            images += wire.embed(_RENDERS, seat.renders.encode(frame))
+    _told(seat, sight)
+    return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *images])]
+
+
+def _told(seat: Seat, sight: Sight) -> None:
+    seat.hands.forget()
+    seat.deaths_told = len(seat.world.deaths)
+    seat.mishaps_told = len(seat.world.mishaps)
+    seat.alerts_told = len(seat.world.alerts)
+    seat.known = frozenset(sight.tag.tolist())
+    seat.observed_loop = seat.world.loop
+
+
+def _mishaps(seat: Seat) -> list[sc.ActionError]:
+    """Orders of the player's that could not be carried out in the end, since the last observation."""
+    return [
+        sc.ActionError(unit_tag=m.tag, ability_id=m.ability, result=result_of(m.refusal))
+        for m in seat.world.mishaps[seat.mishaps_told :]
+        if m.player == seat.player
+    ]
+
+
+def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
+    """What the selection can be told to do now; a foreign unit can be told nothing."""
+    world = seat.world
+    own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
+    found = {ability.id: ability for slot in own for ability in usable(world, slot)}
+    for number in sorted(found):
+        observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
+
+
+def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
+    """Rows of own units damaged since the last observation, if it is time for another alarm."""
+    world = seat.world
+    if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
+        return np.zeros(0, np.intp)
+    own = sight.alliance == Alliance.SELF.value
+    rows = np.flatnonzero(own & (world.damaged_loop[sight.slot] > seat.observed_loop))
+    if rows.size:
+        seat.alarm_loop = world.loop
+    return rows
+
+
+def _alerts(seat: Seat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Alert.ValueType]:
+    structures = seat.types.structure[sight.row[attacked]]
+    told = seat.world.alerts[seat.alerts_told :]
+    alerts = [sc.Alert.Value(alert.name) for alert in told if alert.player == seat.player]
+    alerts += [sc.BuildingUnderAttack] if structures.any() else []
+    return [*alerts, sc.UnitUnderAttack] if (~structures).any() else alerts
+
+
+def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: NDArray[np.bool_]) -> None:
+    world, terrain = seat.world, seat.world.map.terrain
+    x, y = seat.camera
+    camera = raw.player.camera
+    camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
+    camera.z = seat.camera_z
+    raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
+    Units(
+        world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight), seat.player
+    ).write(raw)
+    visibility, creep = world.visibility[seat.player], world.creep
+    if seat.options.raw_crop_to_playable_area:
+        x0, y0, x1, y1 = terrain.playable
+        visibility, creep = visibility[y0:y1, x0:x1], creep[y0:y1, x0:x1]
+    write_image(raw.map_state.visibility, visibility, 8)
+    write_image(raw.map_state.creep, creep, 1)
+    dead = (d.tag for d in world.deaths[seat.deaths_told :] if d.owner == seat.player or d.tag in seat.known)
+    raw.event.dead_units.extend(dead)

@@ -1,0 +1,86 @@
+"""What a player sees of the shooting: who has just fired at whom, and what is in the air.
+
+The API tells clients nothing of it; rendered images show it, as the game's own picture does. Above: `painting`.
+Below: `sight.py`, which says who is seen.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from khala_simulator.api.sight import API_NEUTRAL, Display, alliance_of, sees
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.players import NEUTRAL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from khala_simulator.api.sight import Sight
+    from khala_simulator.world.world import World
+
+    Ints = NDArray[np.int64]
+    Floats = NDArray[np.float64]
+
+FLASH_LOOPS = 5.0
+"""For so long after its damage point an attack is shown."""
+
+
+class Strikes(NamedTuple):
+    """Attacks that have just taken effect, by rows of the sight."""
+
+    attacker: Ints
+    target: Ints
+    melee: NDArray[np.bool_]
+
+
+class InFlight(NamedTuple):
+    """Missiles under way."""
+
+    pos: Floats  # [m, 2] world
+    goal: Floats  # [m, 2]
+    owner: Ints  # 16 is neutral
+    alliance: Ints
+
+
+def strikes(world: World, sight: Sight) -> Strikes:
+    """Attacks of the last loops between units that are both seen.
+
+    When an attack took effect is told from its weapon's cooldown, which runs from the attack's start; the random
+    delay of up to two loops in it is not known here.
+    """
+    clear = sight.display == Display.VISIBLE.value
+    row_of = np.full(world.capacity, NOBODY)
+    row_of[sight.slot[clear]] = np.flatnonzero(clear)
+    slot = sight.slot
+    weapon, target, cooldown = world.weapon[slot], world.target[slot], world.cooldown[slot]
+    fires = clear & (weapon >= 0) & (target != NOBODY) & (cooldown > 0) & (world.windup[slot] < 0)
+    attacker = np.flatnonzero(fires)
+    weapon, at = weapon[attacker], row_of[target[attacker]]
+    damage_point, melee = _rhythm(world.catalog.version)
+    period = world.stats.period[world.owner[slot[attacker]], weapon]
+    recent = (period - cooldown[attacker] - damage_point[weapon] <= FLASH_LOOPS) & (at != NOBODY)
+    return Strikes(attacker[recent], at[recent], melee[weapon[recent]])
+
+
+def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlight | None:
+    """The missiles that a player sees now, None if there are none."""
+    if not len(world.missiles):
+        return None
+    rows = world.missiles.rows
+    pos = rows["pos"]
+    seen = np.ones(len(rows), np.bool_) if through_fog else sees(world, player, pos)
+    owner = rows["owner"][seen]
+    told = np.where(owner == NEUTRAL, API_NEUTRAL, owner)
+    return InFlight(pos[seen], rows["goal"][seen], told, alliance_of(owner, player))
+
+
+@functools.cache
+def _rhythm(version: str) -> tuple[Floats, NDArray[np.bool_]]:
+    """By weapon: loops from start to damage point, and whether it is melee."""
+    weapons = load_catalog(version).weapons
+    points = np.array([weapon.damage_point_loops for weapon in weapons])
+    return points, np.array([weapon.melee for weapon in weapons], np.bool_)

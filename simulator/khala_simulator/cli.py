@@ -1,0 +1,107 @@
+"""The command line of the simulator: install it, look at what it has, run it by hand.
+
+Mounted as `khala sc2`. Listings have `--json`: one object on stdout, everything else on stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from khala_simulator.process.install import BASE_BUILD, InstallError, install, is_installed, link_maps
+
+app = typer.Typer(
+    help="A headless StarCraft II that PySC2 and python-sc2 start and play as if it were the game.",
+    no_args_is_help=True,
+    add_completion=False,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON object instead of text.")]
+OwnMaps = Annotated[
+    Path | None,
+    typer.Option("--maps", help="Your own .SC2Map files: a directory of them, or a StarCraft II with a folder Maps."),
+]
+Directory = Annotated[Path, typer.Argument(help="Made if it is not there. Never one with a real StarCraft II.")]
+
+
+@app.command("install")
+def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = False) -> None:
+    """Lay out DIRECTORY like a StarCraft II install.
+
+    Clients find it by the environment variable SC2PATH:
+
+        khala sc2 install ~/khala-sc2
+
+        export SC2PATH=~/khala-sc2
+
+    Doing it again repairs the install and updates its maps; what you added stays. Your own maps are linked: terrain and
+    what stands on them is read from the file, their scripts are not run.
+    """
+    try:
+        root = install(directory)
+        own = [] if maps is None else link_maps(root, maps)
+    except InstallError as error:
+        typer.echo(f"Not installed: {error}.", err=True)
+        raise typer.Exit(1) from error
+    from khala_simulator.maps.game_map import map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
+    linked = [entry.path for entry in own if not entry.trouble]
+    if as_json:
+        left_out = {str(entry.source): entry.trouble for entry in own if entry.trouble}
+        facts = {"path": str(root), "maps": list(map_names()), "linked": linked, "left_out": left_out}
+        typer.echo(json.dumps(facts))
+        return
+    for entry in own:
+        if entry.trouble:
+            typer.echo(f"Left out {entry.source}: {entry.trouble}.", err=True)
+    and_yours = f" and {len(linked)} of yours" if maps is not None else ""
+    typer.echo(f"Installed {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
+
+
+@app.command()
+def info(as_json: Json = False) -> None:
+    """Tell which game this is, which maps it has, and where SC2PATH points."""
+    facts = _facts()
+    if as_json:
+        typer.echo(json.dumps(facts))
+        return
+    typer.echo(f"StarCraft II 4.10.0 (build {facts['build']}), simulated")
+    typer.echo(f"SC2PATH: {facts['sc2path'] or 'not set'} ({facts['sc2path_is']})")
+    for entry in facts["maps"]:
+        typer.echo(f"  {entry['name']:<40} {entry['title']}")
+
+
+def _facts() -> dict[str, Any]:
+    from khala_simulator.maps.game_map import map_names, map_title  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
+    path = os.environ.get("SC2PATH")
+    if not path:
+        kind = "run khala sc2 install DIRECTORY first"
+    elif is_installed(path):
+        kind = "this simulator"
+    elif Path(path).is_dir():
+        kind = "not an install of this simulator"
+    else:
+        kind = "no such directory"
+    maps = [{"name": name, "title": map_title(name)} for name in map_names()]
+    return {"build": BASE_BUILD, "sc2path": path, "sc2path_is": kind, "maps": maps}
+
+
+@app.command()
+def serve(
+    port: Annotated[int, typer.Option(help="Port of the websocket /sc2api.", min=1, max=65535)] = 5000,
+    host: Annotated[str, typer.Option(help="Address to listen on, IPv4 or IPv6.")] = "127.0.0.1",
+    data_dir: Annotated[Path, typer.Option(help="An install, for its maps and replays.")] = Path(),
+) -> None:
+    """Run one game process in the foreground, for debugging.
+
+    PySC2 attaches to it with --sc2_port; it ends when a client says quit, or with Ctrl+C.
+    """
+    from khala_simulator.__main__ import main  # noqa: PLC0415  # it takes over signals and sockets
+
+    typer.echo(f"Listening on ws://{host}:{port}/sc2api", err=True)
+    main(["-listen", host, "-port", str(port), "-dataDir", str(data_dir)])

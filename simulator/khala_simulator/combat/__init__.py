@@ -1,0 +1,1 @@
+"""The rules of fights: damage, targets, weapons, buffs, and how a unit enters the world, changes and leaves it."""

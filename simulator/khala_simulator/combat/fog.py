@@ -1,0 +1,70 @@
+"""Fog: what a player remembers of structures and resources where it sees nothing now.
+
+Keeps the snapshots of ``World.memories`` up to date. Above: ``systems.vision``. Below: ``snapshots``.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.world.players import NEUTRAL
+from khala_simulator.world.snapshots import INDEX_SHIFT, TAG_BASE, Snapshot
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.snapshots import Memory
+    from khala_simulator.world.world import World
+
+VISIBLE: Final = 2
+
+
+def remember(world: World, player: int) -> None:
+    """Bring a player's memory up to date with what he sees in this loop."""
+    memory = world.memories[player]
+    slots = world.live[_stays(world.catalog)[world.type[world.live]] & (world.owner[world.live] != player)]
+    seen = world.visible[player, slots]
+    if not memory.made:  # the game shows where the neutral things are from the start
+        seen = seen | (world.owner[slots] == NEUTRAL)
+    for slot in slots[seen].tolist():
+        _note(world, memory, slot)
+    in_sight = {int(world.tag[slot]) for slot in slots[world.visible[player, slots]].tolist()}
+    hidden = [s for s in memory.of_unit.values() if s.unit not in in_sight]
+    for snapshot in hidden:
+        if _place_is_seen(world, player, snapshot):
+            del memory.of_unit[snapshot.unit]
+    memory.shown = [s for s in hidden if s.unit in memory.of_unit]
+
+
+def _note(world: World, memory: Memory, slot: int) -> None:
+    tag = int(world.tag[slot])
+    known = memory.of_unit.get(tag)
+    if known is None:
+        memory.made += 1
+    index = memory.made if known is None else (known.tag - TAG_BASE) >> INDEX_SHIFT
+    (x, y), (hx, hy) = world.pos[slot].tolist(), world.heading[slot].tolist()
+    memory.of_unit[tag] = Snapshot(
+        tag=TAG_BASE | index << INDEX_SHIFT,
+        unit=tag,
+        row=int(world.type[slot]),
+        owner=int(world.owner[slot]),
+        pos=(x, y),
+        heading=(hx, hy),
+        build_progress=float(world.build_progress[slot]),
+    )
+
+
+def _place_is_seen(world: World, player: int, snapshot: Snapshot) -> bool:
+    x, y = (int(v) for v in snapshot.pos)
+    height, width = world.visibility[player].shape
+    return 0 <= x < width and 0 <= y < height and bool(world.visibility[player, y, x] == VISIBLE)
+
+
+@lru_cache(maxsize=4)
+def _stays(catalog: Catalog) -> NDArray[np.bool_]:
+    """[rows] which types leave snapshots: structures, resources and whatever else never moves."""
+    return np.array([(u.structure or bool(u.resource)) and u.speed_n == 0.0 for u in catalog.units])

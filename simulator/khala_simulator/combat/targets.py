@@ -1,0 +1,91 @@
+"""Targets: a unit begins and ends a fight, with the weapon that fits the other one.
+
+Used by commands (by order) and by the systems (by its own choice); whether and when it then fires is
+``systems.weapons``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from khala_simulator.tables.stats import GROUND_PLANE
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+WIDEST_AIM_DEG = 180.0
+
+
+def weapon_for(world: World, slot: int, target: int) -> int:
+    """Row of the weapon that a unit can aim at ``target`` now, or -1."""
+    on_ground = bool(world.plane_bits[target] & GROUND_PLANE)
+    row = int(world.ground_weapon[slot]) if on_ground else -1
+    if row < 0 and (not on_ground or world.plane_bits[target] != GROUND_PLANE):
+        row = int(world.air_weapon[slot])
+    if row >= 0 and world.catalog.weapons[row].excluding in world.unit_type(target).attributes:
+        return -1
+    return row
+
+
+def engage(world: World, slot: int, target: int) -> bool:
+    """Make a unit fight ``target`` with the weapon that fits; False when it has none."""
+    row = weapon_for(world, slot, target)
+    if row < 0:
+        return False
+    if world.target[slot] != target:
+        drop_attack(world, slot)
+    weapon = world.catalog.weapons[row]
+    world.target[slot] = target
+    world.weapon[slot] = row
+    measure_reach(world, slot)
+    bites = world.close_weapon[slot] >= 0
+    world.reach_min[slot] = -math.inf if bites or not weapon.min_range else weapon.min_range
+    world.slop[slot] = weapon.slop
+    world.rolling[slot] = weapon.moves == "moving"
+    world.turreted[slot] = weapon.turret_deg_n is not None
+    angle = min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)
+    fixed = weapon.turret_deg_n is None and world.unit_type(slot).unturnable
+    world.aim_cos[slot] = -1.0 if fixed else math.cos(math.radians(angle))
+    world.nav_loop[slot] = 0
+    return True
+
+
+def take_other_weapon(world: World, slot: int) -> None:
+    """Go on with a fight with the weapons of another type, or end it when none fits."""
+    drop_attack(world, slot)
+    if not engage(world, slot, int(world.target[slot])):
+        disengage(world, slot)
+
+
+def measure_reach(world: World, slot: int) -> None:
+    """Write the reach of the weapon at hand, with what buffs add to it or take from it.
+
+    Bodies of some types, such as Siege Tanks and Sentries, keep others farther off than their edges are; whoever
+    touches one reaches it.
+    """
+    plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])
+    touch, target = 0.0, world.target[slot]
+    if target != NOBODY:
+        bodies = world.separation[slot] + world.separation[target]
+        touch = float(bodies - world.radius[slot] - world.radius[target])
+    world.reach[slot] = max(plain + more, min(plain, 0.0), touch)  # what is taken away leaves an arm's length
+
+
+def disengage(world: World, slot: int) -> None:
+    """Make a unit stop fighting; what it has fired stays on its way."""
+    drop_attack(world, slot)
+    world.target[slot] = NOBODY
+    world.weapon[slot] = -1
+    world.rolling[slot] = world.turreted[slot] = False
+    world.nav_loop[slot] = 0
+    world.scan_now = True
+
+
+def drop_attack(world: World, slot: int) -> None:
+    """Drop an attack that is started and has not taken effect; it leaves no cooldown."""
+    world.beaming[slot] = False
+    if world.windup[slot] >= 0.0:
+        world.windup[slot] = -1.0
+        world.cooldown[slot] = 0.0

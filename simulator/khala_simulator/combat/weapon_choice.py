@@ -1,0 +1,66 @@
+"""Armament: which weapons a unit can use now, as traits of its slot.
+
+A type's weapons that are switched off can be switched on, and the other way round, by a buff (an Oracle's beam) or by
+the unit's own setting (a Baneling that blows up structures). Of the usable weapons the one with the longest range is
+aimed; a hidden one with a shorter range takes over when the target stands close, as a Roach's bite does. ``traits``
+calls this, ``targets`` picks from what it writes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
+from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_simulator.tables.buffs import Buff
+    from khala_simulator.tables.records import UnitType, Weapon
+    from khala_simulator.world.world import World
+
+NO_SCAN: Final = -1.0
+NO_WEAPON: Final = -1
+WIDEST_TURN_DEG: Final = 180.0
+
+
+def usable_weapons(world: World, slot: int, kinds: Iterable[Buff] = ()) -> list[Weapon]:
+    """The weapons that are switched on and do something, the longest range first."""
+    toggles = int(world.weapon_toggles[slot])
+    on = {name for kind in kinds for name in kind.weapons_on}
+    off = {name for kind in kinds for name in kind.weapons_off}
+    usable = [
+        weapon
+        for index, weapon in enumerate(world.unit_type(slot).weapons)
+        if weapon.works and weapon.id not in off and (weapon.id in on or weapon.disabled == bool(toggles >> index & 1))
+    ]
+    return sorted(usable, key=lambda weapon: -weapon.range)
+
+
+def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]) -> None:
+    """Write the weapon traits of a slot; see ``columns``."""
+    weapons = usable_weapons(world, slot, kinds)
+    owner = int(world.owner[slot])
+    ground = next((w for w in weapons if w.reaches("ground")), None)
+    air = next((w for w in weapons if w.reaches("air")), None)
+    close = next((w for w in weapons if w.hidden and ground is not None and w.range < ground.range), None)
+    world.ground_weapon[slot] = NO_WEAPON if ground is None else ground.row
+    world.air_weapon[slot] = NO_WEAPON if air is None else air.row
+    world.close_weapon[slot] = NO_WEAPON if close is None else close.row
+    world.close_range[slot] = 0.0 if close is None else close.range
+    world.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
+    world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
+    world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
+    world.acquires[slot] = bool(weapons) and not (unit.defensive or unit.passive or unit.uncommandable) and owner != 0
+    planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
+    world.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
+    world.defensive[slot], world.flees[slot] = unit.defensive, unit.flees and not unit.passive
+    world.guns_walking[slot] = any(w.fires_moving and w.moves == "moving" for w in weapons)
+    world.spares_structures[slot] = bool(weapons) and all(
+        w.acquires == "unit" or w.excluding == "structure" for w in weapons
+    )
+    turret = next((w.turret_deg_n for w in weapons if w.turret_deg_n is not None), 0.0)
+    turn = math.radians(min(turret / LOOPS_PER_NORMAL_SECOND, WIDEST_TURN_DEG))
+    world.turret_cos[slot], world.turret_sin[slot] = math.cos(turn), math.sin(turn)

@@ -1,0 +1,1 @@
+"""Maps: terrain, scenarios, the scripts of scenarios, and `.SC2Map` archives."""

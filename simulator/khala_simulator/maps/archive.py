@@ -1,0 +1,161 @@
+"""A user's own .SC2Map archive as a map that can be played.
+
+Terrain, playable area, start locations and what stands on the map are read from it. Its script is a program that nobody
+here can run: a map that is known by its name has the script of its scenario, any other one is a plain melee game.
+
+Above: ``map_file``, ``install``. Below: ``terrain_file``, ``maps``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import struct
+import zlib
+from functools import lru_cache
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any, Final
+from xml.etree import ElementTree as ET
+
+import mpyq
+import numpy as np
+
+from khala_simulator.maps import terrain_file
+from khala_simulator.maps.game_map import GameMap, MapError, find_map, game_map, load_map
+from khala_simulator.maps.scenario import Scenario
+from khala_simulator.maps.terrain_file import Ground, TerrainError
+from khala_simulator.tables.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from khala_simulator.maps.game_map import Terrain
+
+MAGIC: Final = b"MPQ"
+OBJECTS: Final = "Objects"
+CLOSED: Final = ("CellAttribute_Pnp", "CellAttribute_Pwd")  # paint that nobody walks on
+QUARTER_TURN: Final = np.pi / 2.0  # from the editor's rotation, 0 downwards, to the API's facing, 0 eastwards
+FAMILY: Final = "user"
+
+
+class ArchiveError(ValueError):
+    """The bytes are no archive of a map, or one that can't be read; the text says why."""
+
+
+def read_archive(data: bytes, path: str) -> GameMap:
+    """The map in the bytes of an archive; ``path`` tells its name.
+
+    Raises:
+        ArchiveError: it can't be read, and its name is not that of a shipped map either.
+    """
+    name = PurePosixPath(path.replace("\\", "/")).stem
+    known = _known(path)
+    try:
+        terrain, content = _terrain_of(data)
+    except ArchiveError:
+        if known is not None:
+            return known
+        raise
+    digest = content + name.encode()
+    if known is not None and known.terrain.size == terrain.size:
+        return game_map(known.scenario, terrain, digest)
+    return game_map(_melee(_member(_open(data), OBJECTS), name), terrain, digest)
+
+
+def _known(path: str) -> GameMap | None:
+    """The shipped map of this name."""
+    try:
+        return load_map(find_map(path if path.endswith(".SC2Map") else f"{path}.SC2Map"))
+    except MapError:
+        return None
+
+
+@lru_cache(maxsize=8)
+def _terrain_of(data: bytes) -> tuple[Terrain, bytes]:
+    """The terrain of an archive and a hash of the whole; a game is created from the same bytes again and again."""
+    archive = _open(data)
+    try:
+        info = terrain_file.read_map_info(_member(archive, "MapInfo"))
+        painted = np.zeros(info.size[::-1], dtype=np.bool_)
+        for name in CLOSED:
+            paint = _find(archive, name)
+            if paint is not None:
+                painted |= terrain_file.read_paint(paint, info.size)
+        ground = Ground(
+            vertices=terrain_file.read_heights(_member(archive, "t3SyncHeightMap"), info.size),
+            cliff=terrain_file.read_cliffs(_member(archive, "t3SyncCliffLevel"), info.size),
+            on_cliff_tile=terrain_file.read_flags(_member(archive, "t3CellFlags"), info.size),
+            painted=painted,
+        )
+    except TerrainError as error:
+        raise ArchiveError(str(error)) from error
+    return terrain_file.terrain_of(info, ground), hashlib.sha256(data).digest()
+
+
+def _open(data: bytes) -> Any:
+    try:
+        return mpyq.MPQArchive(io.BytesIO(data), listfile=False)
+    except (ValueError, TypeError, struct.error, KeyError, IndexError) as error:
+        raise ArchiveError(f"the archive is damaged: {error}") from error
+
+
+def _find(archive: Any, name: str) -> bytes | None:
+    try:
+        found: bytes | None = archive.read_file(name)
+    except (ValueError, TypeError, struct.error, zlib.error, OSError, IndexError, RuntimeError) as error:
+        raise ArchiveError(f"{name} in the archive can't be read: {error}") from error
+    return found
+
+
+def _member(archive: Any, name: str) -> bytes:
+    found = _find(archive, name)
+    if found is None:
+        raise ArchiveError(f"the archive has no {name}")
+    return found
+
+
+# what stands on the map -----------------------------------------------------------------------------------------------
+
+
+def _melee(objects: bytes, name: str) -> Scenario:
+    """A melee game on the start locations of a map, with what stands there."""
+    try:
+        root = _tree(objects)
+        starts = [_point(o) for o in root.iter("ObjectPoint") if o.get("Type") == "StartLoc"]
+        units = [unit for o in root.iter("ObjectUnit") if (unit := _unit(o, len(starts))) is not None]
+    except (ET.ParseError, ValueError) as error:
+        raise ArchiveError(f"{OBJECTS} in the archive can't be read: {error}") from error
+    slots = {number: {"race": "random", "control": "open", "ai": "melee"} for number in range(1, len(starts) + 1)}
+    return Scenario.model_validate(
+        {
+            "name": re.sub(r"\W", "_", name, flags=re.ASCII) or "map",
+            "family": FAMILY,
+            "title": f"Melee on {name}",
+            "terrain": "archive",
+            "melee": bool(starts),
+            "start_locations": starts,
+            "players": slots or {1: {"race": "random", "control": "open"}},
+            "units": units,
+        }
+    )
+
+
+def _tree(data: bytes) -> ET.Element:
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise ValueError("it declares entities")
+    return ET.fromstring(data)  # noqa: S314  # without entities
+
+
+def _point(element: ET.Element) -> tuple[float, float]:
+    x, y = (float(number) for number in element.get("Position", "").split(",")[:2])
+    return x, y
+
+
+def _unit(element: ET.Element, players: int) -> dict[str, Any] | None:
+    """A placed unit as a scenario tells it; None for a type that the tables do not have or a player who isn't there."""
+    kind, owner = element.get("UnitType", ""), int(element.get("Player", "0"))
+    if kind not in load_catalog().row_of_name or owner > players:
+        return None
+    unit: dict[str, Any] = {"player": owner, "unit": kind, "at": [_point(element)]}
+    if (turned := element.get("Rotation")) is not None:
+        unit["facing"] = (float(turned) - QUARTER_TURN) % (2.0 * np.pi)
+    return unit

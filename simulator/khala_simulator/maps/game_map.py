@@ -1,0 +1,238 @@
+"""Maps: terrain grids joined with the scenario that is played on them.
+
+Immutable and shared by every game on the map; what structures add to the terrain during a game is the world's.
+All grids are indexed ``[y, x]`` with row 0 at y = 0 (the bottom), cell (x, y) covering [x, x+1) x [y, y+1).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from khala_simulator.maps.scenario import Flat, Scenario
+from khala_simulator.maps.scenario_file import Sheet, sheets
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from khala_simulator.numeric.geometry import Floats
+
+Grid = NDArray[np.bool_]
+Box = tuple[int, int, int, int]
+
+BASES = "bases"
+"""The folder beside the families whose files are only extended by others."""
+FIRST_CHOICE = "llm_smac"
+"""The family that a bare name means when several have it: its maps end by themselves."""
+FLAT_Z = 10.0
+FLAT_CLIFF = 128
+HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
+
+
+class MapError(ValueError):
+    """No such map, or its terrain is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """The unchanging ground: (h, w) grids unless a line says otherwise."""
+
+    size: tuple[int, int]  # width, height in cells
+    playable: Box  # x0, y0, x1, y1; x1 and y1 exclusive
+    walk: Grid  # a ground unit's centre may be here
+    glide: Grid  # a cliff walker's centre may be here
+    build: Grid  # structures may stand here
+    creep: Grid  # creep painted by the map, never receding
+    cliff: NDArray[np.uint16]  # level, 64 per step; 0 is void, between multiples is a ramp
+    height: NDArray[np.uint8]  # API bytes: z = -16 + 32 v / 255 at the cell's lower-left corner
+    vertices: NDArray[np.float32]  # (h + 1, w + 1) ground z at the cells' corners
+
+    def ground_z(self, points: Floats) -> Floats:
+        """Ground height under world points (n, 2), interpolated between the corners of their cells."""
+        x = np.minimum(np.maximum(points[..., 0], 0.0), self.size[0] - 1e-6)
+        y = np.minimum(np.maximum(points[..., 1], 0.0), self.size[1] - 1e-6)
+        ix, iy = x.astype(np.intp), y.astype(np.intp)
+        fx, fy = x - ix, y - iy
+        v, width = self.vertices, self.vertices.shape[1]
+        corner = iy * width + ix  # one index into the flat grid costs a third of two
+        low = v.take(corner) * (1.0 - fx) + v.take(corner + 1) * fx
+        high = v.take(corner + width) * (1.0 - fx) + v.take(corner + width + 1) * fx
+        result: Floats = low * (1.0 - fy) + high * fy
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class GameMap:
+    """A map that can be played.
+
+    ``path`` is where an install keeps it below ``Maps`` (``llm_smac/2s3z.SC2Map``), ``digest`` a hash of scenario and
+    terrain that names exactly this content.
+    """
+
+    name: str
+    family: str
+    terrain: Terrain
+    scenario: Scenario
+    digest: str
+
+    @property
+    def path(self) -> str:
+        """Path below ``Maps`` in an install, with forward slashes."""
+        return f"{self.family}/{self.name}.SC2Map"
+
+    @property
+    def camera(self) -> tuple[float, float]:
+        """Where the camera starts: the scenario's word, or the middle of the playable area."""
+        if self.scenario.camera is not None:
+            return self.scenario.camera
+        x0, y0, x1, y1 = self.terrain.playable
+        return (x0 + x1) / 2.0, (y0 + y1) / 2.0
+
+
+@lru_cache(maxsize=1)
+def _families() -> tuple[str, ...]:
+    """The folders of shipped maps, sorted."""
+    root = resources.files("khala_simulator.data") / "maps"
+    return tuple(sorted(folder.name for folder in root.iterdir() if folder.is_dir() and folder.name != BASES))
+
+
+@lru_cache(maxsize=32)
+def _sheets(family: str) -> Mapping[str, Sheet]:
+    """The scenarios of a family's shipped files as ``family/name``; none of a family that is not there."""
+    if family not in _families():
+        return {}
+    found: dict[str, Sheet] = {}
+    for file in (resources.files("khala_simulator.data") / "maps" / family).iterdir():
+        if file.name.endswith(".yaml"):
+            named = sheets(file.read_text(encoding="utf-8"), f"{family}/{file.name}")
+            found |= {f"{family}/{name}": sheet for name, sheet in named}
+    return found
+
+
+@lru_cache(maxsize=1)
+def map_names() -> tuple[str, ...]:
+    """All shipped maps as ``family/name``, sorted."""
+    return tuple(sorted(name for family in _families() for name in _sheets(family)))
+
+
+def map_title(name: str) -> str:
+    """What the shipped map ``family/name`` is about."""
+    return _sheets(name.partition("/")[0])[name].title
+
+
+def find_map(name: str) -> str:
+    """The shipped map that ``name`` means: ``family/name``, a bare name, or a path to an .SC2Map file of that name.
+
+    Raises:
+        MapError: none is meant, or a bare name means several.
+    """
+    parts = Path(name.replace("\\", "/")).with_suffix("").parts if name.endswith(".SC2Map") else Path(name).parts
+    exact = "/".join(parts[-2:])
+    if len(parts) > 1 and exact in _sheets(parts[-2]):
+        return exact
+    preferred = f"{FIRST_CHOICE}/{''.join(parts[-1:])}"
+    if preferred in _sheets(FIRST_CHOICE):
+        return preferred
+    same = [known for known in map_names() if parts and known.split("/")[1] == parts[-1]]
+    if len(same) == 1:
+        return same[0]
+    if same:
+        raise MapError(f"map {name!r} is ambiguous: {', '.join(same)}")
+    raise MapError(f"no map {name!r}; shipped are {', '.join(map_names())}")
+
+
+def load_map(name: str) -> GameMap:
+    """The shipped map with this name (see ``find_map``); raises ``MapError`` when there is none."""
+    return _load(find_map(name))
+
+
+@lru_cache(maxsize=128)
+def _load(full_name: str) -> GameMap:
+    sheet = _sheets(full_name.partition("/")[0])[full_name]
+    return map_from(sheet.scenario(), sheet.canonical())
+
+
+def map_from(scenario: Scenario, text: str) -> GameMap:
+    """Join a scenario, which ``text`` tells completely, with its terrain."""
+    if isinstance(scenario.terrain, Flat):
+        terrain, content = _flat(scenario.terrain.flat)
+    else:
+        terrain, content = _shipped(scenario.terrain)
+    return game_map(scenario, terrain, text.encode() + content)
+
+
+def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
+    """The map of a scenario on a terrain, which ``content`` tells completely."""
+    narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
+    return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
+
+
+def height_bytes(vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(h, w) the API's height of every cell, which is that of its lower-left corner, from (h + 1, w + 1) z."""
+    scaled = np.rint((vertices[:-1, :-1] - HEIGHT_LOW) * (HEIGHT_STEPS / HEIGHT_SPAN))
+    result: NDArray[np.uint8] = np.clip(scaled, 0, HEIGHT_STEPS).astype(np.uint8)
+    return result
+
+
+@lru_cache(maxsize=32)
+def _shipped(name: str) -> tuple[Terrain, bytes]:
+    path = resources.files("khala_simulator.data") / "terrain" / f"{name}.npz"
+    if not path.is_file():
+        raise MapError(f"no terrain {name!r} is shipped")
+    with path.open("rb") as file, np.load(file) as grids:
+        arrays = {key: grids[key] for key in grids.files}
+    for array in arrays.values():
+        array.setflags(write=False)
+    content = b"".join(arrays[key].tobytes() for key in sorted(arrays))
+    walk = arrays["walk"]
+    x0, y0, x1, y1 = (int(v) for v in arrays["playable"])
+    terrain = Terrain(
+        size=(walk.shape[1], walk.shape[0]),
+        playable=(x0, y0, x1, y1),
+        walk=walk,
+        glide=arrays["glide"],
+        build=arrays["build"],
+        creep=arrays.get("creep", np.zeros_like(walk)),
+        cliff=arrays["cliff"],
+        height=arrays["height"],
+        vertices=arrays["vertices"],
+    )
+    return terrain, content
+
+
+@lru_cache(maxsize=32)
+def _flat(size: tuple[int, int]) -> tuple[Terrain, bytes]:
+    """Level ground on which everything may stand everywhere."""
+    width, height = size
+    free = np.ones((height, width), dtype=np.bool_)
+    vertices = np.full((height + 1, width + 1), FLAT_Z, dtype=np.float32)
+    cliff = np.full((height, width), FLAT_CLIFF, dtype=np.uint16)
+    none = np.zeros_like(free)
+    terrain = Terrain(size, (0, 0, width, height), free, free, free, none, cliff, height_bytes(vertices), vertices)
+    for array in (free, none, vertices, cliff, terrain.height):
+        array.setflags(write=False)
+    return terrain, repr(size).encode()
+
+
+@lru_cache(maxsize=64)
+def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
+    """The terrain of which only a part is played on; heights are told of that part alone, as the game does."""
+    x0, y0, x1, y1 = playable
+    width, height = terrain.size
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise MapError(f"the playable area {list(playable)} is not within the terrain's {width} x {height} cells")
+    inside = np.zeros_like(terrain.walk)
+    inside[y0:y1, x0:x1] = True
+    grids = {name: getattr(terrain, name) & inside for name in ("walk", "glide", "build", "creep")}
+    told = np.where(inside, terrain.height, 0).astype(np.uint8)
+    for array in (*grids.values(), told):
+        array.setflags(write=False)
+    return dataclasses.replace(terrain, playable=playable, height=told, **grids)

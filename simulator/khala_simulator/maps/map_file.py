@@ -1,0 +1,106 @@
+"""What stands in the `.SC2Map` files of an install, and which map a client means.
+
+A map of ours is a text file: a first line that marks it, then the name of a shipped map, or a whole scenario in
+the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
+path. An archive of StarCraft II itself is read by `archive.py`.
+
+Above: `install.py`, `api/lobby.py`. Below: `maps.py`, `archive.py`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from yaml import YAMLError
+
+from khala_simulator.maps.game_map import GameMap, MapError, find_map, load_map, map_from, map_names
+from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps")
+"""Folders below `Maps` that PySC2, SMAC and LLM-PySC2 look into."""
+
+SUFFIX = ".SC2Map"
+_MARK = b"# A map of Khala's simulator\n"
+_ARCHIVE = b"MPQ"
+
+
+class MapDataError(ValueError):
+    """The bytes are no map that can be played here."""
+
+
+def placeholders() -> Iterator[tuple[str, bytes]]:
+    """Path below `Maps` and content of the file of every shipped map."""
+    for name in map_names():
+        yield name + SUFFIX, _placeholder(name)
+
+
+def _placeholder(name: str) -> bytes:
+    return _MARK + name.encode() + b"\n"
+
+
+def is_placeholder(data: bytes) -> bool:
+    """Whether this is the file of a shipped map, which an update may replace, and nothing that a user wrote."""
+    return data.startswith(_MARK) and b"\n" not in data[len(_MARK) :].strip()
+
+
+def is_archive(data: bytes) -> bool:
+    """Whether this is an archive of StarCraft II itself."""
+    return data.startswith(_ARCHIVE)
+
+
+def read_map(data: bytes, path: str) -> GameMap:
+    """The map in the bytes of a file; its path tells which map an archive of StarCraft II holds.
+
+    Raises:
+        MapDataError: with a sentence for the client.
+    """
+    if is_archive(data):
+        from khala_simulator.maps.archive import ArchiveError, read_archive  # noqa: PLC0415  # its libraries, for few games only
+
+        try:
+            return read_archive(data, path)
+        except ArchiveError as error:
+            raise MapDataError(f"{path or 'the map'} is an archive that the simulator cannot read: {error}") from error
+    if not data.startswith(_MARK):
+        raise MapDataError(f"{path or 'the map'} holds neither a map of the simulator nor a StarCraft II archive")
+    try:
+        return _read_text(data, path or "the map")
+    except (MapError, ScenarioError) as error:
+        raise MapDataError(str(error)) from error
+    except (ValueError, YAMLError) as error:  # no UTF-8, control characters, an impossible date
+        raise MapDataError(f"{path or 'the map'} cannot be read: {error}") from error
+
+
+def _read_text(data: bytes, source: str) -> GameMap:
+    text = data.decode()
+    if is_placeholder(data):
+        return load_map(text[len(_MARK) :].strip())
+    return map_from(parse_scenario(text, source), text)  # the mark is a comment of YAML
+
+
+def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:
+    """The bytes of the map that a path means, or None.
+
+    It may be one that the client saved, a file of the install, any file, or the name of a shipped map.
+    """
+    if path in saved:
+        return saved[path]
+    for file in _files(path, data_dir):
+        with contextlib.suppress(OSError, ValueError):  # not there, a directory, or no possible name at all
+            return file.read_bytes()
+    try:
+        return _placeholder(find_map(path))
+    except MapError:
+        return None
+
+
+def _files(path: str, data_dir: Path) -> Iterator[Path]:
+    maps = data_dir / "Maps"
+    yield maps / path
+    yield Path(path)
+    yield from (folder / PurePosixPath(path).name for folder in sorted(maps.glob("*/")))

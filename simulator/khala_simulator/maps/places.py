@@ -1,0 +1,250 @@
+"""Places of a scenario: points, regions and the ways in which a file says where units shall be.
+
+Models and plane geometry. Names are only names here: whether a point, a region, a player or a unit type exists is
+checked against ``Names``, which the reader of the file hands in as the context of the validation. Above: ``script``,
+``scenario``. Which random place it is, and which is free, is for ``systems``.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    model_validator,
+)
+
+from khala_simulator.tables.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from khala_simulator.numeric.arrays import Bools
+    from khala_simulator.numeric.geometry import Floats
+    from khala_simulator.tables.catalog import Catalog
+
+
+class Model(BaseModel):
+    """A part of a scenario: nothing that is not foreseen, and it never changes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the parts of one file may refer to."""
+
+    players: frozenset[int]
+    points: frozenset[str]
+    regions: frozenset[str]
+    groups: frozenset[str]
+
+
+def _known(value: Any, known: Collection[Any], what: str) -> Any:
+    if value in known:
+        return value
+    close = difflib.get_close_matches(str(value), [str(name) for name in sorted(known)], n=1)
+    hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(map(str, sorted(known))) or 'none'}"
+    raise ValueError(f"there is no {what} {value}{hint}")
+
+
+def _reference(what: str, *fields: str) -> AfterValidator:
+    """A check that the file has what a value names; without a context everything is taken for known."""
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        names = info.context
+        if names is None or isinstance(value, tuple):
+            return value
+        return _known(value, frozenset[Any]().union(*(getattr(names, field) for field in fields)), what)
+
+    return AfterValidator(check)
+
+
+def _in_tables(names: Callable[[Catalog], Collection[str]], what: str) -> AfterValidator:
+    """A check that any version of the game's tables has what a value names."""
+
+    def check(value: str) -> str:
+        if any(value in names(load_catalog(version)) for version in (DEFAULT_VERSION, *VERSION_OF_BUILD.values())):
+            return value
+        close = difflib.get_close_matches(value, sorted(names(load_catalog())), n=1)
+        raise ValueError(f"there is no {what} {value}" + (f"; did you mean {close[0]}?" if close else ""))
+
+    return AfterValidator(check)
+
+
+PlayerId = Annotated[int, Field(ge=1, le=15)]
+Owner = Annotated[int, _reference("player", "players")]
+"""A player of the file, or 0 for the neutral one."""
+PointName = Annotated[str, _reference("point", "points")]
+RegionName = Annotated[str, _reference("region", "regions")]
+GroupName = Annotated[str, _reference("group", "groups")]
+UnitName = Annotated[str, _in_tables(lambda catalog: catalog.row_of_name, "unit type")]
+UpgradeName = Annotated[str, _in_tables(lambda catalog: {upgrade.name for upgrade in catalog.upgrades}, "upgrade")]
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Point = Annotated[tuple[float, float], BeforeValidator(_as_tuple)]
+Posed = Annotated[tuple[float, float] | tuple[float, float, float], BeforeValidator(_as_tuple)]
+"""A point, or a point and the facing of the unit that stands there."""
+
+
+def kind_of_place(value: Any) -> str | None:
+    """Which form of a place a value is meant to be."""
+    if isinstance(value, str):
+        return "name"
+    if isinstance(value, list | tuple):
+        return "point" if not value or not isinstance(value[0], list | tuple) else "points"
+    keys = value if isinstance(value, dict) else type(value).model_fields
+    return next((kind for kind in ("x", "random_in", "column") if kind in keys), None)
+
+
+Place = Annotated[
+    Annotated[PointName, Tag("name")] | Annotated[Point, Tag("point")],
+    Discriminator(kind_of_place, custom_error_type="place", custom_error_message="give a point's name or [x, y]"),
+]
+
+
+Source = Annotated[str | Point, _reference("point or region", "points", "regions")]
+"""What a point is drawn from: another one, or any point of a region."""
+
+
+class Span(Model):
+    """Numbers from one to another, both included."""
+
+    start: float = Field(alias="from")
+    to: float
+    step: Annotated[float, Field(gt=0)] = 1.0
+
+    def values(self) -> tuple[float, ...]:
+        """The numbers, ascending."""
+        count = round((self.to - self.start) / self.step) + 1
+        return tuple(round(self.start + i * self.step, 4) for i in range(count))
+
+
+def _axis(value: Any) -> Any:
+    """One number, several, or a span, as the numbers that they stand for."""
+    if isinstance(value, dict):
+        return Span.model_validate(value).values()
+    return (value,) if isinstance(value, int | float) else _as_tuple(value)
+
+
+Axis = Annotated[tuple[float, ...], BeforeValidator(_axis), Field(min_length=1)]
+
+
+class Grid(Model):
+    """Every x with every y; offsets from a place, if they are ``around`` one."""
+
+    x: Axis
+    y: Axis
+    around: Place | None = None
+
+
+class RandomPlace(Model):
+    """Anywhere in a region, at least so far from every unit of a type, centre to centre."""
+
+    random_in: RegionName
+    away_from: dict[UnitName, float] = {}
+
+
+class Column(Model):
+    """One above and one below the other in turn, around a place."""
+
+    column: Place
+    step: Annotated[float, Field(gt=0)] = 1.0
+
+
+Spot = Annotated[
+    Annotated[PointName, Tag("name")]
+    | Annotated[Point, Tag("point")]
+    | Annotated[tuple[Posed, ...], Tag("points")]
+    | Annotated[Grid, Tag("x")]
+    | Annotated[RandomPlace, Tag("random_in")]
+    | Annotated[Column, Tag("column")],
+    Discriminator(
+        kind_of_place,
+        custom_error_type="spot",
+        custom_error_message="give a point's name, [x, y], a list of them, {x, y}, {random_in: region} or "
+        "{column: point}",
+    ),
+]
+"""Where units are put: all at one point, one at each of several, at random, or in a column."""
+
+
+class Shape(Model):
+    """A rectangle ``[x0, y0, x1, y1]`` or a circle ``[x, y, radius]``; ``minus`` takes it out of the region."""
+
+    rect: Annotated[tuple[float, float, float, float], BeforeValidator(_as_tuple)] | None = None
+    circle: Annotated[tuple[float, float, float], BeforeValidator(_as_tuple)] | None = None
+    minus: bool = False
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Shape:
+        if (self.rect is None) == (self.circle is None):
+            raise ValueError("give either rect: [x0, y0, x1, y1] or circle: [x, y, radius]")
+        return self
+
+    def covers(self, points: Floats) -> Bools:
+        """(n,) whether each of the points (n, 2) is inside, edges included."""
+        x, y = points[:, 0], points[:, 1]
+        if self.rect is not None:
+            x0, y0, x1, y1 = self.rect
+            inside: Bools = (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
+            return inside
+        cx, cy, radius = self.circle or (0.0, 0.0, 0.0)
+        within: Bools = (x - cx) ** 2 + (y - cy) ** 2 <= radius**2
+        return within
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """The rectangle around it."""
+        if self.rect is not None:
+            return self.rect
+        cx, cy, radius = self.circle or (0.0, 0.0, 0.0)
+        return cx - radius, cy - radius, cx + radius, cy + radius
+
+
+class Region(Model):
+    """A part of the map: what any of its shapes covers and none that is taken out."""
+
+    shapes: Annotated[tuple[Shape, ...], Field(min_length=1)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _shapes(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "shapes" not in value:
+            value = [value]
+        return {"shapes": value} if isinstance(value, list) else value
+
+    @model_validator(mode="after")
+    def _something(self) -> Region:
+        if all(shape.minus for shape in self.shapes):
+            raise ValueError("a region needs a shape that is not taken out of it")
+        return self
+
+    def covers(self, points: Floats) -> Bools:
+        """(n,) whether each of the points (n, 2) lies in the region."""
+        inside: Bools = np.zeros(len(points), dtype=np.bool_)
+        for shape in self.shapes:
+            inside = inside & ~shape.covers(points) if shape.minus else inside | shape.covers(points)
+        return inside
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """The rectangle around all of it."""
+        corners = np.array([shape.box for shape in self.shapes if not shape.minus])
+        x0, y0 = corners[:, :2].min(axis=0).tolist()
+        x1, y1 = corners[:, 2:].max(axis=0).tolist()
+        return x0, y0, x1, y1

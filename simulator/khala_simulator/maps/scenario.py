@@ -1,0 +1,153 @@
+"""The scenario language: what a map's own script does, as data.
+
+A scenario is one YAML file of about 30 lines: who plays, where the named points and regions are, what stands there,
+and an ordered list of triggers. A trigger says *when* it is looked at, *if* which condition holds, and what it will
+*do*::
+
+    triggers:
+      - name: spawn
+        when: [start, unit_died]
+        if: {alive: {1: none, 2: none}}
+        do:
+          - create: {player: 1, unit: Stalker, count: 2, at: team_1, facing: 4.7124}
+          - order: {player: 2, attack_move: team_1}
+      - name: victory
+        when: [{every_loops: 80}]
+        if: {alive: {1: some, 2: none}}
+        do:
+          - result: {1: victory, 2: defeat}
+
+Triggers are looked at in the order of the file, and none after the one that ends the game. Here is only the model of
+the whole; its parts are in ``script`` and ``places``, ``scenario_file`` reads it, ``systems.triggers`` executes it and
+``maps`` joins it with its terrain.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UpgradeName
+from khala_simulator.maps.script import At, CreateSpec, Enters, Every, Made, Touches, Trigger
+
+MELEE_MINERALS = 50.0
+"""What every player has at the start of a melee game."""
+
+Box = Annotated[
+    tuple[int, int, int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+]
+
+
+class Visibility(Model):
+    """What the map's script switches off for everybody: the fog of war and the black mask."""
+
+    fog: bool = True
+    black_mask: bool = True
+
+
+class PlayerSpec(Model):
+    """A player slot of the map.
+
+    An ``open`` slot is a player only if somebody sits there. Without a ``start`` a player of a melee game gets one of
+    the scenario's start locations by chance. ``ai: melee`` lets the game's own computer player lead what he has.
+    """
+
+    race: Literal["protoss", "terran", "zerg", "random"]
+    control: Literal["agent", "computer", "open"]
+    start: Point | None = None
+    minerals: Annotated[float, Field(ge=0)] | None = None
+    vespene: Annotated[float, Field(ge=0)] = 0.0
+    upgrades: tuple[UpgradeName, ...] = ()
+    ai: Literal["melee"] | None = None
+
+
+class Flat(Model):
+    """A terrain without a terrain file: level ground of this many cells."""
+
+    flat: Annotated[tuple[int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
+
+
+class Scenario(Model):
+    """A whole map: its terrain, players, places, what stands on it, and its script."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
+    family: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
+    title: str
+    terrain: str | Flat
+    playable: Box | None = None
+    """What part of the terrain is played on, ``[x0, y0, x1, y1]``; the terrain's own without it."""
+    visibility: Visibility = Visibility()
+    camera: Point | None = None
+    """Where the camera starts; in a melee game at the player's workers, else in the middle without it."""
+    score: Literal["melee", "curriculum", "collected"] = "melee"
+    """What the API calls the score: the game's own, the script's, or the resources that were gathered."""
+    melee: bool = False
+    """Whether every player starts with a town hall and twelve workers, and loses with the last structure."""
+    start_locations: tuple[Point, ...] = ()
+    players: dict[PlayerId, PlayerSpec]
+    points: dict[str, Point] = Field(default_factory=dict)
+    regions: dict[str, Region] = Field(default_factory=dict)
+    groups: dict[str, tuple[CreateSpec, ...]] = Field(default_factory=dict)
+    """Units that triggers make by name."""
+    units: tuple[CreateSpec, ...] = ()
+    """What stands on the map before any trigger is looked at."""
+    triggers: tuple[Trigger, ...] = ()
+    estimates: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _starts(self) -> Scenario:
+        if self.melee:
+            open_starts = len(self.start_locations)
+            without = [number for number, player in self.players.items() if player.start is None]
+            if len(without) > open_starts:
+                raise ValueError(f"a melee game needs a start location for player {without[open_starts]}")
+        return self
+
+    @cached_property
+    def periods(self) -> tuple[int, ...]:
+        """The periods in game loops at which any trigger is due."""
+        return tuple(sorted({w.every_loops for w in self._whens if isinstance(w, Every)}))
+
+    @cached_property
+    def moments(self) -> frozenset[int]:
+        """The single game loops at which any trigger is due."""
+        return frozenset(w.at_loop for w in self._whens if isinstance(w, At))
+
+    @cached_property
+    def watches(self) -> bool:
+        """Whether any trigger waits for what can happen in every loop."""
+        return any(isinstance(w, Made | Enters | Touches) for w in self._whens)
+
+    @cached_property
+    def _whens(self) -> list[Any]:
+        return [when for trigger in self.triggers for when in trigger.when]
+
+
+def names_of(raw: Any) -> Names:
+    """What the parts of a scenario may refer to, from its data before they are checked."""
+    raw = raw if isinstance(raw, dict) else {}
+
+    def keys(field: str) -> set[Any]:
+        value = raw.get(field)
+        return set(value) if isinstance(value, dict) else set()
+
+    return Names(
+        players=frozenset({0, *keys("players")}),
+        points=frozenset(keys("points") | set(_drawn(raw.get("triggers")))),
+        regions=frozenset(keys("regions")),
+        groups=frozenset(keys("groups")),
+    )
+
+
+def _drawn(triggers: Any) -> list[str]:
+    """Names of the points that triggers draw."""
+    found: list[str] = []
+    for trigger in triggers if isinstance(triggers, list) else ():
+        actions = trigger.get("do") if isinstance(trigger, dict) else None
+        for action in actions if isinstance(actions, list) else ():
+            options = action.get("draw", ()) if isinstance(action, dict) else ()
+            for option in [options] if isinstance(options, dict) else options:
+                found += list(option) if isinstance(option, dict) else []
+    return found

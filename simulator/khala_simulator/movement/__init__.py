@@ -1,0 +1,1 @@
+"""The rules of movement: ways over the ground, contact between bodies, room for new ones."""

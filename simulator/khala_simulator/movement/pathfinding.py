@@ -1,0 +1,345 @@
+"""Which way round: free cells, connected parts and shortest ways over a terrain with its structures.
+
+A ``Surface`` is one grid of free cells that never changes, so it remembers the ways it has found, across games too.
+``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go. Positions are world
+units, cells are flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import which
+from khala_simulator.tables.layers import Layer
+
+if TYPE_CHECKING:
+    from khala_simulator.maps.game_map import Grid, Terrain
+    from khala_simulator.numeric.geometry import Floats
+    from khala_simulator.world.ground import Ground
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FIELDS_KEPT: Final = 2048
+SIDE_CLEARANCE: Final = 0.3
+SAMPLE_STEP: Final = 0.35
+NEAR_SIDE: Final = 0.2
+LOOK_AHEAD: Final = (1, 2, 3, 5, 8, 12, 18, 26)
+NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
+
+
+class Surface:
+    """Free cells of one layer, with shortest ways to any cell."""
+
+    def __init__(self, free: Grid) -> None:
+        self.free = free
+        self.height, self.width = free.shape
+        self._last = np.array([self.width - 1, self.height - 1])
+        self.flat: Bools = free.ravel()
+        blocked = {(dx, dy): self._neighbour_blocked(dx, dy) for dx, dy in NEIGHBOURS}
+        # free with all eight neighbours free: a body of at most one cell touches no wall from here
+        self.open: Bools = self.flat & ~np.logical_or.reduce(list(blocked.values()))
+        # (cells, 2) whether the neighbour towards lower and towards higher x and y is blocked, as 0 and 1
+        self.walls_low: Floats = np.stack([blocked[-1, 0], blocked[0, -1]], axis=1).astype(np.float64)
+        self.walls_high: Floats = np.stack([blocked[1, 0], blocked[0, 1]], axis=1).astype(np.float64)
+        # corners of a cell (as offsets) at which only the diagonal neighbour is blocked, and of which cells
+        self.spikes: list[tuple[Floats, Bools]] = [
+            (np.array([max(dx, 0), max(dy, 0)], dtype=np.float64), blocked[dx, dy] & ~blocked[dx, 0] & ~blocked[0, dy])
+            for dx, dy in NEIGHBOURS
+            if dx and dy
+        ]
+        self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
+        self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+        self._fields: dict[int, _Field] = {}
+        # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
+        self._steps: list[int] = self._free_steps(blocked).tolist()
+        self._edges = _edges(self.width)
+
+    def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
+        """(cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
+        padded = np.pad(self.free, 1)
+        shifted = padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width]
+        return ~shifted.ravel()
+
+    def _free_steps(self, blocked: dict[tuple[int, int], Bools]) -> NDArray[np.uint8]:
+        """(cells,) the bits of ``_steps``."""
+        steps = np.zeros(self.flat.size, dtype=np.uint8)
+        for bit, (dx, dy) in enumerate(NEIGHBOURS):
+            free = self.flat & ~blocked[dx, dy]
+            if dx and dy:
+                free &= ~blocked[dx, 0] & ~blocked[0, dy]
+            steps |= free.astype(np.uint8) << bit
+        return steps
+
+    # cells --------------------------------------------------------------------------------------------------------
+
+    def cell(self, points: Floats) -> Ints:
+        """Cells under points (..., 2); points outside count as the nearest cell inside."""
+        at = points.astype(np.int64)
+        np.maximum(at, 0, out=at)
+        np.minimum(at, self._last, out=at)
+        result: Ints = at[..., 1] * self.width + at[..., 0]
+        return result
+
+    def centre(self, cells: Ints) -> Floats:
+        """Centres (..., 2) of cells."""
+        return np.stack([cells % self.width + 0.5, cells // self.width + 0.5], axis=-1)
+
+    def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
+        """The cell of a connected part nearest to ``point``; of nearly equal ones that on the side of ``start``."""
+        members, centres = self._members[part], self._centres[part]
+        distance = geometry.length(centres - point)
+        if start is not None:
+            distance += NEAR_SIDE * geometry.length(centres - start)
+        return int(members[np.argmin(distance)])
+
+    def nearest_free(self, point: Floats) -> int | None:
+        """The free cell nearest to ``point`` over all parts, or None when nothing is free."""
+        candidates = [self.nearest(point, part) for part in range(len(self._members))]
+        if not candidates:
+            return None
+        return candidates[int(np.argmin(geometry.length(self.centre(np.array(candidates)) - point)))]
+
+    # lines --------------------------------------------------------------------------------------------------------
+
+    def clear(self, start: Floats, end: Floats) -> Bools:
+        """(k,) whether a body of ordinary width gets straight from ``start`` (k, 2) to ``end`` (k, 2)."""
+        result = self._box_is_free(start, end)
+        if np.count_nonzero(result) < len(result):
+            unsure = which(~result)
+            result[unsure] = self._sampled(start[unsure], end[unsure])
+        return result
+
+    def _box_is_free(self, start: Floats, end: Floats) -> Bools:
+        low = np.floor(np.minimum(start, end) - SIDE_CLEARANCE).astype(np.int64)
+        high = np.floor(np.maximum(start, end) + SIDE_CLEARANCE).astype(np.int64) + 1
+        np.maximum(low, 0, out=low)
+        np.minimum(high, self._last + 1, out=high)
+        s = self._sums
+        free = s[high[:, 1], high[:, 0]] - s[low[:, 1], high[:, 0]] - s[high[:, 1], low[:, 0]] + s[low[:, 1], low[:, 0]]
+        size = high - low
+        result: Bools = np.equal(free, size[:, 0] * size[:, 1])
+        return result
+
+    def _sampled(self, start: Floats, end: Floats) -> Bools:
+        offset = end - start
+        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        count = int(float(distance.max()) / SAMPLE_STEP) + 2
+        share = np.linspace(0.0, 1.0, count)
+        scale = SIDE_CLEARANCE / np.maximum(distance, SIDE_CLEARANCE)
+        side = np.stack([-offset[:, 1] * scale, offset[:, 0] * scale], axis=1)
+        line = start[:, None, :] + offset[:, None, :] * share[None, :, None]
+        both = self.flat.take(self.cell(line + side[:, None, :])) & self.flat.take(self.cell(line - side[:, None, :]))
+        result: Bools = np.logical_and.reduce(both, axis=1)
+        return result
+
+    # ways ---------------------------------------------------------------------------------------------------------
+
+    def corners(self, start: Floats, goal_cell: Ints) -> Floats:
+        """(k, 2) the farthest cell centre on the way to each goal cell that can be walked to straight.
+
+        Each start must lie in the connected part of its goal.
+        """
+        here = self.cell(start)
+        steps = np.empty((len(here), len(LOOK_AHEAD)), dtype=np.int64)
+        for goal in dict.fromkeys(goal_cell.tolist()):
+            mine = goal_cell == goal
+            steps[mine] = self._follow(here[mine], goal)
+        ahead = self.centre(steps)  # (k, len(LOOK_AHEAD), 2)
+        result: Floats = ahead[np.arange(len(steps)), self._farthest(start, ahead)]
+        return result
+
+    def _farthest(self, start: Floats, ahead: Floats) -> Ints:
+        """(k,) the last of the places ``ahead`` (k, m, 2) that each can walk to straight; the first one always is.
+
+        Found by halving: who can't get straight to one place is taken not to get to a later one.
+        """
+        k, m = ahead.shape[:2]
+        near = np.zeros(k, dtype=np.int64)
+        far = np.full(k, m - 1)
+        at = far.copy()
+        unsure = np.arange(k)
+        while unsure.size:
+            seen = self.clear(start[unsure], ahead[unsure, at[unsure]])
+            near[unsure[seen]] = at[unsure[seen]]
+            far[unsure[~seen]] = at[unsure[~seen]] - 1
+            at = (near + far + 1) // 2
+            unsure = which(near < far)
+        return near
+
+    def distance(self, start: Floats, goal: Floats) -> float:
+        """Length of the way between two points, 0 when there is none (the API's convention)."""
+        a, b = int(self.cell(start)), int(self.cell(goal))
+        if not (self.flat[a] and self.flat[b]) or self.part[a] != self.part[b]:
+            return 0.0
+        if self.clear(start[None], goal[None])[0]:
+            return math.dist(start, goal)
+        return self._field(b, [a]).distance[a]
+
+    def next_cells(self, cells: Ints, goal: int) -> Ints:
+        """(k,) the next cell on the way from each of ``cells`` to a goal cell of the same connected part."""
+        result: Ints = self._field(goal, cells.tolist()).towards_array().take(cells)
+        return result
+
+    def _follow(self, cells: Ints, goal: int) -> Ints:
+        """(k, len(LOOK_AHEAD)) the cells that lie so many steps on the way from each of ``cells``."""
+        towards = self._field(goal, cells.tolist()).towards_array()
+        steps, at = [], 0
+        for wanted in LOOK_AHEAD:
+            while at < wanted:
+                cells = towards.take(cells)
+                at += 1
+            steps.append(cells)
+        return np.stack(steps, axis=1)
+
+    def _field(self, goal: int, cells: list[int]) -> _Field:
+        """The ways to ``goal``, as far as they are needed from ``cells``."""
+        found = self._fields.get(goal)
+        if found is None:
+            if len(self._fields) >= FIELDS_KEPT:
+                self._fields.clear()
+            found = self._fields[goal] = _Field(goal, self.flat.size)
+        found.reach(cells, self._steps, self._edges)
+        return found
+
+    @cached_property
+    def part(self) -> Ints:
+        """(cells,) number of the connected part each cell belongs to, -1 where it is blocked.
+
+        A diagonal step needs both sides free, so that what is connected is connected by the four straight ones.
+        """
+        part: Ints = connected_parts(self.free).ravel()
+        return part
+
+    @cached_property
+    def _members(self) -> list[Ints]:
+        """The cells of each connected part, ascending."""
+        return [np.flatnonzero(self.part == number) for number in range(int(self.part.max()) + 1)]
+
+    @cached_property
+    def _centres(self) -> list[Floats]:
+        """The centres of these cells."""
+        return [self.centre(members) for members in self._members]
+
+
+def connected_parts(free: Grid) -> Ints:
+    """(h, w) number of the part that each free cell belongs to by straight steps, -1 where it is not free.
+
+    Runs of free cells in each row are joined to those they touch in the row above; parts are numbered in the order of
+    their first cell. A few hundred runs are what a map has, where it has thousands of cells.
+    """
+    height, width = free.shape
+    padded = np.zeros((height, width + 2), dtype=np.int8)
+    padded[:, 1:-1] = free
+    change = np.diff(padded, axis=1)
+    rows, begins = np.nonzero(change == 1)
+    _, ends = np.nonzero(change == -1)
+    runs = list(zip(rows.tolist(), begins.tolist(), ends.tolist(), strict=True))
+    root = list(range(len(runs)))
+
+    def find(run: int) -> int:
+        while root[run] != run:
+            root[run] = root[root[run]]
+            run = root[run]
+        return run
+
+    above = 0
+    for run, (row, begin, end) in enumerate(runs):
+        while runs[above][0] < row - 1 or (runs[above][0] == row - 1 and runs[above][2] <= begin):
+            above += 1
+        touching = above
+        while runs[touching][0] == row - 1 and runs[touching][1] < end:
+            one, other = sorted((find(run), find(touching)))
+            root[other] = one
+            touching += 1
+    numbers = {first: number for number, first in enumerate(sorted({find(run) for run in range(len(runs))}))}
+    parts = np.full((height, width), -1, dtype=np.int64)
+    for run, (row, begin, end) in enumerate(runs):
+        parts[row, begin:end] = numbers[find(run)]
+    return parts
+
+
+class _Field:
+    """The shortest ways to one goal, found outwards from it only as far as somebody has asked (Dijkstra).
+
+    ``towards`` holds for every settled cell the next one on its way, ``distance`` how far it is; what is not settled
+    yet, or has no way, leads to itself.
+    """
+
+    def __init__(self, goal: int, cells: int) -> None:
+        self.distance = [math.inf] * cells
+        self.distance[goal] = 0.0
+        self.towards = list(range(cells))
+        self._settled = bytearray(cells)
+        self._heap = [(0.0, goal)]
+        self._array: Ints | None = None
+
+    def towards_array(self) -> Ints:
+        """(cells,) ``towards`` as an array; cells that are not settled have no meaning in it."""
+        if self._array is None:
+            self._array = np.array(self.towards)
+        return self._array
+
+    def reach(self, cells: list[int], steps: list[int], edges: list[list[tuple[int, float]]]) -> None:
+        """Go on until all of ``cells`` are settled or nothing is left to settle."""
+        settled, heap = self._settled, self._heap
+        wanted = {cell for cell in cells if not settled[cell]}
+        if not wanted or not heap:
+            return
+        distance, towards = self.distance, self.towards
+        while heap and wanted:
+            reached, cell = heapq.heappop(heap)
+            if settled[cell]:
+                continue
+            settled[cell] = 1
+            wanted.discard(cell)
+            for offset, cost in edges[steps[cell]]:
+                neighbour, further = cell + offset, reached + cost
+                if further < distance[neighbour]:
+                    distance[neighbour] = further
+                    towards[neighbour] = cell
+                    heapq.heappush(heap, (further, neighbour))
+        self._array = None
+
+
+@lru_cache(maxsize=64)
+def _edges(width: int) -> list[list[tuple[int, float]]]:
+    """For every set of free steps (8 bits): the offset of each in a flat grid of that width, and its length."""
+    moves = [(dy * width + dx, math.sqrt(dx * dx + dy * dy)) for dx, dy in NEIGHBOURS]
+    return [[move for bit, move in enumerate(moves) if mask >> bit & 1] for mask in range(256)]
+
+
+@lru_cache(maxsize=64)
+def _bare_surface(terrain: Terrain, layer: Layer) -> Surface:
+    """The surface of a terrain without structures, shared by all games on it."""
+    return Surface(_layer_grid(terrain, layer))
+
+
+def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
+    if layer is Layer.AIR:
+        grid = np.zeros_like(terrain.walk)
+        x0, y0, x1, y1 = terrain.playable
+        grid[y0:y1, x0:x1] = True
+        return grid
+    return terrain.walk if layer is Layer.WALK else terrain.glide
+
+
+def surface(ground: Ground, layer: Layer) -> Surface:
+    """What units of a layer move on now."""
+    found = ground.surfaces.get(layer)
+    if not isinstance(found, Surface):
+        bare = layer is Layer.AIR or not ground.blocked
+        found = _bare_surface(ground.terrain, layer) if bare else Surface(_free_now(ground, layer))
+        ground.surfaces[layer] = found
+    return found
+
+
+def _free_now(ground: Ground, layer: Layer) -> Grid:
+    return ground.with_structures(_layer_grid(ground.terrain, layer))

@@ -1,0 +1,1 @@
+"""Arrays and geometry of the plane, which know nothing of the game."""

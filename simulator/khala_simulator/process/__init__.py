@@ -1,0 +1,1 @@
+"""The game as a process: websocket, sessions, lobby, LAN, clock, replays, and the install that clients find."""

@@ -1,0 +1,164 @@
+"""Lays out a directory like a StarCraft II install whose game is this simulator.
+
+Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that turns into the
+process of `__main__.py`. Nothing of a real StarCraft II is ever replaced, and maps that a user puts beside ours
+stay. A user's own maps are linked, not copied: they stay where they are.
+
+Above: `cli.py`. Below: the list of scenarios.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shlex
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+BASE_BUILD = 75689
+"""Build of 4.10.0: the newest for Linux that both PySC2 and python-sc2 know."""
+
+OWN_FOLDER = "user"
+"""Folder below `Maps` of maps that lie in no folder of their own."""
+
+_EXECUTABLE = Path("Versions") / f"Base{BASE_BUILD}" / "SC2_x64"
+_MARK = "# The simulator of Khala stands in for the game here."
+_REAL = (".build.info", "SC2Data", "StarCraft II.exe", "StarCraft II.app", "Support64")
+
+
+class InstallError(Exception):
+    """The directory cannot become an install; the message says why and what to do."""
+
+
+def install(directory: Path | str) -> Path:
+    """Makes a directory that clients take for a StarCraft II install, and returns its absolute path.
+
+    Doing it again repairs and updates the launcher and the maps, and leaves everything else alone.
+
+    Raises:
+        InstallError: a real StarCraft II is there, or something cannot be written.
+    """
+    root = Path(directory).expanduser().absolute()
+    _refuse_real_game(root)
+    try:
+        _write_launcher(root / _EXECUTABLE)
+        _write_maps(root / "Maps")
+        (root / "Replays").mkdir(exist_ok=True)
+    except OSError as error:
+        raise InstallError(_explain(error, root)) from error
+    return root
+
+
+@dataclass(frozen=True, slots=True)
+class OwnMap:
+    """A map of the user's: where it lies, its path below `Maps`, and why it can't be played, if so."""
+
+    source: Path
+    path: str
+    trouble: str = ""
+
+
+def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
+    """Links every .SC2Map file below a directory into an install, and says which ones can be played.
+
+    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. A map of the user's
+    takes the place of a shipped one of the same path; none takes the place of what the user put there himself.
+
+    Raises:
+        InstallError: there is no such directory, no map in it, or something cannot be written.
+    """
+    source = Path(directory).expanduser().absolute()
+    if not source.is_dir():
+        raise InstallError(f"{source} is no directory with maps")
+    top = source / "Maps" if (source / "Maps").is_dir() else source
+    files = sorted(path for path in top.rglob("*") if path.suffix.lower() == ".sc2map" and path.is_file())
+    if not files:
+        raise InstallError(f"{source} holds no .SC2Map file")
+    try:
+        return [_link(root / "Maps", top, file) for file in files]
+    except OSError as error:
+        raise InstallError(_explain(error, root)) from error
+
+
+def is_installed(directory: Path | str) -> bool:
+    """Whether a directory holds an install of the simulator."""
+    return _is_ours(Path(directory).expanduser() / _EXECUTABLE)
+
+
+def _refuse_real_game(root: Path) -> None:
+    for name in _REAL:
+        if (root / name).exists():
+            raise InstallError(f"{root} holds a real StarCraft II ({name}); choose another directory")
+    versions = root / "Versions"
+    found = sorted(versions.glob("Base*/SC2*")) if versions.is_dir() else []
+    for executable in found:
+        if not _is_ours(executable):
+            relative = executable.relative_to(root)
+            raise InstallError(f"{root} holds a real StarCraft II ({relative}); choose another directory")
+
+
+def _is_ours(executable: Path) -> bool:
+    try:
+        with executable.open("rb") as file:
+            return _MARK.encode() in file.read(256)
+    except OSError:
+        return False
+
+
+def _write_launcher(path: Path) -> None:
+    package_root = Path(__file__).absolute().parent.parent
+    # -I: the client's PYTHONPATH and its user site are not ours. exec: signals must reach the game itself.
+    # malloc: half a megabyte is made and freed for every observation; by default it goes back to the kernel each time,
+    # and fetching the pages again costs more (235 page faults, 0.5 ms) than drawing what is in them.
+    malloc = "export MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432"
+    code = f"import sys; sys.path.insert(0, {str(package_root)!r}); from khala_simulator.__main__ import main; main()"
+    command = f'exec {shlex.quote(sys.executable)} -I -c {shlex.quote(code)} -executable "$0" "$@"'
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_suffix(".new")
+    fresh.write_text(f"#!/bin/sh\n{_MARK}\n{malloc}\n{command}\n")
+    fresh.chmod(0o755)
+    fresh.replace(path)  # in one step: a client may be starting the game right now
+
+
+def _write_maps(maps: Path) -> None:
+    from khala_simulator.maps.map_file import FOLDERS, is_placeholder, placeholders  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
+    for folder in FOLDERS:
+        (maps / folder).mkdir(parents=True, exist_ok=True)
+    for relative, data in placeholders():
+        path = maps / relative
+        if not path.exists() or is_placeholder(path.read_bytes()):
+            path.write_bytes(data)
+
+
+def _link(maps: Path, top: Path, file: Path) -> OwnMap:
+    """Links one map; clients look for maps exactly one folder below `Maps`."""
+    from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
+
+    folder = file.parent.name if file.parent != top else OWN_FOLDER
+    path = f"{folder}/{file.stem}.SC2Map"
+    target = maps / path
+    try:
+        read_map(file.read_bytes(), path)
+    except (MapDataError, OSError) as error:
+        return OwnMap(file, path, str(error))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.is_symlink() or (target.exists() and is_placeholder(target.read_bytes())):
+        target.unlink()
+    if not target.exists():
+        try:
+            target.symlink_to(file)
+        except OSError:  # not everybody may make links on Windows
+            shutil.copyfile(file, target)
+    return OwnMap(file, path)
+
+
+def _explain(error: OSError, root: Path) -> str:
+    where = error.filename or root
+    if error.errno in {errno.EACCES, errno.EPERM, errno.EROFS}:
+        return f"{where} cannot be written; choose a directory of yours or change its permissions"
+    if error.errno in {errno.ENOTDIR, errno.EEXIST}:
+        return f"{where} is a file, not a directory; choose another place"
+    return f"{where}: {os.strerror(error.errno) if error.errno else error}"

@@ -1,0 +1,170 @@
+"""Lock-step: one game that several processes simulate, each of them the whole of it.
+
+Members are the players and observers that have a process of their own. What travels between them is what clients do,
+and how far each client lets the world go; a world never goes further than the most hesitant member allows. As the same
+setup and the same log give the same world, that is all there is to agree on. Digests of the worlds are compared now and
+then, because a world that has gone astray is worse than one that has ended.
+
+No I/O: `lan.py` carries the messages. Below: `game.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+from typing import TYPE_CHECKING, Any
+
+from google.protobuf.message import DecodeError
+from s2clientprotocol import debug_pb2
+
+from khala_simulator.api.game import Entry
+from khala_simulator.process.replay import pack, unpack
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_simulator.api.game import Game
+
+CHECK_LOOPS = 448
+"""Loops between two comparisons of the worlds: 20 s, as a digest takes as long as a loop."""
+
+
+class LockstepError(Exception):
+    """A message that no member of this game can have sent, or worlds that differ."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Commit:
+    """A member's client has done `entries`, and does nothing more that takes effect before loop `through`."""
+
+    member: int
+    through: int
+    entries: tuple[Entry, ...] = ()
+    digests: dict[int, str] = dataclasses.field(default_factory=dict)  # of its world, by loop
+
+    def encode(self) -> bytes:
+        """The bytes of the message."""
+        head = {"member": self.member, "through": self.through, "digests": self.digests}
+        return json.dumps(head).encode() + b"\n" + pack(self.entries)
+
+
+@dataclasses.dataclass(frozen=True)
+class Leave:
+    """A member is gone: nobody waits for it after `loop`, at which a player surrenders."""
+
+    member: int
+    loop: int
+
+    def encode(self) -> bytes:
+        """The bytes of the message."""
+        return json.dumps({"member": self.member, "leaves": self.loop}).encode() + b"\n"
+
+
+def decode(data: bytes, members: frozenset[int]) -> Commit | Leave:
+    """The message in bytes, which may be about one of these members.
+
+    Raises:
+        LockstepError: there is none, or it is about somebody else.
+    """
+    head, _, log = data.partition(b"\n")
+    try:
+        fields: dict[str, Any] = json.loads(head)
+        if (member := int(fields["member"])) not in members:
+            raise LockstepError(f"somebody speaks in the name of member {member}")
+        if "leaves" in fields:
+            return Leave(member, int(fields["leaves"]))
+        digests = {int(loop): str(digest) for loop, digest in fields["digests"].items()}
+        return Commit(member, int(fields["through"]), tuple(unpack(log)), digests)
+    except (ValueError, LookupError, TypeError, AttributeError, struct.error, DecodeError) as error:
+        raise LockstepError(f"not a message of a game over several processes: {error}") from error
+
+
+class Lockstep:
+    """One process's account of how far the world may go."""
+
+    def __init__(self, game: Game, me: int, members: Iterable[int]) -> None:
+        self.game, self.me = game, me
+        self._through = dict.fromkeys(members, 0)
+        self._digests: dict[int, str] = {}  # of the own world, by loop
+        self._untold: dict[int, str] = {}  # those that the others have not been told
+        self._unchecked: list[Commit] = []  # with digests of loops that the own world has not reached
+        game.unsent = []
+        game.delay = 1  # what a client does needs a loop to reach the others, as in the game
+
+    @property
+    def horizon(self) -> int:
+        """The loop up to which the world may go."""
+        return min(self._through.values())
+
+    @property
+    def members(self) -> frozenset[int]:
+        """Who is still there."""
+        return frozenset(self._through)
+
+    def commit(self, loop: int) -> Commit:
+        """Lets the world go up to a loop as far as the own client is concerned; the message is for all others."""
+        through = self._through[self.me] = max(loop, self._through[self.me])
+        message = Commit(self.me, through, tuple(self.game.unsent or ()), self._untold)
+        self.game.unsent, self._untold = [], {}
+        self.game.not_before = through
+        return message
+
+    def receive(self, message: Commit | Leave) -> None:
+        """Takes over what another member said; whoever has left is not listened to.
+
+        Raises:
+            LockstepError: it cannot have said that, or its world is another one.
+        """
+        if message.member not in self._through:
+            return
+        if isinstance(message, Leave):
+            self._drop(message.member, message.loop)
+            return
+        before = self._through[message.member]
+        foreign = any(entry.loop < before or entry.player != message.member for entry in message.entries)
+        if foreign or message.through < before:
+            raise LockstepError(f"member {message.member} says what it has said before, or what is not its to say")
+        if message.digests:
+            self._unchecked.append(message)
+            self._check()
+        for entry in message.entries:
+            self.game.note(entry)
+        self._through[message.member] = message.through
+
+    def leave(self, member: int) -> Leave:
+        """Waits no more for a member that is gone; the message is for all others."""
+        message = Leave(member, self.horizon)  # no world can be further than that
+        self._drop(member, message.loop)
+        return message
+
+    def advance(self, loops: int) -> None:
+        """Advances the own world by up to so many loops, as far as it may go.
+
+        Raises:
+            LockstepError: another member's world was another one.
+        """
+        world = self.game.world
+        target = min(world.loop + loops, self.horizon)
+        while world.loop < target and not self.game.over:
+            check = (world.loop // CHECK_LOOPS + 1) * CHECK_LOOPS
+            if self.game.step(min(check, target) - world.loop) == check:
+                self._digests[check] = self._untold[check] = world.digest()
+                self._check()
+
+    def _drop(self, member: int, loop: int) -> None:
+        if self._through.pop(member, None) is not None and member <= len(self.game.setup.players):
+            self.game.note(Entry(loop, member, _surrender()))
+
+    def _check(self) -> None:
+        waiting, self._unchecked = self._unchecked, []
+        for message in waiting:
+            for loop, digest in message.digests.items():
+                if self._digests.get(loop, digest) != digest:
+                    raise LockstepError(f"at loop {loop} the world of member {message.member} is another one")
+            if not message.digests.keys() <= self._digests.keys():
+                self._unchecked.append(message)
+
+
+def _surrender() -> debug_pb2.DebugCommand:
+    return debug_pb2.DebugCommand(end_game=debug_pb2.DebugEndGame(end_result=debug_pb2.DebugEndGame.Surrender))

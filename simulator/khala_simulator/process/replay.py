@@ -1,0 +1,164 @@
+"""Replays: the setup of a game and all that was done to it, to be simulated again.
+
+The format is ours: a line that marks it, one line of JSON with the setup, then for each entry of the log its loop,
+player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside. In a file it
+is the member of an archive like the game's, because clients look there for the version of the game.
+
+Above: `viewing.py`, `lockstep.py`. Below: `game.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+import zlib
+from typing import TYPE_CHECKING
+
+from google.protobuf.message import DecodeError, Message
+from s2clientprotocol import debug_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from khala_simulator.api.game import Entry, Game, Setup
+from khala_simulator.maps.map_file import read_map
+from khala_simulator.process import mpq
+from khala_simulator.process.clock import LOOPS_PER_SECOND
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+METADATA = "replay.gamemetadata.json"
+"""The member of a replay file in which clients look for the version."""
+
+_MEMBER = "khala.replay"
+_MARK = b"Khala replay 3\n"
+_ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
+_KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
+
+
+class ReplayError(ValueError):
+    """The bytes are no replay of this simulator."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """What is in a replay file."""
+
+    setup: Setup
+    interfaces: dict[int, sc.InterfaceOptions]  # with which the players clicked
+    loops: int
+    results: dict[int, int]
+    races: dict[int, str]
+    log: tuple[Entry, ...]
+
+    def file(self, version: dict[str, str]) -> bytes:
+        """The file; `version` is what it says of the game in the words of the game's own files."""
+        title, duration_s = self.setup.game_map.name, int(self.loops / LOOPS_PER_SECOND)
+        players = [{"PlayerID": player} for player in self.results]
+        about = {"Title": title, **version, "Duration": duration_s, "Players": players}
+        return mpq.pack({METADATA: json.dumps(about).encode(), _MEMBER: self.encode()})
+
+    def encode(self) -> bytes:
+        """The replay without the archive around it."""
+        setup = self.setup
+        head = {
+            "path": setup.path,
+            "map": setup.map_data.decode("latin-1"),
+            "players": [_hex(player) for player in setup.players],
+            "interfaces": {player: _hex(options) for player, options in self.interfaces.items()},
+            "seed": setup.seed,
+            "disable_fog": setup.disable_fog,
+            "realtime": setup.realtime,
+            "observers": [_hex(observer) for observer in setup.observers],
+            "loops": self.loops,
+            "results": self.results,
+            "races": self.races,
+        }
+        return _MARK + zlib.compress(json.dumps(head).encode() + b"\n" + pack(self.log))
+
+    @classmethod
+    def decode(cls, data: bytes) -> Replay:
+        """The replay in the bytes of a file, or without the archive around it; raises ReplayError if there is none."""
+        if data.startswith(mpq.MAGIC):
+            try:
+                data = mpq.member(data, _MEMBER) or b""
+            except mpq.MpqError as error:
+                raise ReplayError(f"The replay is damaged: {error}") from error
+        if not data.startswith(_MARK):
+            raise ReplayError("The data is not a replay of this simulator")
+        try:
+            return cls._decode(zlib.decompress(data[len(_MARK) :]))
+        except (zlib.error, ValueError, LookupError, TypeError, struct.error, DecodeError) as error:
+            raise ReplayError(f"The replay is damaged: {error}") from error
+
+    @classmethod
+    def _decode(cls, data: bytes) -> Replay:
+        head, _, log = data.partition(b"\n")
+        fields = json.loads(head)
+        map_data = fields["map"].encode("latin-1")
+        setup = Setup(
+            game_map=read_map(map_data, fields["path"]),
+            map_data=map_data,
+            path=fields["path"],
+            players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in fields["players"]),
+            seed=fields["seed"],
+            disable_fog=fields["disable_fog"],
+            realtime=fields["realtime"],
+            observers=tuple(sc.PlayerSetup.FromString(bytes.fromhex(observer)) for observer in fields["observers"]),
+        )
+        interfaces = {
+            int(player): sc.InterfaceOptions.FromString(bytes.fromhex(options))
+            for player, options in fields["interfaces"].items()
+        }
+        results = {int(player): result for player, result in fields["results"].items()}
+        races = {int(player): str(race) for player, race in fields["races"].items()}
+        return cls(setup, interfaces, fields["loops"], results, races, tuple(unpack(log)))
+
+
+def _hex(message: Message) -> str:
+    return message.SerializeToString(deterministic=True).hex()
+
+
+def pack(log: Iterable[Entry]) -> bytes:
+    """Entries of a log as bytes."""
+    parts = []
+    for entry in log:
+        data = entry.act.SerializeToString(deterministic=True)
+        parts += [_ENTRY.pack(entry.loop, entry.player, _KINDS.index(type(entry.act)), len(data)), data]
+    return b"".join(parts)
+
+
+def unpack(log: bytes) -> Iterator[Entry]:
+    """The entries in bytes that `pack` made.
+
+    Raises:
+        struct.error, LookupError, DecodeError: they are no such bytes.
+    """
+    at = 0
+    while at < len(log):
+        loop, player, kind, size = _ENTRY.unpack_from(log, at)
+        at += _ENTRY.size
+        yield Entry(loop, player, _KINDS[kind].FromString(log[at : at + size]))
+        at += size
+
+
+def record(game: Game) -> Replay:
+    """The replay of a game up to now."""
+    players = range(1, len(game.setup.players) + 1)
+    return Replay(
+        setup=game.setup,
+        interfaces={player: seat.options for player, seat in game.seats.items()},
+        loops=game.world.loop,
+        results={player: int(game.world.players[player].result) for player in players},
+        races={player: game.world.players[player].race for player in players},
+        log=game.past,
+    )
+
+
+def rerun(replay: Replay, version: str) -> Game:
+    """A game that plays a replay, with the players in their seats."""
+    game = Game(replay.setup, version, log=replay.log, end_loop=replay.loops)
+    for number, recorded in replay.interfaces.items():
+        game.sit(number, recorded)
+    game.step(0)  # it may have ended before its first loop
+    return game

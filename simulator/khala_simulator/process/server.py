@@ -1,0 +1,91 @@
+"""The websocket at `/sc2api`: frames in, frames out.
+
+Requests come as text frames from PySC2 and as binary frames from python-sc2; both carry raw protobuf, so text is
+not decoded. Connections come and go while the session lives on: the newest one is served, and whatever was open
+before it is dropped, so that a client that vanished without a word locks nobody out.
+
+A client that goes away while its request is being answered takes the request with it.
+
+It knows nothing of the game: that is `session.py`, called with the bytes of one request at a time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import gc
+from typing import TYPE_CHECKING
+
+from aiohttp import WSMsgType, web
+
+from khala_simulator.process.parent_watch import orphaned
+from khala_simulator.process.session import Session
+from khala_simulator.process.status import Status
+
+if TYPE_CHECKING:
+    import socket
+
+ENDPOINT = "/sc2api"
+_REQUESTS = {WSMsgType.TEXT, WSMsgType.BINARY}
+
+
+class Server:
+    """Serves one session to one client after the other."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.done = asyncio.Event()
+        self._transport: asyncio.Transport | None = None
+        self._turn = asyncio.Lock()  # a client that was replaced still has to hear that its request is dropped
+
+    async def connect(self, request: web.Request) -> web.WebSocketResponse:
+        """Answers one client until it leaves, is replaced, or ends the process with quit."""
+        client = web.WebSocketResponse(decode_text=False, max_msg_size=0, compress=False, timeout=0.1)
+        await client.prepare(request)
+        before, self._transport = self._transport, request.transport
+        if before is not None:
+            before.abort()  # closing politely would wait for one that may be gone
+        with contextlib.suppress(ConnectionError):  # a client need not wait for its last answer
+            await self._answer(client)
+        return client
+
+    def has_client(self) -> bool:
+        """Whether a client is connected now."""
+        return self._transport is not None and not self._transport.is_closing()
+
+    async def _answer(self, client: web.WebSocketResponse) -> None:
+        async for frame in client:
+            if frame.type not in _REQUESTS:
+                continue
+            async with self._turn:
+                answer = await self.session.answer(frame.data)
+            try:
+                await client.send_bytes(answer)
+            finally:
+                if self.session.status is Status.quit:
+                    self.done.set()
+
+
+def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: str | None) -> None:
+    """Serves on a listening socket until a client says quit."""
+    session = Session(data_dir=data_dir, base_build=base_build, data_version=data_version)
+    gc.collect()
+    gc.freeze()  # tables and modules stay; collections in a game need not look at them again
+    asyncio.run(serve(sock, session))
+
+
+async def serve(sock: socket.socket, session: Session) -> None:
+    """Serves the session on a listening socket until a client says quit, or nobody is left who could."""
+    server = Server(session)
+    app = web.Application()
+    app.router.add_get(ENDPOINT, server.connect)
+    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1, handler_cancellation=True)
+    await runner.setup()
+    ends = [asyncio.create_task(server.done.wait()), asyncio.create_task(orphaned(server.has_client))]
+    try:
+        await web.SockSite(runner, sock).start()
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for end in ends:
+            end.cancel()
+        await runner.cleanup()

@@ -1,0 +1,103 @@
+"""Autocast: units use abilities by themselves where their player lets them.
+
+Looked over every few loops. A unit that walks or fights on order interrupts only for abilities that leave its orders
+alone; one that idles, patrols or attack-moves does it as an order of its own and goes on afterwards.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.abilities import casting, commands
+from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.casts import Cast
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import Order, OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.world.world import World
+
+FREE = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL, OrderKind.HOLD})
+
+
+def look_out(world: World) -> None:
+    """Let every unit with autocast use what it may, in the order of slots."""
+    if not world.autocast or world.loop % MECHANICS.scan_period:
+        return
+    for slot in sorted(world.autocast):
+        if world.carrier[slot] == NOBODY and world.can_cast[slot] and not world.casts[slot]:
+            for number in world.autocast[slot]:
+                if _try(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
+                    break
+
+
+def _try(world: World, slot: int, ability: Ability) -> bool:
+    order = OrderKind(int(world.order_kind[slot]))
+    cast = _choose(world, slot, ability) if ability.transient or order in FREE else None
+    if cast is None or (order is OrderKind.HOLD and not casting.in_range(world, cast)):
+        return False
+    give = casting.skill_of(ability).give
+    if give is not None:
+        return bool(give(world, [slot], ability, world.tag_of(cast.target), None, False))
+    if ability.transient:
+        casting.perform(world, cast)
+        return True
+    waiting = ([] if order is OrderKind.IDLE else world.orders_of(slot)[:1]) + world.queue[slot]
+    commands.begin(world, slot, Order(OrderKind.CAST, ability.id, target=world.tag_of(cast.target)))
+    world.queue[slot] = waiting
+    return True
+
+
+def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
+    """The cast that a unit would make of an ability now, or None."""
+    if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
+        return None
+    pick = casting.skill_of(ability).pick
+    target = (pick or nearest)(world, slot, ability)
+    if Aim.UNIT not in ability.aim and ability.autocast_range and pick is None and not _tempted(world, slot, ability):
+        return None
+    cast = Cast(slot, ability, target, begun=world.loop)
+    aimless = target == NOBODY and (ability.requires_point or pick is not None)
+    return None if aimless or casting.aim_refusal(world, cast) is not ActionResult.SUCCESS else cast
+
+
+def _tempted(world: World, slot: int, ability: Ability) -> bool:
+    """Whether somebody is near who makes a unit use what is aimed at nobody, as when it comes out of the ground."""
+    filters = ability.autocast_filters
+    return any(
+        casting.fits(world, slot, other, filters) is ActionResult.SUCCESS for other in _near(world, slot, ability)
+    )
+
+
+def nearest(world: World, slot: int, ability: Ability) -> int:
+    """The nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
+    if Aim.UNIT not in ability.aim:
+        return NOBODY
+    for other in _near(world, slot, ability):
+        if (
+            other != slot
+            and casting.fits(world, slot, other, ability.autocast_filters) is ActionResult.SUCCESS
+            and casting.aim_refusal(world, Cast(slot, ability, other)) is ActionResult.SUCCESS
+        ):
+            return int(other)
+    return NOBODY
+
+
+def _near(world: World, slot: int, ability: Ability) -> list[int]:
+    """The units that autocast looks at, the nearest first: no foes or no friends where the filters leave these out."""
+    slots = world.live
+    excluded = (*ability.filters.excluded, *ability.autocast_filters.excluded)
+    if "Player" in excluded:
+        slots = slots[world.owner[slots] != world.owner[slot]]
+    if "Enemy" in excluded:
+        slots = slots[(world.owner[slots] == world.owner[slot]) | (world.owner[slots] == 0)]
+    offset = world.pos[slots] - world.pos[slot]
+    gap = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[slots] - world.radius[slot]
+    reach = ability.autocast_range or ability.range
+    near: list[int] = slots[gap <= reach][np.argsort(gap[gap <= reach], kind="stable")].tolist()
+    return near

@@ -1,0 +1,129 @@
+"""Avoidance: how a walker that bodies block finds a heading around them.
+
+A blocked walker looks in a fan of headings around its way, takes the free one that turns it least, and keeps to the
+side it has once chosen until it has got on for a while. Bodies that stand or come towards it and the terrain count as
+obstacles, those that go the same way are left to ``collision``. The game's own local avoidance is not known; all of
+this is an estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.movement import pathfinding
+from khala_simulator.movement.contacts import within
+from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
+from khala_simulator.tables.layers import Layer
+from khala_simulator.tables.mechanics import MECHANICS
+
+if TYPE_CHECKING:
+    from khala_simulator.numeric.geometry import Floats
+    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.world.world import World
+
+FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
+FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG])
+FAN_SIN = np.array([math.sin(math.radians(a)) for a in FAN_DEG])
+SEEN_AHEAD = 0.7
+TOLERANCE = 0.02
+LAYERS = tuple(Layer)
+AIR = Layer.AIR
+
+
+def find_headings(world: World) -> None:
+    """Write ``aside`` of walkers that have to go around somebody; it is looked over every few loops."""
+    n = world.top
+    if not np.count_nonzero(world.detour[:n]):
+        return
+    if world.loop % MECHANICS.detour_period:
+        return
+    turning = which((world.detour[:n] != 0) & world.wants[:n])
+    over = world.detour_end.take(turning) <= world.loop
+    world.detour[turning[over]] = 0
+    world.aside[turning[over]] = 0.0
+    due = turning[~over]
+    if due.size:
+        _look(world, due)
+
+
+def begin(world: World, slots: Ints, shift: Floats) -> None:
+    """Let blocked walkers look for a way around, first on the side to which ``shift`` (k, 2) pushed them."""
+    intended = world.intended.take(slots, 0)
+    pushed = intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0]
+    side = np.where(pushed >= 0.0, 1, -1)
+    kept = world.detour.take(slots)
+    world.detour[slots] = np.where(kept != 0, kept, side)
+    world.detour_end[slots] = world.loop + MECHANICS.detour_loops
+
+
+def _look(world: World, slots: Ints) -> None:
+    start = world.pos.take(slots, 0)
+    way = world.nav_point.take(slots, 0) - start
+    way /= np.maximum(geometry.length(way), 1e-12)[:, None]
+    side = world.detour.take(slots).astype(np.float64)
+    headings = np.concatenate([_fan(way, side), _fan(way, -side)], axis=1)  # (k, 2 x fan, 2), own side first
+    free = _free(world, slots, start, way, headings)
+    first = np.argmax(free, axis=1)
+    rows = np.arange(len(slots))
+    found = free[rows, first]
+    chosen = headings[rows, first]
+    straight = found & (first == 0)
+    world.detour[slots] = np.where(found & (first > len(FAN_DEG)), -side, side)
+    world.aside[slots] = np.where((found & ~straight)[:, None], chosen, 0.0)
+
+
+def _fan(way: Floats, side: Floats) -> Floats:
+    """(k, fan, 2) headings turned further and further to a side (1 is left)."""
+    sine = FAN_SIN * side[:, None]
+    x, y = way[:, 0, None], way[:, 1, None]
+    return np.stack([x * FAN_COS - y * sine, y * FAN_COS + x * sine], axis=2)
+
+
+def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Floats) -> Bools:
+    """(k, h) whether ``SEEN_AHEAD`` along each heading there is no wall and no body that stands or comes nearer."""
+    free = np.ones(headings.shape[:2], dtype=np.bool_)
+    k, body, apart = _in_the_way(world, slots, start, way)
+    if k.size:
+        ahead = headings[k]  # (p, h, 2)
+        along = ahead[..., 0] * body[:, 0, None] + ahead[..., 1] * body[:, 1, None]
+        across = ahead[..., 0] * body[:, 1, None] - ahead[..., 1] * body[:, 0, None]
+        reach = np.maximum(along - SEEN_AHEAD, 0.0)
+        struck = (along > 0.0) & (across**2 + reach**2 < apart[:, None] ** 2)
+        np.logical_and.at(free, k, ~struck)
+    return free & _on_ground(world, slots, start[:, None, :] + headings * SEEN_AHEAD)
+
+
+def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
+    """Bodies near ``slots`` that do not go their way: (p,) index into these, (p, 2) offset, (p,) distance to keep."""
+    bodies = world.live[~world.walled[world.live]]
+    number = np.full(world.top, -1)
+    number[slots] = np.arange(len(slots))
+    widest = float(world.separation.take(bodies).max())
+    one, other, _ = within(world.pos.take(bodies, 0), 2.0 * widest + SEEN_AHEAD)
+    one, other = bodies.take(np.concatenate((one, other))), bodies.take(np.concatenate((other, one)))
+    looks = number.take(one) >= 0
+    one, other = one[looks], other[looks]
+    k = number.take(one)
+    offset = world.pos.take(other, 0) - start.take(k, 0)
+    apart = world.separation.take(one) + world.separation.take(other) - TOLERANCE
+    product = way.take(k, 0) * world.intended.take(other, 0)
+    meets = (world.layer_bits.take(one) & world.layer_bits.take(other)) != 0
+    meets &= other != world.target.take(one)
+    meets &= product[:, 0] + product[:, 1] <= 0.0
+    meets &= offset[:, 0] ** 2 + offset[:, 1] ** 2 < (apart + SEEN_AHEAD) ** 2
+    return k[meets], offset[meets], apart[meets]
+
+
+def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
+    free = np.ones(points.shape[:2], dtype=np.bool_)
+    layers = world.layer.take(slots)
+    for layer in LAYERS:
+        mine = layers == layer.value
+        if layer is not AIR and some(mine):
+            surface = pathfinding.surface(world.ground, layer)
+            free[mine] = surface.flat[surface.cell(points[mine])]
+    return free

@@ -1,0 +1,274 @@
+"""Collision: bodies are pushed apart and kept off cliffs, structures and the edge of the map.
+
+All bodies take their intended step, overlapping pairs are pushed apart along the line between their centres a few
+times over, and finally everybody is put where its layer allows. Who gives way: a walker before one that fights, an
+idle unit before a friend that comes through, nobody before an enemy, and one that holds its place before nobody.
+Flyers pass through each other and drift apart where they stop. How much is an estimate (see ``data/mechanics.yaml``);
+that nobody ends inside a wall is not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.movement import pathfinding
+from khala_simulator.movement.contacts import OVERLAP_ALLOWED, Pairs, bodies_of
+from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
+from khala_simulator.systems import avoidance
+from khala_simulator.tables.layers import Layer
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.census import census
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from khala_simulator.movement.pathfinding import Surface
+    from khala_simulator.numeric.geometry import Floats
+    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.world.world import World
+
+OVERLAP_PRESSED = 0.03
+SAME_POINT = 1e-9
+STIR = 1e3
+EDGE_MARGIN = 1e-6
+IMMOBILE_YIELDING = 1e-6
+EVEN = 0.5 - 1e-9
+LAYERS = tuple(Layer)
+AIR = Layer.AIR
+EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 4)) for i in range(8)])
+
+
+def separate(world: World) -> None:
+    """Carry out this loop's steps, push bodies apart and remember who could not get on."""
+    if not world.anyone_moved and world.resting_version == world.population:
+        return
+    slots = world.live
+    before = world.pos.take(slots, 0)
+    after = before + world.intended.take(slots, 0) if world.anyone_moved else before.copy()
+    crowded = _push_apart(world, slots, before, after)
+    _keep_on_surfaces(world, slots, before, after)
+    world.pos[slots] = after
+    world.resting_version = -1 if world.anyone_moved or crowded else world.population
+    if world.anyone_moved:
+        _note_blocked(world, slots, before, after)
+
+
+def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> bool:
+    """Move overlapping bodies apart in place; returns whether anybody was touched.
+
+    Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
+    that a crowd does not press itself together.
+    """
+    bodies = bodies_of(world)
+    found = bodies.near(after)
+    if found is None:
+        return False
+    _part(after, found)
+    start = after.copy()
+    drifting = False
+    if bodies.any_flying:
+        flying = bodies.flying
+        soft = flying.take(found.one) | flying.take(found.other)
+        drifting = _drift_apart(world, slots, after, _only(found, soft))
+        found = _only(found, ~soft)
+    if found.one.size:
+        pairs = _Pairs(found.one, found.other, found.apart, _shares(world, slots, found.one, found.other))
+        deep = pairs.relax(after, MECHANICS.push_rounds)
+        if deep.size:
+            pressed = pairs.one[deep[pairs.share[deep] >= EVEN]]
+            after[pressed] = start[pressed] = before[pressed]
+            pairs.relax(after, MECHANICS.push_rounds - 1)
+    shift = after - start
+    far = geometry.length(shift)
+    if far.max() > MECHANICS.push_limit:
+        shift *= np.minimum(1.0, MECHANICS.push_limit / np.maximum(far, 1e-12))[:, None]
+        np.add(start, shift, out=after)
+    return bool(found.one.size) or drifting
+
+
+def _only(pairs: Pairs, chosen: Bools) -> Pairs:
+    return Pairs(pairs.one[chosen], pairs.other[chosen], pairs.apart[chosen])
+
+
+def _drift_apart(world: World, slots: Ints, at: Floats, pairs: Pairs) -> bool:
+    """Part flyers that hover over each other little by little, in place; those on their way pass through."""
+    still = ~world.wants.take(slots) & ~world.holds.take(slots) & (world.step_max.take(slots) > 0.0)
+    gives = still.take(pairs.one) & ~world.wants.take(slots).take(pairs.other)
+    if not some(gives):
+        return False
+    pairs = _only(pairs, gives)
+    offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
+    distance = geometry.length(offset)
+    depth = np.maximum(pairs.apart - distance, 0.0)
+    push = np.minimum(depth * MECHANICS.flyer_drift, MECHANICS.flyer_drift_limit) / np.maximum(distance, SAME_POINT)
+    offset *= push[:, None]
+    np.add.at(at, pairs.one, offset)
+    return some(depth > OVERLAP_ALLOWED)
+
+
+@dataclass(slots=True)
+class _Pairs:
+    """Bodies near each other, (k,) each, as indices into the living slots; every pair is there both ways round."""
+
+    one: Ints
+    other: Ints
+    apart: Floats  # distance to keep
+    share: Floats  # part of an overlap that ``one`` gives way
+
+    def relax(self, at: Floats, rounds: int) -> Ints:
+        """Push overlapping pairs apart up to ``rounds`` times, in place; returns those that stay deep in each other."""
+        axes = np.ascontiguousarray(at.T)  # (2, n)
+        one, other, n = self.one, self.other, len(at)
+        while True:
+            offset = axes.take(one, 1) - axes.take(other, 1)
+            squared = offset * offset
+            distance = np.sqrt(squared[0] + squared[1])
+            depth = self.apart - distance
+            if rounds == 0 or not some(depth > OVERLAP_ALLOWED):
+                break
+            rounds -= 1
+            push = np.maximum(depth, 0.0) / np.maximum(distance, SAME_POINT)
+            push *= self.share
+            offset *= push
+            axes[0] += np.bincount(one, offset[0], n)
+            axes[1] += np.bincount(one, offset[1], n)
+        at[:] = axes.T
+        return which(depth > OVERLAP_PRESSED)
+
+
+def _part(at: Floats, pairs: Pairs) -> None:
+    """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
+    offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
+    offset *= offset
+    same = offset[:, 0] + offset[:, 1] < SAME_POINT
+    if some(same):
+        stirred = np.unique(pairs.one[same])
+        at[stirred] += EIGHT_DIRECTIONS[stirred % 8] * (1.0 + stirred[:, None]) * SAME_POINT * STIR
+
+
+def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
+    """How much of an overlap the first of each pair gives way; what is left is the other one's."""
+    yielding, yielding_to_friend = _yielding(world, slots)
+    mine, theirs = yielding.take(one), yielding.take(other)
+    if yielding_to_friend is not None:
+        owner = world.owner.take(slots)
+        friends = owner.take(one) == owner.take(other)
+        mine = np.where(friends, yielding_to_friend.take(one), mine)
+        theirs = np.where(friends, yielding_to_friend.take(other), theirs)
+    wants = world.wants.take(slots)
+    rivals = wants.take(one) & wants.take(other)
+    if some(rivals):
+        left = _left(world, slots)
+        ahead = left.take(other) - left.take(one)
+        mine = np.where(rivals & (ahead > 0.0), mine * MECHANICS.push_ahead, mine)
+        theirs = np.where(rivals & (ahead < 0.0), theirs * MECHANICS.push_ahead, theirs)
+    share: Floats = mine / (mine + theirs)
+    return share
+
+
+def _left(world: World, slots: Ints) -> Floats:
+    """How far each of ``slots`` has to its next corner, squared; who is nearer goes first."""
+    offset = world.nav_point.take(slots, 0) - world.pos.take(slots, 0)
+    offset *= offset
+    left: Floats = offset[:, 0] + offset[:, 1]
+    return left
+
+
+def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
+    """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
+    firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
+    if census(world).low_priority_bodies:
+        firm *= world.lightness.take(slots)
+    immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
+    if some(immobile):
+        firm[immobile] = IMMOBILE_YIELDING
+    idle = world.target.take(slots) == NOBODY
+    if not some(idle):
+        return firm, None
+    idle &= ~world.wants.take(slots) & ~immobile
+    return firm, np.where(idle, MECHANICS.push_idle * world.lightness.take(slots), firm)
+
+
+def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:
+    layers = world.layer.take(slots)
+    for layer in LAYERS:
+        mine = which(layers == layer.value)
+        if not mine.size:
+            continue
+        if layer is AIR:
+            x0, y0, x1, y1 = world.map.terrain.playable
+            mine = _moved(mine, before, after)
+            after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
+            continue
+        surface = pathfinding.surface(world.ground, layer)
+        free = surface.open.take(surface.cell(after.take(mine, 0)))
+        if np.count_nonzero(free) < len(free):
+            near = _moved(mine[~free], before, after)
+            if near.size:
+                after[near] = _off_walls(surface, before[near], after[near], world.clearance[slots[near]])
+
+
+def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
+    """Those that are not where they were; only they are put right."""
+    changed = before.take(bodies, 0) != after.take(bodies, 0)
+    moved: Ints = bodies[changed[:, 0] | changed[:, 1]]
+    return moved
+
+
+def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
+    """Positions (k, 2) kept a body's clearance away from blocked cells; what can't be helped stays where it was."""
+    cell = surface.cell(after)
+    corner = np.floor(after)
+    room = clearance[:, None]
+    low, high = surface.walls_low.take(cell, 0), surface.walls_high.take(cell, 0)
+    kept = np.minimum(np.maximum(after, corner + low * room), corner + 1.0 - high * room)
+    if some(surface.spiked.take(cell)):
+        for toward, spiked in surface.spikes:
+            at = which(spiked.take(cell))
+            if at.size:
+                offset = kept[at] - (corner[at] + toward)
+                distance = geometry.length(offset)
+                push = np.maximum(clearance[at] - distance, 0.0) / np.maximum(distance, SAME_POINT)
+                kept[at] += offset * push[:, None]
+    return _free_or_back(surface, before, kept)
+
+
+def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
+    """Where the new place is blocked: slide along one axis, else stay, else leave towards the nearest free cell."""
+    after = np.minimum(np.maximum(after, 0.0), (surface.width - EDGE_MARGIN, surface.height - EDGE_MARGIN))
+    bad = ~surface.flat.take(surface.cell(after))
+    for axes in ((0,), (1,), ()):
+        if not some(bad):
+            return after
+        attempt = before.copy()
+        for axis in axes:
+            attempt[:, axis] = after[:, axis]
+        fits = bad & surface.flat[surface.cell(attempt)]
+        after[fits] = attempt[fits]
+        bad &= ~fits
+    for i in which(bad).tolist():
+        free = surface.nearest_free(before[i])
+        if free is not None:
+            after[i] = surface.centre(np.array(free))
+    return after
+
+
+def _note_blocked(world: World, slots: Ints, before: Floats, after: Floats) -> None:
+    """Count the loops in which walkers made no headway, and send those that are stuck around the obstacle."""
+    intended = world.intended.take(slots, 0)
+    real = after - before
+    squared, along = intended * intended, real * intended
+    wish = squared[:, 0] + squared[:, 1]
+    hindered = along[:, 0] + along[:, 1] < MECHANICS.blocked_share * wish
+    blocked = world.blocked.take(slots)
+    if not some(hindered) and not np.count_nonzero(blocked):
+        return
+    blocked = np.where(hindered, blocked + 1, np.maximum(blocked - 2, 0)) * (wish > 0.0)
+    world.blocked[slots] = blocked
+    stuck = which(hindered & (blocked % MECHANICS.detour_after == 0))
+    if stuck.size:
+        avoidance.begin(world, slots[stuck], (real - intended)[stuck])

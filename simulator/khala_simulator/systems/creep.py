@@ -1,0 +1,127 @@
+"""Creep spreads from finished structures and standing Overlords, and recedes when they are gone.
+
+Structures that need creep wither without it.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.combat import buffs
+from khala_simulator.combat.damage import apply_damage
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.creep import GENERATING, spreads
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.columns import Bools
+    from khala_simulator.world.world import World
+
+LOOK_PERIOD: Final = 8
+WITHERING: Final = "ZergBuildingNotOnCreep"
+
+
+def spread(world: World) -> None:
+    """Look for new and lost sources, let all take the steps that are due, and harm what has lost its creep."""
+    creep = world.growth
+    if creep.looked_at != world.population or (creep.sources and world.loop % LOOK_PERIOD == 0):
+        _look_over(world)
+    if creep.sources and creep.due <= world.loop:
+        _step(world)
+    if world.growth.withering.size:
+        _wither(world)
+
+
+def _look_over(world: World) -> None:
+    """Compare the sources with the units that are there."""
+    creep = world.growth
+    creep.looked_at = world.population
+    slots = world.live[makers(world.catalog)[world.type[world.live]]]
+    stand = {world.tag_of(s): s for s in slots.tolist() if _generates(world, s)}
+    for source in creep.sources:
+        slot = stand.get(source.tag, NOBODY)
+        if source.fades:
+            continue
+        if slot != NOBODY and _cell(world, slot) == source.cell:
+            del stand[source.tag]
+        else:
+            source.fades = True
+            source.due = world.loop + MECHANICS.creep_decay_loops
+            creep.due = min(creep.due, source.due)
+    for tag, slot in stand.items():
+        creep.add(tag, world.unit_type(slot).name, _cell(world, slot), world.loop, grown=_old(world, slot))
+    if stand:
+        creep.settle()
+    world.growth.withering = world.live[needy(world.catalog)[world.type[world.live]]]
+
+
+def _generates(world: World, slot: int) -> bool:
+    """Whether creep comes from a unit now: a finished structure, or an Overlord told so that has stood long enough."""
+    spread = world.growth.spreads[world.unit_type(slot).name]
+    if not spread.delay_loops:
+        return bool(world.build_progress[slot] >= 1.0)
+    tag, (x, y) = world.tag_of(slot), world.pos[slot].tolist()
+    if not buffs.has(world, slot, GENERATING):
+        world.growth.waiting.pop(tag, None)
+        return False
+    was = world.growth.waiting.get(tag)
+    if was is None or was[:2] != (x, y):
+        world.growth.waiting[tag] = was = (x, y, world.loop)
+    return world.loop - was[2] >= spread.delay_loops
+
+
+def _old(world: World, slot: int) -> bool:
+    """Whether a source stands since the game began, and has all its creep."""
+    return bool(world.born_loop[slot] == 0) and not world.growth.spreads[world.unit_type(slot).name].delay_loops
+
+
+def _cell(world: World, slot: int) -> tuple[int, int]:
+    x, y = world.pos[slot].tolist()
+    return int(x), int(y)
+
+
+def _step(world: World) -> None:
+    """Let every source that is due cover a few cells more, or less."""
+    creep = world.growth
+    changed = False
+    for source in creep.sources:
+        while source.due <= world.loop and not _rests(world, source.extent, source.unit, fades=source.fades):
+            source.due += creep.spreads[source.unit].period_loops
+            cells = MECHANICS.creep_cells_per_step
+            creep.reach(source, source.extent + (-cells if source.fades else cells))
+            changed = True
+    if changed:
+        creep.settle()
+    busy = (s.due for s in creep.sources if not _rests(world, s.extent, s.unit, fades=s.fades))
+    creep.due = min(busy, default=float("inf"))
+
+
+def _rests(world: World, extent: int, unit: str, *, fades: bool) -> bool:
+    return extent == (0 if fades else len(world.growth.spreads[unit].cells))
+
+
+def _wither(world: World) -> None:
+    """Take a point of life from every finished structure off its creep, once per period."""
+    period = world.catalog.buff(WITHERING).period_loops
+    if int(world.loop / period) == int((world.loop - 1) / period):
+        return
+    for slot in world.growth.withering.tolist():
+        if world.build_progress[slot] >= 1.0 and not world.on_creep(slot):
+            apply_damage(world, NOBODY, int(world.owner[slot]), slot, MECHANICS.off_creep_damage)
+
+
+@lru_cache(maxsize=4)
+def makers(catalog: Catalog) -> Bools:
+    """(unit rows,) whether creep can come from units of the type."""
+    known = spreads(catalog.version)
+    return np.array([unit.name in known for unit in catalog.units])
+
+
+@lru_cache(maxsize=4)
+def needy(catalog: Catalog) -> Bools:
+    """(unit rows,) whether structures of the type wither off creep: those that need it and make none."""
+    return np.array([unit.structure and unit.needs_creep and not unit.makes_creep for unit in catalog.units])

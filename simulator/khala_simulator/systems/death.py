@@ -1,0 +1,95 @@
+"""Death: units without life leave the world, and both players' scores remember them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_simulator.abilities.registry import DEATHS, FINALS
+from khala_simulator.numeric.arrays import some, which
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.world import Death
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.records import UnitType
+    from khala_simulator.world.players import Spent
+    from khala_simulator.world.world import World
+
+NO_KILLER = -1
+
+
+def bury(world: World) -> None:
+    """Remove every unit whose life is used up, in the order of slots, and whom their deaths kill in turn."""
+    killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
+    while True:
+        slots = world.live
+        dead = world.life.take(slots) <= 0.0
+        if not some(dead):
+            return
+        for slot in slots[dead].tolist():
+            _bury(world, slot, killers)
+
+
+def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
+    attacker, owner = int(world.attacker[slot]), int(world.owner[slot])
+    killer = int(world.owner[attacker]) if attacker != NOBODY else killers.get(slot, NO_KILLER)
+    name = world.unit_type(slot).name
+    if name in DEATHS:
+        DEATHS[name](world, slot)
+    if len(world.buffs):
+        _last_of_buffs(world, slot)
+    _note(world, slot, killer)
+    for passenger in world.passengers(slot):
+        world.life[passenger] = 0.0
+        _note(world, passenger, killer)
+        world.remove(passenger)
+    n = world.top
+    killers.update(dict.fromkeys(which((world.attacker[:n] == slot) & (world.life[:n] <= 0.0)).tolist(), owner))
+    world.remove(slot)
+
+
+def _last_of_buffs(world: World, slot: int) -> None:
+    """Let what lies on a dying unit have its last effect."""
+    for row in world.buffs.of(slot):
+        rule = FINALS.get(world.catalog.buffs[int(row["buff"])].name)
+        if rule is not None:
+            rule(world, slot, row)
+
+
+def _note(world: World, slot: int, killer: int) -> None:
+    """Remember a death, and enter it into the scores unless it was a hallucination's."""
+    owner, unit = int(world.owner[slot]), world.unit_type(slot)
+    world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, killer))
+    if not world.hallucination[slot]:
+        _count(world, unit, owner, killer)
+
+
+def _count(world: World, unit: UnitType, owner: int, killer: int) -> None:
+    """Enter a death into the scores of the loser and of the killer, if it was an enemy."""
+    if unit.no_score:
+        return
+    lost = world.players[owner].score
+    _add(lost.lost, unit)
+    if unit.structure:
+        lost.lost_structures += 1
+    else:
+        lost.lost_units += 1
+    if killer in (NO_KILLER, owner):
+        return
+    won = world.players[killer].score
+    _add(won.killed, unit)
+    if unit.structure:
+        won.killed_structures += 1
+        won.killed_value_structures += unit.score_kill
+    else:
+        won.killed_units += 1
+        won.killed_value_units += unit.score_kill
+
+
+def _add(spent: Spent, unit: UnitType) -> None:
+    """Add a unit's price to its category: workers and town halls are economy, other structures technology."""
+    if unit.worker or (unit.structure and unit.provides > 0 and "structure" in unit.attributes):
+        category = spent.economy
+    else:
+        category = spent.technology if unit.structure and not unit.weapons else spent.army
+    category[0] += unit.cost[0]
+    category[1] += unit.cost[1]

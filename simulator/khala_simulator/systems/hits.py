@@ -1,0 +1,48 @@
+"""Hits: what a weapon has let go happens when it is due, at once, as a missile or as a sweep.
+
+Between ``weapons``, which puts hits into ``pending`` at the damage point, and the rules that carry them out:
+``damage``, ``missiles``, ``sweeps``. The hits of a shot happen in the order of being due and fired; those of a dead
+attacker are lost.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.combat import damage
+from khala_simulator.numeric.arrays import some
+from khala_simulator.systems import missiles, sweeps
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import shot_of
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+
+def fall_due(world: World) -> None:
+    """Let every hit that is due happen."""
+    pending = world.pending
+    if not len(pending):
+        return
+    due = pending.rows["due"] <= world.loop
+    if not some(due):
+        return
+    homing = (pending.target != NOBODY) & ~world.stats.kamikaze[pending.rows["weapon"]]
+    pending.rows["goal"] = np.where(homing[:, None], world.pos.take(pending.target, 0), pending.goal)
+    rows = pending.rows[due]
+    pending.keep(~due)
+    for row, begun, single in zip(rows, rows["due"].tolist(), rows["single"].tolist(), strict=True):
+        shot = shot_of(row)
+        if shot.source == NOBODY:
+            continue
+        hit = world.catalog.weapons[shot.weapon].hits[shot.hit]
+        if single:
+            damage.hit_target(world, shot)
+        elif hit.missile_speed_n is not None:
+            missiles.launch(world, shot, hit)
+        elif hit.sweep is not None:
+            sweeps.begin(world, shot, begun)
+        else:
+            damage.hit_with(world, shot)

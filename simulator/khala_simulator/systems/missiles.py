@@ -1,0 +1,75 @@
+"""Missiles: they follow their target and hit when they reach its edge, or the last place of a target that died.
+
+A missile that bounces goes on from its victim to the next enemy near it that it has not hit yet.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.combat import damage
+from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
+from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
+from khala_simulator.tables.stats import INSTANT_ACCELERATION_N
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import Shot, shot_of
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.records import Hit
+    from khala_simulator.world.world import World
+
+
+def fly(world: World) -> None:
+    """Move all missiles by one loop and let those that arrive hit."""
+    missiles = world.missiles
+    if not len(missiles):
+        return
+    shots = missiles.rows
+    target = shots["target"]
+    homing = target != NOBODY
+    body = world.radius.take(target) * homing
+    shots["goal"] = np.where(homing[:, None], world.pos.take(target, 0), shots["goal"])
+    step = shots["step"] = np.minimum(shots["step"] + shots["gain"], shots["top"])
+    offset = shots["goal"] - shots["pos"]
+    distance = geometry.length(offset)
+    arriving = distance - body <= step
+    shots["pos"] += offset * (step / np.maximum(distance, 1e-12))[:, None]
+    if some(arriving):
+        arrived = [shot_of(shots[row]) for row in which(arriving).tolist()]
+        missiles.keep(~arriving)
+        for shot in arrived:
+            damage.hit_with(world, shot)
+            _bounce(world, shot)
+
+
+def launch(world: World, shot: Shot, hit: Hit) -> None:
+    """Send the missile of a hit on its way."""
+    top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
+    gain_n = hit.missile_acceleration_n
+    instant = gain_n is None or gain_n >= INSTANT_ACCELERATION_N
+    world.missiles.append(
+        1,
+        **shot._asdict(),
+        pos=shot.start,
+        step=top if instant else 0.0,
+        top=top,
+        gain=math.inf if gain_n is None or instant else gain_n / LOOPS_PER_NORMAL_SECOND**2,
+    )
+
+
+def _bounce(world: World, shot: Shot) -> None:
+    """Send on a missile that bounces; one whose target died on the way is lost."""
+    hits = world.catalog.weapons[shot.weapon].hits
+    if shot.target == NOBODY or shot.hit + 1 >= len(hits) or not hits[shot.hit + 1].bounce:
+        return
+    onward = hits[shot.hit + 1]
+    if onward.search is None:
+        return
+    for slot in damage.found_by(world, onward.search, shot):
+        x, y = world.pos[slot].tolist()
+        after = shot._replace(target=slot, prior=shot.target, hit=shot.hit + 1, start=shot.goal, goal=(x, y))
+        launch(world, after, onward)

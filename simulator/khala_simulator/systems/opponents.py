@@ -1,0 +1,31 @@
+"""Opponents: computer players of melee games think, each in its own loops."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_simulator.opponent import melee
+from khala_simulator.opponent.levels import level_of
+from khala_simulator.opponent.plans import PLANS
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+
+def run(world: World) -> None:
+    """Let every computer player that leads a side think when its time has come."""
+    if world.opponents is None:
+        world.opponents = tuple(_led(world))
+    for player in world.opponents:
+        if (world.loop + player) % level_of(world.players[player].difficulty).period_loops == 0:
+            melee.think(world, player)
+
+
+def _led(world: World) -> list[int]:
+    """The computer players that the scenario gives to the game's own ways."""
+    specs = world.map.scenario.players
+    return [
+        player.id for player in world.players[1:]
+        if player.control == "computer" and player.race in PLANS and player.id in specs
+        and specs[player.id].ai == "melee"
+    ]  # fmt: skip

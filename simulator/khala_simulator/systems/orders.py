@@ -1,0 +1,55 @@
+"""Orders: when the current one is finished, the next in the queue begins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_simulator.abilities import commands
+from khala_simulator.movement.arrival import packed
+from khala_simulator.numeric.arrays import some, which
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+CROWD_PERIOD = 2  # whether the crowd at a goal is dense is looked over so often
+
+
+def carry_out(world: World) -> None:
+    """End every order whose point is reached or whose target is gone, and begin what waits behind it."""
+    for slot in _lost(world) + _arrived(world):
+        commands.begin_next(world, slot)
+
+
+def _lost(world: World) -> list[int]:
+    """Slots whose order's target is dead, or out of their owner's sight; without fog only a change can bring that."""
+    if not world.orders_changed and not world.fog:
+        return []
+    world.orders_changed = False
+    slots = which(world.needs_target[: world.top])
+    if not slots.size:
+        return []
+    target = world.order_target.take(slots)
+    lost = (target == NOBODY) | ~world.visible[world.owner.take(slots), target]
+    return slots[lost].tolist() if some(lost) else []
+
+
+def _arrived(world: World) -> list[int]:
+    """Slots whose walk has reached its point, or as near as the crowd there or the terrain lets them."""
+    n = world.top
+    walkers = which(world.walks[:n] & ((world.target[:n] == NOBODY) | ~world.looks_around[:n]))
+    if not walkers.size:
+        return []
+    offset = world.order_point.take(walkers, 0) - world.pos.take(walkers, 0)
+    offset *= offset
+    squared = offset[:, 0] + offset[:, 1]
+    there = squared <= MECHANICS.arrival_radius**2
+    there |= world.nav_end.take(walkers)
+    if world.loop % CROWD_PERIOD == 0:
+        stuck = world.blocked.take(walkers) > 0
+        stuck |= world.loop - world.nav_best_loop.take(walkers) > MECHANICS.crowd_stall
+        stuck &= ~there
+        if some(stuck):
+            there[stuck] = packed(world, walkers[stuck])
+    return walkers[there].tolist() if some(there) else []

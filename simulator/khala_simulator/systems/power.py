@@ -1,0 +1,20 @@
+"""Power: looked over when somebody came or went, was finished, or changed its kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_simulator.combat.traits import refresh
+from khala_simulator.economy import power
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+
+def run(world: World) -> None:
+    """Say which structures have power, if anything changed since the last time."""
+    if world.powered_at == world.population:
+        return
+    world.powered_at = world.population
+    for slot in power.supply(world):
+        refresh(world, slot)

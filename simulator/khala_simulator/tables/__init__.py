@@ -1,0 +1,1 @@
+"""The numbers of the game: unit types, weapons, abilities, upgrades, and the statistics that follow from them."""

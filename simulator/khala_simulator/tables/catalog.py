@@ -1,0 +1,300 @@
+"""The game's tables: what a unit, a weapon and an upgrade are in one version of StarCraft II.
+
+Reads ``data/tables/<version>`` into the records of ``records``, once per process. Nothing here is about one
+particular game: which upgrades a player has is applied in ``stats``, where the records become arrays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any, Final
+
+from khala_simulator.tables.abilities import Ability, ability_from
+from khala_simulator.tables.buffs import Buff, buff_from
+from khala_simulator.tables.prices import priced
+from khala_simulator.tables.records import (
+    Affects,
+    Area,
+    Change,
+    Footprint,
+    Hit,
+    Production,
+    Search,
+    Sweep,
+    UnitType,
+    Upgrade,
+    Weapon,
+)
+
+__all__ = [
+    "DEFAULT_VERSION",
+    "LOOPS_PER_NORMAL_SECOND",
+    "Ability",
+    "Buff",
+    "Catalog",
+    "CatalogError",
+    "Footprint",
+    "Hit",
+    "Production",
+    "UnitType",
+    "Upgrade",
+    "Weapon",
+    "load_catalog",
+]
+
+LOOPS_PER_NORMAL_SECOND: Final = 16
+DEFAULT_VERSION: Final = "4.10"
+VERSION_OF_BUILD: Final = {75689: "4.10", 92440: "5.0.13"}
+
+
+class CatalogError(ValueError):
+    """A table version, unit or weapon that is not in the data was asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Catalog:
+    """All tables of one game version, with look-up by id and by name.
+
+    ``cards`` and ``ordinary`` go by unit row: what units of a type can be told, and by which ability ids they move,
+    attack, patrol, hold and stop.
+    """
+
+    version: str
+    build: int
+    units: tuple[UnitType, ...]
+    weapons: tuple[Weapon, ...]
+    upgrades: tuple[Upgrade, ...]
+    footprints: dict[str, Footprint]
+    row_of_id: dict[int, int]
+    row_of_name: dict[str, int]
+    abilities: tuple[Ability, ...]
+    buffs: tuple[Buff, ...]
+    cards: tuple[tuple[Ability, ...], ...]
+    ordinary: tuple[dict[str, int], ...]
+    ability_of_id: dict[int, Ability]
+    buff_of_name: dict[str, Buff]
+    upgrade_of: dict[int | str, Upgrade]
+
+    def unit(self, key: int | str) -> UnitType:
+        """The unit type with this API id or this name; raises ``CatalogError`` when there is none."""
+        row = self.row_of_id.get(key) if isinstance(key, int) else self.row_of_name.get(key)
+        if row is None:
+            raise CatalogError(f"no unit type {key!r} in the tables of version {self.version}")
+        return self.units[row]
+
+    def ability(self, number: int) -> Ability:
+        """The specific ability with this API id; raises ``CatalogError`` when there is none."""
+        found = self.ability_of_id.get(number)
+        if found is None:
+            raise CatalogError(f"no ability {number} in the tables of version {self.version}")
+        return found
+
+    def abilities_of(self, row: int) -> tuple[Ability, ...]:
+        """What units of the type in this row can be told to do, by ascending id."""
+        return self.cards[row]
+
+    def buff(self, name: str) -> Buff:
+        """The buff with this name; raises ``CatalogError`` when there is none."""
+        found = self.buff_of_name.get(name)
+        if found is None:
+            raise CatalogError(f"no buff {name!r} in the tables of version {self.version}")
+        return found
+
+    def upgrade(self, key: int | str) -> Upgrade:
+        """The upgrade with this API id or this name; raises ``CatalogError`` when there is none."""
+        found = self.upgrade_of.get(key)
+        if found is not None:
+            return found
+        raise CatalogError(f"no upgrade {key!r} in the tables of version {self.version}")
+
+
+@lru_cache(maxsize=4)
+def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
+    """The tables of a game version, given as "4.10" or as its build number 75689.
+
+    Raises:
+        CatalogError: no tables for this version are shipped.
+    """
+    name = VERSION_OF_BUILD.get(version) if isinstance(version, int) else version
+    if name is None or name not in VERSION_OF_BUILD.values():
+        known = ", ".join(f"{v} (build {b})" for b, v in VERSION_OF_BUILD.items())
+        raise CatalogError(f"no tables for game version {version!r}; shipped are {known}")
+    weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
+    weapon_of_id = {w.id: w for w in weapons}
+    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(_rows(name, "units"))))
+    upgrades = tuple(_upgrade(raw) for raw in _rows(name, "upgrades"))
+    unpriced = (ability_from(raw) for raw in _rows(name, "abilities"))
+    abilities = priced(unpriced, {u.name: u for u in units}, {u.name: u for u in upgrades})
+    cards = _cards(units, abilities)
+    buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
+    return Catalog(
+        version=name,
+        build=next(b for b, v in VERSION_OF_BUILD.items() if v == name),
+        units=units,
+        weapons=weapons,
+        upgrades=upgrades,
+        footprints={raw["id"]: _footprint(raw) for raw in _rows(name, "footprints")},
+        row_of_id={u.id: u.row for u in units},
+        row_of_name={u.name: u.row for u in units},
+        abilities=abilities,
+        buffs=buffs,
+        cards=cards,
+        ordinary=tuple({a.effect: a.id for a in card if a.effect in BASICS} for card in cards),
+        ability_of_id={a.id: a for a in abilities},
+        buff_of_name={b.name: b for b in buffs},
+        upgrade_of={key: u for u in upgrades for key in (u.id, u.name)},
+    )
+
+
+WALK_BY_UPGRADE: Final = frozenset({"RoachBurrowed"})
+"""Types without a speed of their own that an upgrade gives one."""
+BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack")
+
+
+def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple[tuple[Ability, ...], ...]:
+    """The command card of every type; of each basic order it holds one, the one that fits the type."""
+    of_name: dict[str, dict[int, Ability]] = {unit.name: {} for unit in units}
+    smart = next(a for a in abilities if a.effect == "smart")
+    for ability in abilities:
+        for user in ability.users:
+            if ability.effect not in ("", "general", "smart") and user in of_name:
+                of_name[user][ability.id] = ability
+    return tuple(_card(unit, of_name[unit.like or unit.name], smart) for unit in units)
+
+
+def _card(unit: UnitType, found: dict[int, Ability], smart: Ability) -> tuple[Ability, ...]:
+    armed = any(unit.weapon_against(plane) is not None for plane in ("ground", "air"))
+    walks = unit.speed_n > 0.0 or unit.name in WALK_BY_UPGRADE
+    fits = {"attack": armed, "scan_move": walks and not armed, "stop": armed or walks}
+    card = {} if unit.uncommandable else dict(found)
+    seen: set[str] = set()
+    for number, ability in sorted(found.items()):
+        if ability.effect not in BASICS:
+            continue
+        if ability.effect in seen or not fits.get(ability.effect, walks):
+            card.pop(number, None)
+        else:
+            seen.add(ability.effect)
+    if card or (not unit.uncommandable and (armed or walks)):
+        card[smart.id] = smart
+    return tuple(ability for _, ability in sorted(card.items()))
+
+
+def _rows(version: str, kind: str) -> list[dict[str, Any]]:
+    path = resources.files("khala_simulator.data") / "tables" / version / f"{kind}.json"
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return rows
+
+
+def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows, where one that is ``like`` another has all of that one that it does not say itself."""
+    of_name = {row["name"]: row for row in rows}
+    return [{**of_name[row["like"]], "made_by": (), **row} if "like" in row else row for row in rows]
+
+
+def _pairs(bonus: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(bonus.items()))
+
+
+def _own(record: type[Any], raw: dict[str, Any]) -> dict[str, Any]:
+    """The values of a row that are fields of ``record``."""
+    names = {f.name for f in dataclasses.fields(record)}
+    return {k: v for k, v in raw.items() if k in names}
+
+
+def _affects(raw: dict[str, Any]) -> Affects:
+    return Affects(**_own(Affects, raw), excluding=raw.get("except", ""))
+
+
+def _sweep(raw: dict[str, Any]) -> Sweep:
+    points = tuple(map(tuple, raw["points"]))
+    return Sweep(affects=_affects(raw), **{**_own(Sweep, raw), "points": points})
+
+
+def _hit(raw: dict[str, Any]) -> Hit:
+    raw = dict(raw)
+    sweep, search = raw.pop("sweep", None), raw.pop("search", None)
+    return Hit(
+        bonus=_pairs(raw.pop("bonus", {})),
+        missile_speed_n=raw.pop("missile_speed", None),
+        missile_acceleration_n=raw.pop("missile_acceleration", None),
+        area=tuple(Area(**ring) for ring in raw.pop("area", ())),
+        area_affects=_affects(raw.pop("area_affects", {})),
+        sweep=sweep and _sweep(sweep),
+        search=search and Search(affects=_affects(search), **_own(Search, search)),
+        **raw,
+    )
+
+
+def _weapon(row: int, raw: dict[str, Any]) -> Weapon:
+    raw = dict(raw)
+    shown = raw.pop("shown")
+    return Weapon(
+        row=row,
+        hits=tuple(_hit(h) for h in raw.pop("hits", ())),
+        jitter_loops=tuple(raw.pop("jitter_loops", (0.0, 0.0))),
+        backswing_loops=raw.pop("backswing_loops", 0.0),
+        shown_damage=shown["damage"] or 0.0,
+        shown_attacks=shown["attacks"],
+        shown_bonus=_pairs(shown["bonus"]),
+        estimates=tuple(raw.pop("estimates", ())),
+        **raw,
+    )
+
+
+def _production(raw: dict[str, Any]) -> Production:
+    cost = tuple(raw.get("cost", (0, 0)))
+    rest = {k: v for k, v in raw.items() if k not in ("from", "cost")}
+    return Production(producer=raw["from"], cost=cost, **{"ability": 0, **rest})
+
+
+def _unit(row: int, raw: dict[str, Any], weapon_of_id: dict[str, Weapon]) -> UnitType:
+    raw = dict(raw)
+    resource = raw.pop("resource", {})
+    for name in ("attributes", "planes", "collide", "cost", "tech_alias"):
+        if name in raw:
+            raw[name] = tuple(raw[name])
+    return UnitType(
+        row=row,
+        made_by=tuple(_production(p) for p in raw.pop("made_by", ())),
+        weapons=tuple(weapon_of_id[w] for w in raw.pop("weapons", ())),
+        resource=resource.get("kind", ""),
+        resource_amount=resource.get("amount", 0),
+        per_trip=resource.get("per_trip", 0),
+        harvest_loops=resource.get("harvest_n", 0.0) * LOOPS_PER_NORMAL_SECOND,
+        ideal_harvesters=resource.get("ideal", 0),
+        power=tuple((p["radius"], p.get("level", 0)) for p in raw.pop("power", ())),
+        **raw,
+    )
+
+
+def _upgrade(raw: dict[str, Any]) -> Upgrade:
+    raw = dict(raw)
+    return Upgrade(
+        cost=tuple(raw.pop("cost", (0, 0))),
+        at=tuple(raw.pop("at", ())),
+        changes=tuple(Change(*change) for change in raw.pop("changes", ())),
+        **raw,
+    )
+
+
+def _footprint(raw: dict[str, Any]) -> Footprint:
+    x0, y0, x1, y1 = raw["area"]
+    marked: dict[str, list[tuple[int, int]]] = {"x": [], "o": []}
+    for line, text in enumerate(raw["rows"]):
+        for column, mark in enumerate(text):
+            if mark in marked:
+                marked[mark].append((x0 + column, y1 - 1 - line))
+    check = raw.get("check", {}).get("x", {})
+    return Footprint(
+        id=raw["id"],
+        area=(x0, y0, x1, y1),
+        cells=tuple(marked["x"]),
+        around=tuple(marked["o"]),
+        forbids=frozenset(check.get("forbid", ())),
+        requires=frozenset(check.get("require", ())),
+    )

@@ -1,0 +1,72 @@
+"""Prices: what a player is charged for what an ability makes.
+
+The tables keep most prices with the product (``made_by``); ``priced`` brings them to the abilities once, when a
+catalog is loaded, so that one rule of affording holds for all. ``payments`` takes them and gives them back.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.tables.records import UnitType, Upgrade
+
+Cost = tuple[float, float]
+
+BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "summon", "warp_in", "arm", "structure_morph"})
+"""What is charged for as its product's ``made_by`` says."""
+BUILD_REACH: Final = 0.5
+"""How far from a structure's body its builder may stand when it places it (an estimate)."""
+
+
+def priced(
+    abilities: Iterable[Ability], units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]
+) -> tuple[Ability, ...]:
+    """The abilities with price, supply and time of what they make, and a builder's reach, where they have none.
+
+    What makes nothing that the tables of the version know does nothing.
+    """
+    return tuple(_priced(ability, units, upgrades) for ability in abilities)
+
+
+def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]) -> Ability:
+    if ability.effect == "research":
+        return _priced_research(ability, upgrades.get(ability.upgrade))
+    product = units.get(ability.unit)
+    if ability.effect not in BY_PRODUCT:
+        return ability
+    if product is None:
+        return dataclasses.replace(ability, effect="")
+    ways = [way for way in product.made_by if way.ability == ability.id]
+    if not ways or ability.minerals or ability.vespene:
+        return ability
+    way = ways[0]
+    reach = product.radius + BUILD_REACH if ability.effect == "build" and not ability.range else ability.range
+    minerals, vespene = way.cost
+    return dataclasses.replace(
+        ability,
+        minerals=minerals,
+        vespene=vespene,
+        count=way.count,
+        supply=product.supply * way.count,
+        loops=ability.loops or way.loops,
+        range=reach,
+    )
+
+
+def _priced_research(ability: Ability, upgrade: Upgrade | None) -> Ability:
+    if upgrade is None or not ability.loops:
+        return dataclasses.replace(ability, effect="")
+    if ability.minerals or ability.vespene:
+        return ability
+    minerals, vespene = upgrade.cost
+    return dataclasses.replace(ability, minerals=minerals, vespene=vespene)
+
+
+def cost_of(ability: Ability) -> Cost:
+    """Minerals and vespene."""
+    return float(ability.minerals), float(ability.vespene)

@@ -1,0 +1,61 @@
+"""Active buffs: which units bear which buffs, a row each.
+
+Only the table: ``buffs`` adds to it and takes from it, ``systems.buffs`` lets them run out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FOREVER: Final = 1 << 40  # end of a buff that does not run out
+
+ROW: Final = np.dtype(
+    [
+        ("slot", np.int64),  # who bears it
+        ("buff", np.int64),  # row in catalog.buffs
+        ("source", np.int64),  # slot of the caster, or NOBODY
+        ("owner", np.int64),  # whose unit cast it
+        ("begun", np.int64),  # loop
+        ("end", np.float64),  # loop, FOREVER without an end
+        ("due", np.float64),  # loop of the next period, FOREVER without one
+        ("count", np.int64),  # stacks, or ticks done: the skill's own counter
+    ]
+)
+
+
+class ActiveBuffs:
+    """The buffs in force, a row each, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self.rows: NDArray[np.void] = np.zeros(0, dtype=ROW)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def of(self, slot: int) -> NDArray[np.void]:
+        """The rows that lie on a unit."""
+        found: NDArray[np.void] = self.rows[self.rows["slot"] == slot]
+        return found
+
+    def find(self, slot: int, row: int) -> int:
+        """Index of the first row of a kind on a unit, or -1."""
+        found = np.flatnonzero((self.rows["slot"] == slot) & (self.rows["buff"] == row))
+        return int(found[0]) if found.size else -1
+
+    def forget(self, slot: int) -> None:
+        """The unit in ``slot`` is gone: what lay on it goes, what it cast stays."""
+        if len(self.rows):
+            self.rows = self.rows[self.rows["slot"] != slot]
+            source = self.rows["source"]
+            source[source == slot] = NOBODY
+
+    def content(self) -> bytes:
+        """All rows as bytes, for the digest of the world."""
+        return self.rows.tobytes()

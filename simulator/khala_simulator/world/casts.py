@@ -1,0 +1,29 @@
+"""One use of an ability, as a value: who, which, and at what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.abilities import Ability
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """A unit (slot) uses an ability on a unit (slot), at a point (world), or on nothing.
+
+    ``begun`` is the loop in which it takes effect; a channel goes on from there. ``was`` is the row of the caster's
+    type before it did.
+    """
+
+    slot: int
+    ability: Ability
+    target: int = NOBODY
+    point: Point | None = None
+    begun: int = 0
+    was: int = -1

@@ -1,0 +1,50 @@
+"""The ground of one game: which cells its structures block now.
+
+Only the cells; which way round leads over what is free is ``pathfinding``'s.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from khala_simulator.maps.game_map import Grid, Terrain
+    from khala_simulator.tables.layers import Layer
+    from khala_simulator.world.columns import Ints
+
+
+class Ground:
+    """The terrain with the structures that stand on it now.
+
+    ``surfaces`` is a place for what ``pathfinding`` works out of it per layer; it is empty after every change.
+    """
+
+    def __init__(self, terrain: Terrain) -> None:
+        self.terrain = terrain
+        self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
+        self.blocked: dict[int, Ints] = {}  # slot -> (k, 2) cells (x, y) of its structure
+        self.surfaces: dict[Layer, object] = {}
+
+    def block(self, slot: int, cells: Ints) -> None:
+        """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
+        height, width = self.terrain.walk.shape
+        inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
+        if inside.any():
+            self.blocked[slot] = cells[inside]
+            self._changed()
+
+    def unblock(self, slot: int) -> None:
+        """Take the structure of a slot away, if it has one."""
+        if self.blocked.pop(slot, None) is not None:
+            self._changed()
+
+    def with_structures(self, grid: Grid) -> Grid:
+        """A copy of a grid of free cells (h, w) with the cells of the structures taken."""
+        grid = grid.copy()
+        for cells in self.blocked.values():
+            grid[cells[:, 1], cells[:, 0]] = False
+        return grid
+
+    def _changed(self) -> None:
+        self.walk = self.with_structures(self.terrain.walk)
+        self.surfaces = {}

@@ -1,0 +1,390 @@
+"""The world: the whole state of one game as arrays over unit slots.
+
+State and bookkeeping only. What happens in it is in ``systems``, what players ask of it comes through ``commands``,
+``tick`` advances it, and the API reads it. A slot is the index of a unit in every array; slots of dead units are used
+again with another tag, so whoever keeps a unit for longer than a loop keeps its tag.
+
+Everything that decides the future lies in the state columns, the queues, the shots under way, the players, the random
+generator and the loop counter; ``digest`` covers exactly these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.numeric import geometry
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.stats import Stats
+from khala_simulator.world.active_buffs import ActiveBuffs
+from khala_simulator.world.caches import WorldCaches
+from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
+from khala_simulator.world.creep import Creep
+from khala_simulator.world.ground import Ground
+from khala_simulator.world.orders import ATTACK, Order, OrderKind
+from khala_simulator.world.players import NEUTRAL, GameResult, Player, PlayerSetup
+from khala_simulator.world.script_memory import ScriptMemory
+from khala_simulator.world.shots import Missiles, PendingHits, Sweep
+from khala_simulator.world.snapshots import Memory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from khala_simulator.maps.game_map import GameMap
+    from khala_simulator.tables.action_result import ActionResult
+    from khala_simulator.tables.catalog import Catalog, UnitType
+    from khala_simulator.world.area_effects import AreaEffect
+    from khala_simulator.world.casts import Cast
+    from khala_simulator.world.jobs import Job
+
+__all__ = ["NOBODY", "NO_TAG", "Death", "World"]
+
+NO_TAG: Final = 0
+TAG_BASE: Final = 1 << 32
+INDEX_SHIFT: Final = 18
+
+
+@dataclass(frozen=True, slots=True)
+class Death:
+    """A unit that died: at which loop, which tag and type, whose it was, and whose unit did it (-1 nobody's)."""
+
+    loop: int
+    tag: int
+    type_id: int
+    owner: int
+    killer: int
+
+
+@dataclass(frozen=True, slots=True)
+class Mishap:
+    """A command that was given and could not be carried out in the end: at which loop, whose, which, and why."""
+
+    loop: int
+    player: int
+    tag: int
+    ability: int
+    refusal: ActionResult
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """Something that a player is told of: at which loop, whom, and the API's name of it."""
+
+    loop: int
+    player: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rally:
+    """Where new units are sent: to a unit (tag), or to a point."""
+
+    point: tuple[float, float]
+    target: int = NO_TAG
+
+
+class World(UnitColumns, WorldCaches):
+    """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
+
+    The world grows by itself; keep no reference to a column across ``spawn``.
+    """
+
+    def __init__(
+        self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
+    ) -> None:
+        UnitColumns.__init__(self)
+        WorldCaches.__init__(self)
+        self.map: GameMap = game_map
+        self.catalog: Catalog = catalog or load_catalog()
+        self.seed = seed
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+        self.loop = 0
+        self.players: list[Player] = [Player(NEUTRAL, "neutral", "none")]
+        self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty) for p in players]
+        self.stats = Stats(self.catalog, len(self.players))
+        self.ground = Ground(game_map.terrain)
+        self.fog: bool = game_map.scenario.visibility.fog
+        self.visibility: NDArray[np.uint8]  # (players, h, w): 0 never seen, 1 seen before, 2 visible
+        width, height = game_map.terrain.size
+        never = 0 if game_map.scenario.visibility.black_mask else 1
+        self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
+        self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
+        self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
+        self.memories = [Memory() for _ in self.players]  # what each player remembers of what the fog covers
+        self.missiles = Missiles()
+        self.pending = PendingHits()
+        self.sweeps: list[Sweep] = []
+        self.buffs = ActiveBuffs()
+        self.area_effects: list[AreaEffect] = []
+        self.timers: dict[int, dict[str, float]] = {}  # slot -> cooldown's name -> loop at which it is over
+        self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
+        self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
+        self.mishaps: list[Mishap] = []
+        self.alerts: list[Alert] = []
+        self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
+        self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
+        self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
+        self.deaths: list[Death] = []
+        self.deaths_seen = 0  # how many of the deaths the triggers have been told about
+        self.script = ScriptMemory()
+        self.ended = False
+        self.queue: list[list[Order]] = []
+        self.live: Ints = np.zeros(0, dtype=np.int64)
+        self._recycles: Ints = np.zeros(0, dtype=np.int64)
+        self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
+        self.growth = Creep(game_map.terrain, self.catalog.version)
+        self.scan_now = True  # somebody lost a target or got an order since the last scan
+        self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
+        self._grow(64)
+
+    # units --------------------------------------------------------------------------------------------------------
+
+    def add(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float) -> int:
+        """Take a free slot for a unit at exactly ``point``; returns it. ``lifecycle.spawn`` writes the rest."""
+        slot = self._free_slot()
+        self.clear(slot)
+        self.alive[slot] = True
+        self.tag[slot] = TAG_BASE | slot << INDEX_SHIFT | int(self._recycles[slot])
+        self.type[slot] = unit.row
+        self.owner[slot] = owner
+        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
+        self.heading[slot] = self.turret[slot] = geometry.heading(facing)
+        self.born_loop[slot] = self.loop
+        self.queue[slot] = []
+        return slot
+
+    def remove(self, slot: int) -> None:
+        """Take a unit out of the world; every reference to its slot becomes NOBODY."""
+        self.clear(slot)
+        self._recycles[slot] += 1
+        self.queue[slot] = []
+        for column in (
+            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
+            self.occupant,
+        ):  # fmt: skip
+            column[column == slot] = NOBODY
+        self.buffs.forget(slot)
+        for job in self.jobs.pop(slot, ()):
+            self.players[job.owner].underway.remove(job.makes)
+        self.rallies.pop(slot, None)
+        self.invested.pop(slot, None)
+        self.timers.pop(slot, None)
+        self.autocast.pop(slot, None)
+        self.hurt = [pair for pair in self.hurt if slot not in pair]
+        self.missiles.forget(slot)
+        self.pending.forget(slot)
+        for sweep in self.sweeps:
+            sweep.forget(slot)
+        self.ground.unblock(slot)
+        self.population_changed()
+
+    def stow(self, slot: int, carrier: int) -> None:
+        """Take a unit out of the world into a carrier: it lives on, and nobody sees or touches it."""
+        self.carrier[slot] = carrier
+        self.walks[slot] = self.looks_around[slot] = self.holds[slot] = False
+        self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
+        self.wants[slot] = self.in_reach[slot] = False
+        self.visible[:, slot] = False
+        for column in (self.target, self.order_target):
+            column[column == slot] = NOBODY
+        self.target[slot] = NOBODY
+        self.ground.unblock(slot)
+        self.population_changed()
+
+    def unstow(self, slot: int, point: tuple[float, float]) -> None:
+        """Put a unit from its carrier back into the world."""
+        self.carrier[slot] = NOBODY
+        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
+        self.looks_around[slot] = True
+        self.visible[self.owner[slot], slot] = True
+        self.stand(slot)
+        self.population_changed()
+
+    def alert(self, player: int, name: str) -> None:
+        """Tell a player something, by the API's name of the alert."""
+        self.alerts.append(Alert(self.loop, player, name))
+
+    def passengers(self, carrier: int) -> list[int]:
+        """Slots of the units inside a carrier, ascending."""
+        inside: list[int] = np.flatnonzero(self.alive & (self.carrier == carrier)).tolist()
+        return inside
+
+    def slot_of(self, tag: int) -> int:
+        """The slot of a living unit with this tag, or NOBODY."""
+        slot = tag >> INDEX_SHIFT & 0x3FFF
+        return slot if slot < self.capacity and tag != NO_TAG and self.tag[slot] == tag else NOBODY
+
+    def tag_of(self, slot: int) -> int:
+        """The tag of the unit in a slot, 0 for NOBODY."""
+        return int(self.tag[slot]) if slot >= 0 else NO_TAG
+
+    def unit_type(self, slot: int) -> UnitType:
+        """The record of the unit's type."""
+        return self.catalog.units[int(self.type[slot])]
+
+    def units_of(self, player: int) -> Ints:
+        """Slots of a player's living units, ascending."""
+        result: Ints = self.live[self.owner[self.live] == player]
+        return result
+
+    def facing(self) -> Floats:
+        """(capacity,) API facing of every slot, radians in [0, 2 pi)."""
+        return geometry.facing(self.heading)
+
+    def heights(self) -> Floats:
+        """(len(live),) z of every living unit: the ground's, and its flying height above it."""
+        above = np.array([self.catalog.units[row].height for row in self.type[self.live]], dtype=np.float64)
+        result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
+        return result
+
+    def stand(self, slot: int) -> None:
+        """Put a structure's footprint on the ground, unless units walk over it."""
+        if not self.unit_type(slot).underfoot:
+            self.ground.block(slot, self.footprint_cells(slot))
+
+    def footprint_cells(self, slot: int) -> Ints:
+        """(k, 2) cells ``(x, y)`` that a structure blocks; (0, 2) for others."""
+        footprint = self.catalog.footprints.get(self.unit_type(slot).footprint)
+        if footprint is None or not footprint.cells:
+            return np.zeros((0, 2), dtype=np.int64)
+        corner = np.floor(self.pos[slot] + 1e-9).astype(np.int64)
+        cells: Ints = corner + np.array(footprint.cells, dtype=np.int64)
+        return cells
+
+    # orders, as values --------------------------------------------------------------------------------------------
+
+    def orders_of(self, slot: int) -> list[Order]:
+        """The unit's orders, the current one first; empty when it is idle and engages nobody.
+
+        An idle unit that fights by itself shows the attack it makes, as the game does.
+        """
+        kind = OrderKind(int(self.order_kind[slot]))
+        if slot in self.jobs and kind is OrderKind.IDLE:
+            return [Order(OrderKind.CAST, job.ability, progress=job.progress) for job in self.jobs[slot]]
+        if kind is OrderKind.IDLE:
+            fights = self.target[slot] != NOBODY
+            return [Order(OrderKind.ATTACK_UNIT, ATTACK, self.tag_of(int(self.target[slot])))] if fights else []
+        targeted = kind in (OrderKind.ATTACK_UNIT, OrderKind.FOLLOW) or self.order_target[slot] != NOBODY
+        pointless = targeted or kind is OrderKind.HOLD or not self.order_aimed[slot]
+        current = Order(
+            kind=kind,
+            ability=int(self.order_ability[slot]),
+            target=self.tag_of(int(self.order_target[slot])) if targeted else NO_TAG,
+            point=None if pointless else _point(self.order_point, slot),
+            origin=_point(self.order_origin, slot) if kind is OrderKind.PATROL else None,
+            progress=self._progress(slot) if kind is OrderKind.CAST else 0.0,
+        )
+        return [current, *self.queue[slot]]
+
+    def _progress(self, slot: int) -> float:
+        """How much of the time is over that an ability takes to prepare, 0..1."""
+        end, begun = float(self.cast_at[slot]), float(self.cast_begun[slot])
+        return min(max((self.loop - begun) / (end - begun), 0.0), 1.0) if end > begun >= 0.0 else 0.0
+
+    # ground -------------------------------------------------------------------------------------------------------
+
+    @property
+    def creep(self) -> Bools:
+        """(h, w) where there is creep now; a new array whenever that changes."""
+        return self.growth.covered
+
+    def on_creep(self, slot: int) -> bool:
+        """Whether the middle of a unit is on creep."""
+        x, y = self.pos[slot].tolist()
+        return self.growth.covers(x, y)
+
+    # sight --------------------------------------------------------------------------------------------------------
+
+    def is_visible(self, player: int) -> Bools:
+        """(len(live),) whether ``player`` sees each living unit now; cloak and detection are not looked at here."""
+        if not self.fog:
+            return np.ones(len(self.live), dtype=np.bool_)
+        cells = self.pos[self.live].astype(np.int64)
+        width, height = self.map.terrain.size
+        x, y = np.clip(cells[:, 0], 0, width - 1), np.clip(cells[:, 1], 0, height - 1)
+        seen: Bools = (self.visibility[player, y, x] == 2) | (self.owner[self.live] == player)
+        return seen
+
+    # result -------------------------------------------------------------------------------------------------------
+
+    def end(self, results: dict[int, GameResult]) -> None:
+        """End the game with a result per player id; players without one are undecided."""
+        for player in self.players:
+            player.result = results.get(player.id, player.result)
+        self.ended = True
+
+    # bookkeeping --------------------------------------------------------------------------------------------------
+
+    def digest(self) -> str:
+        """SHA-256 over everything that decides the future, the same on every run with the same actions."""
+        sha = hashlib.sha256(self.map.digest.encode())
+        sha.update(repr((self.loop, self.ended, self.scan_now, self.hurt, self.rng.bit_generator.state)).encode())
+        sha.update(self.state_bytes(self.top))
+        sha.update(self._recycles[: self.top].tobytes())
+        sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
+        sha.update(repr([player.counters() for player in self.players]).encode())
+        sha.update(repr(self.script.content()).encode())
+        sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
+        sha.update(repr((self.jobs, self.rallies, self.invested)).encode())
+        sha.update(repr((self.area_effects, self.timers, self.autocast, self.sweeps)).encode())
+        channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]
+        sha.update(repr(channels).encode())
+        sha.update(self.growth.content())
+        sha.update(self.visibility.tobytes())
+        sha.update(repr([list(memory.of_unit.values()) for memory in self.memories]).encode())
+        return sha.hexdigest()
+
+    def population_changed(self) -> None:
+        """Note that a unit came, went or became another."""
+        self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
+        self.population += 1
+        self.bodies = None
+        self.census = self.tally = None
+        self.scan_now = self.orders_changed = True
+        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
+        self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
+        self.mortal = bool(self.expires.any())
+        self.hiding = bool((self.cloaked | self.burrowed).any())
+
+    def note_traits(self, slot: int) -> None:
+        """Note what the changed traits of a unit mean for systems that pass over worlds without such units."""
+        shields, life, energy = self.regenerating
+        self.regenerating = (
+            shields or bool(self.shield_regen[slot]),
+            life or bool(self.life_regen[slot]),
+            energy or bool(self.energy_regen[slot]),
+        )
+        self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
+        self.bodies = None
+        self.census = self.tally = None
+        self.looked_at = -1
+        self.scan_now = True
+
+    def _free_slot(self) -> int:
+        free = np.flatnonzero(~self.alive[1 : self.top])
+        if free.size:
+            return int(free[0]) + 1
+        if self.top == self.capacity:
+            self._grow(self.capacity * 2)
+        self.top += 1
+        return self.top - 1
+
+    def _grow(self, capacity: int) -> None:
+        visible = np.zeros((len(self.players), capacity), dtype=np.bool_)
+        visible[:, : self.capacity] = self.visible
+        self.visible = visible
+        recycles = np.zeros(capacity, dtype=np.int64)
+        recycles[: self.capacity] = self._recycles
+        self._recycles = recycles
+        self.queue += [[] for _ in range(capacity - self.capacity)]
+        self.grow(capacity)
+
+
+def _point(column: Floats, slot: int) -> tuple[float, float]:
+    x, y = column[slot].tolist()
+    return x, y
