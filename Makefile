@@ -58,7 +58,6 @@ check: install ## Lint, format, types and import contracts
 	$(RUN)ruff format --check .
 	$(RUN)mypy
 	$(RUN)lint-imports --no-logo
-	$(RUN)lint-imports --no-logo --config cycles.ini
 
 format: install ## Format the code and mend what the linter can
 	$(RUN)ruff format .

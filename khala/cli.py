@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -28,7 +28,8 @@ from khala_orchestrator.cli import Insecure, Json, Listen
 from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
 from khala_orchestrator.console import Progress, stderr_console
 from khala_protocol.bus.config import BusConfig
-from khala_protocol.errors import ConfigError, KhalaError
+from khala_protocol.commandline import run_command
+from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 
@@ -229,24 +230,8 @@ app.add_typer(knowledge, name="knowledge")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
-    faults: list[BaseException] = []
-    try:
-        app(arguments, prog_name="khala")
-    except* (KhalaError, khala_simulator.process.install.InstallError) as group:
-        faults = list(_leaves(group))
-    for fault in faults:
-        sys.stderr.write(f"khala: {fault}\n")
-    if faults:  # not within `except*`, from where early Pythons 3.11 raise an exit as a part of a group
-        sys.exit(1)
-
-
-def _leaves(group: BaseExceptionGroup[Any]) -> Iterator[BaseException]:
-    for error in group.exceptions:
-        if isinstance(error, BaseExceptionGroup):
-            yield from _leaves(error)
-        else:
-            yield error
+    """Run the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
+    run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
 
 
 def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:

@@ -1,13 +1,18 @@
 """The commands `khala agent` and `khala llm`, as plain functions that `khala.cli` mounts.
 
+Where only this package is installed they are `khala-agent` and `khala-llm`.
+
 They read options, put things together and run until they are told to end. What goes wrong on the user's side is
 raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the front door's part.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from khala_protocol.commandline import run_command
 
 DEFAULT_LLM_PORT = 8765
 
@@ -120,3 +125,19 @@ def llm(
         ready_file=ready_file,
         as_json=as_json,
     )
+
+
+def agent_command() -> None:
+    """Run `khala-agent`: `khala agent`, on a machine that has only this package."""
+    _run_alone("khala-agent", agent, AGENT_EPILOG)
+
+
+def llm_command() -> None:
+    """Run `khala-llm`: `khala llm`, on a machine that has only this package."""
+    _run_alone("khala-llm", llm, LLM_EPILOG)
+
+
+def _run_alone(name: str, command: Callable[..., None], epilog: str) -> None:
+    app = typer.Typer(add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False)
+    app.command(epilog=epilog.replace("khala agent", name).replace("khala llm", name))(command)
+    run_command(name, lambda: app(prog_name=name))

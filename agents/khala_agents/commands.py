@@ -1,7 +1,7 @@
 """What `khala agent` and `khala llm` do: put things together and run until the run or a signal ends them.
 
-`khala_agents.cli` above has the options; it imports this module only when a command is run, since HTTP clients and servers
-take half a second that `--help` need not wait for.
+`khala_agents.cli` above has the options; it imports this module only when a command is run, since HTTP clients and
+servers take half a second that `--help` need not wait for.
 """
 
 from __future__ import annotations

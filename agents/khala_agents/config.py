@@ -19,13 +19,11 @@ from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES, ProfileName
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import ANTHROPIC, Vision
+from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Frozen
-
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
-"""The shipped configuration: beside the packages in a checkout and in an installed wheel alike."""
 
 _VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
 _KEY_LIKE = re.compile(r"key|token$|secret|password|authorization", re.IGNORECASE)

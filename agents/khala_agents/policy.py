@@ -4,9 +4,9 @@
     class Mine(Policy):
         async def decide(self, context) -> str: ...         with pictures, the deadline and a trace of requests
 
-The worker (`khala_agents.worker`) is above: it owns the bus and the deadline, and cancels a decision that is late. A policy
-that raises, or answers nothing in time, costs its agent that step and no more. The policy that asks a language model
-is `khala_agents.llm_policy.LLMPolicy`; shipped doubles are in `khala_agents.scripted`.
+The worker (`khala_agents.worker`) is above: it owns the bus and the deadline, and cancels a decision that is late. A
+policy that raises, or answers nothing in time, costs its agent that step and no more. The policy that asks a language
+model is `khala_agents.llm_policy.LLMPolicy`; shipped doubles are in `khala_agents.scripted`.
 """
 
 from __future__ import annotations

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts
-from khala_agents.config import CONFIGS, AgentsFile, ModelConfig, load_model, model_files
+from khala_agents.config import AgentsFile, ModelConfig, load_model, model_files
 from khala_agents.llm.profiles import PROFILES, Profile
 from khala_bridge.state import teams
 from khala_bridge.task import config
+from khala_configs import CONFIGS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

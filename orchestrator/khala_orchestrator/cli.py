@@ -102,7 +102,12 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Tell what was said and done in a recorded run."""
-    from khala_orchestrator.transcript import Selection, save_pictures, summary, transcript
+    from khala_orchestrator.transcript import (  # noqa: PLC0415  # zstd is not for --help
+        Selection,
+        save_pictures,
+        summary,
+        transcript,
+    )
 
     selection = Selection.of(agent, steps)
     if images is not None:

@@ -1,7 +1,7 @@
 """What a match is configured with: a task file, and what the command line changes of it.
 
-Task files are found by their name below `configs/tasks/`, or by a path. Their model is `khala_bridge.task.config.TaskConfig`. A map
-without a task file is a task, too: `khala_bridge.task.standard` makes it.
+Task files are found by their name below `configs/tasks/`, or by a path. Their model is
+`khala_bridge.task.config.TaskConfig`. A map without a task file is a task, too: `khala_bridge.task.standard` makes it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import secrets
 from datetime import UTC, datetime
-from pathlib import Path
+from pathlib import Path  # noqa: TC003  # pydantic evaluates it
 from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, ValidationError
@@ -18,6 +18,7 @@ from khala_bridge.task.config import TaskConfig
 from khala_bridge.task.images import images_for
 from khala_bridge.task.maps import known_maps
 from khala_bridge.task.standard import standard_task
+from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
@@ -25,9 +26,6 @@ from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
-"""The shipped configuration: beside the packages in a checkout and in an installed wheel alike."""
 
 
 class MatchConfig(Frozen):

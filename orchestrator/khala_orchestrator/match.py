@@ -1,7 +1,8 @@
 """The match: reset, observe, ask, act, until the episode is over.
 
 The loop reads like the turn in docs/design/turn.md. It owns nothing but the order: what agents see is
-`khala_bridge.observe`'s, who answered in time `khala_orchestrator.turn`'s, what their words do `khala_bridge.act`'s, who hears what
+`khala_bridge.observe`'s, who answered in time `khala_orchestrator.turn`'s, what their words do `khala_bridge.act`'s,
+who hears what
 `khala_orchestrator.mailbox`'s. It needs no bus: a recording can stand in for the agents (`AgentPool`).
 """
 

@@ -1,8 +1,9 @@
 """Writes down every topic of a run: a bus that records what passes through it.
 
-The host records what it sends before it is sent, and what it gets when it takes it, so that the file holds
-the order in which the host acted, and cannot lose to congestion what the host saw. Below it: a bus and a
-`khala_protocol.recording.Recorder`. Above it: `khala_orchestrator.host`, which gives the recording bus to everything else.
+The host records what it sends before it is sent, and what it gets when it takes it, so that the file holds the order in
+which the host acted, and cannot lose to congestion what the host saw. Below it: a bus and a
+`khala_protocol.recording.Recorder`. Above it: `khala_orchestrator.host`, which gives the recording bus to everything
+else.
 """
 
 from __future__ import annotations

@@ -88,12 +88,17 @@ def test_the_second_file_changes_what_the_first_one_has() -> None:
         ("tmpfs", ["/tmp"]),
         ("cap_drop", ["ALL"]),
         ("security_opt", ["no-new-privileges:true"]),
-        ("build", "."),
-        ("image", "khala"),
     ],
 )
 def test_a_service_is_locked_down(service: str, field: str, value: object) -> None:
     assert plain(SERVICES[service][field]) == value
+
+
+@every_service
+def test_a_service_runs_in_the_image_that_has_what_it_needs(service: str) -> None:
+    image = "khala-agents" if service in {"llm", "agents"} else "khala"
+    assert plain(SERVICES[service]["image"]) == image
+    assert SERVICES[service]["build"] == {"context": ".", "target": image.removeprefix("khala-")}
 
 
 @every_service
@@ -156,6 +161,12 @@ def plain(value: Any) -> Any:
     return VARIABLE.sub(lambda found: found["default"], value) if isinstance(value, str) else value
 
 
+def command_of(service: str) -> list[str]:
+    """The words after `khala` of a service; `khala-agent` is `khala agent` where only the agents are installed."""
+    entrypoint = SERVICES[service].get("entrypoint", "khala").removeprefix("khala").removeprefix("-")
+    return shlex.split(f"{entrypoint} {plain(SERVICES[service]['command'])}")
+
+
 def parsed(words: list[str]) -> Mapping[str, Any]:
     """What the command line makes of `khala <words>`, without doing it."""
     command: Any = typer.main.get_command(app)
@@ -205,7 +216,7 @@ def khala_words(words: list[str]) -> list[str] | None:
         case ["docker", "compose", "run", *options]:
             service, *rest = itertools.dropwhile(lambda word: word.startswith("--"), options)
             assert service in SERVICES
-            return rest or shlex.split(plain(SERVICES[service]["command"]))
+            return rest or command_of(service)
     assert "run" not in words
     return None
 
@@ -226,7 +237,7 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 @every_service
 def test_a_service_is_a_command_of_khala(service: str, environment: Callable[[str], None]) -> None:
     environment(service)
-    words = shlex.split(plain(SERVICES[service]["command"]))
+    words = command_of(service)
     assert parsed(words)
     test = SERVICES[service].get("healthcheck", {}).get("test", [])
     if test[1:2] == ["khala"]:
@@ -236,8 +247,8 @@ def test_a_service_is_a_command_of_khala(service: str, environment: Callable[[st
 def test_host_and_agents_of_the_compose_file_belong_together(environment: Callable[[str], None]) -> None:
     environment("agents")
     environment("host")
-    agents = parsed(shlex.split(plain(SERVICES["agents"]["command"])))
-    host = parsed(shlex.split(plain(SERVICES["host"]["command"])))
+    agents = parsed(command_of("agents"))
+    host = parsed(command_of("host"))
     task = load_task(host["task"])
     assert list(agents["names"]) == [agent.name for agent in task.agents]
     assert (agents["run"], agents["side"], agents["connect"]) == (host["run"], task.side, host["connect"])
@@ -284,29 +295,29 @@ def instructions(name: str) -> list[str]:
     return re.findall(rf"^{name} (.*)$", text, re.MULTILINE)
 
 
-def test_the_image_runs_khala_as_an_ordinary_user() -> None:
-    assert instructions("ENTRYPOINT") == ['["khala"]']
-    assert instructions("USER") == ["1000:1000"]
+def test_the_images_run_as_an_ordinary_user() -> None:
+    assert instructions("ENTRYPOINT") == ['["khala-agent"]', '["khala"]']
+    assert instructions("USER") == ["1000:1000", "1000:1000"]
     assert plain(SERVICES["host"]["user"]) == "1000:1000"
 
 
-def test_the_image_holds_what_the_lock_file_says_and_no_more() -> None:
+def test_the_images_hold_what_the_lock_file_says_and_no_more() -> None:
     syncs = [run for run in instructions("RUN") if "uv sync" in run]
     assert len(syncs) == 2
-    assert all("--frozen --no-dev" in run for run in syncs)
-    assert "--no-editable" in syncs[-1]
-    assert instructions("FROM") == ["${PYTHON_IMAGE} AS build", "${PYTHON_IMAGE}"]
+    assert all("--frozen --no-dev --no-editable" in run for run in syncs)
+    assert "--package khala-agents" in syncs[0]
+    assert instructions("FROM")[-2:] == ["base AS agents", "base AS khala"]  # the last one is built by default
 
 
 def test_the_simulator_is_where_the_host_looks_for_it(environment: Callable[[str], None]) -> None:
     (made,) = re.findall(r"khala sc2 install (\S+)", (ROOT / "Dockerfile").read_text())
-    assert parsed(shlex.split(plain(SERVICES["host"]["command"])))["game"] == made
+    assert parsed(command_of("host"))["game"] == made
     assert f"SC2PATH={made}" in instructions("ENV")[-1]
 
 
 def test_the_build_sees_the_packages_and_nothing_else() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    packages = project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    packages = ["khala", *project["tool"]["uv"]["workspace"]["members"]]
     rules = [line for line in (ROOT / ".dockerignore").read_text().splitlines() if not line.startswith("#")]
     assert rules[0] == "*"
     needed = {f"{package}/" for package in packages} | {"LICENSE", "README.md", "pyproject.toml", "uv.lock"}

@@ -1,7 +1,7 @@
 """What a target has to be, and may not be, for an action: the game's target filters, in words.
 
-The words of the filters are those of `khala_bridge.knowledge` (`AbilityFacts.must`, `must_not`); those that say nothing of a
-unit that is in sight (`missile`, `item`, …) or that the API does not show (`stasis`) are left to the game.
+The words of the filters are those of `khala_bridge.knowledge` (`AbilityFacts.must`, `must_not`); those that say nothing
+of a unit that is in sight (`missile`, `item`, …) or that the API does not show (`stasis`) are left to the game.
 """
 
 from __future__ import annotations

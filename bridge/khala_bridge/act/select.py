@@ -1,7 +1,7 @@
 """The hand that selects units on the screen: the shortest way that fits, checked against what the game says.
 
-Above it is the tour of `khala_bridge.act.screen`, which lends it the camera and the functions; below it `khala_bridge.act.aim`
-says where to click. It selects own units only, and gives no orders.
+Above it is the tour of `khala_bridge.act.screen`, which lends it the camera and the functions; below it
+`khala_bridge.act.aim` says where to click. It selects own units only, and gives no orders.
 """
 
 from __future__ import annotations

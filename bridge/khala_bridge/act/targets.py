@@ -1,8 +1,9 @@
 """At what an order is aimed: tags and points of a call → units and places of the world, or what is wrong with them.
 
-A team aims at what stands on its screen and at its own units wherever they are; a rule of `khala_bridge.auto` may be told
-of anything that the side knows, such as a mineral field in the fog. Near misses of a tag are named, never taken: the
-wrong target may be the worst one. Knows no ability of the units that are to do it, except what their targets may be.
+A team aims at what stands on its screen and at its own units wherever they are; a rule of `khala_bridge.auto` may be
+told of anything that the side knows, such as a mineral field in the fog. Near misses of a tag are named, never taken:
+the wrong target may be the worst one. Knows no ability of the units that are to do it, except what their targets may
+be.
 """
 
 from __future__ import annotations

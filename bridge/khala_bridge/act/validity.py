@@ -1,9 +1,9 @@
 """Whether these very units may do it now: what the game says, and what the turn has left.
 
 The judge is the game (`Snapshot.abilities`), which is asked once an observation; why it says no is worked out by
-`khala_bridge.act.reasons`. What earlier calls of the same turn took from the accounts is gone, so that a price can be refused
-that the game would still take. Where the game was not asked, only what is sure is refused: a weapon or an upgrade that
-is not there. Range is no reason, since units walk.
+`khala_bridge.act.reasons`. What earlier calls of the same turn took from the accounts is gone, so that a price can be
+refused that the game would still take. Where the game was not asked, only what is sure is refused: a weapon or an
+upgrade that is not there. Range is no reason, since units walk.
 
 What a target has to be is judged by `khala_bridge.act.targets`. Above both is `khala_bridge.act.translate`.
 """

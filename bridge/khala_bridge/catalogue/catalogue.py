@@ -1,9 +1,9 @@
 """The catalogue of text actions: those that were written by hand, and those that follow from PySC2's functions.
 
-The files of `bridge/khala_bridge/data/actions/` hold the actions of the paper and others that deserve words of their own;
-`khala_bridge.catalogue.generated` makes one of every function that none of them stands for, and the forms for a single unit. What
-contradicts itself or PySC2's functions is found while the whole is loaded. It does not import PySC2: that PySC2 has
-every function that is named here is checked where a game starts.
+The files of `bridge/khala_bridge/data/actions/` hold the actions of the paper and others that deserve words of their
+own; `khala_bridge.catalogue.generated` makes one of every function that none of them stands for, and the forms for a
+single unit. What contradicts itself or PySC2's functions is found while the whole is loaded. It does not import PySC2:
+that PySC2 has every function that is named here is checked where a game starts.
 """
 
 from __future__ import annotations

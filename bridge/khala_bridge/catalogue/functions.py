@@ -1,7 +1,8 @@
 """PySC2's functions as a table: every entry of its `FUNCTIONS`, and the forms that `RAW_FUNCTIONS` has of an ability.
 
 PySC2 takes seconds to import; lists of tasks and actions need only names and numbers, and read them from
-`bridge/khala_bridge/data/functions.tsv`, which `python -m khala_bridge.catalogue.functions` writes anew from the PySC2 that is installed.
+`bridge/khala_bridge/data/functions.tsv`, which `python -m khala_bridge.catalogue.functions` writes anew from the PySC2
+that is installed.
 `check_against_pysc2` makes sure, where PySC2 is loaded anyway, that both still say the same.
 Nothing here knows text actions: they are `khala_bridge.catalogue.catalogue`'s.
 """

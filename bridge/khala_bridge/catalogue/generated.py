@@ -6,7 +6,8 @@ it takes: `Effect_Stim()`, `Effect_Blink_Stalker_Screen([x, y])`, `Rally_Buildin
 a producer for, can be told to one unit: `Select_Unit_<name>(tag, ...)`.
 
 Functions without words, those of the interface and of what the game no longer has, are listed with their reasons in a
-file that `khala_bridge.catalogue.coverage` shows. Below this module: the table of functions and what is known of abilities. Above it:
+file that `khala_bridge.catalogue.coverage` shows. Below this module: the table of functions and what is known of
+abilities. Above it:
 `khala_bridge.catalogue.catalogue`, which checks what it makes.
 """
 

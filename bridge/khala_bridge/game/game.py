@@ -1,8 +1,8 @@
 """The game as the rest of Khala knows it: a thing that is reset, played with plans, and closed.
 
 `Game` is blocking, and one thread may use it. `GameThread` runs one in a thread of its own, so that a match can await
-it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`; no code above this module knows
-whether it talks to StarCraft II or to Khala's simulator, which is only a matter of the directory in `GameConfig`.
+it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`; no code above this module
+knows whether it talks to StarCraft II or to Khala's simulator, which is only a matter of the directory in `GameConfig`.
 
 Players are the ones that Khala plays, in the order of the configuration: one now, two later; so a game has a tuple of
 snapshots and not one. `OneSide` is the game as a match with one side has it: commands in, one snapshot out.

@@ -1,7 +1,8 @@
 """Forms: unit types that a unit of another type turns into and back, or grows into: sieged, burrowed, flying, a Lair.
 
-Where a task speaks of a type, it means its forms as well: they stay in their teams (`khala_bridge.state.teams`) and may be
-told what the type may (`khala_bridge.task.config`). Names only; how a form differs is told by `khala_bridge.knowledge`.
+Where a task speaks of a type, it means its forms as well: they stay in their teams (`khala_bridge.state.teams`) and may
+be told what the type may (`khala_bridge.task.config`). Names only; how a form differs is told by
+`khala_bridge.knowledge`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Things on the map whose tags an action takes: power fields, free places for a base, free geysers, own structures.
 
-Functions of a scene. Where a base could stand is known by `khala_bridge.state.ground`; here a place gets the tag that an agent
-can name it by, which is that of the resource nearest to its middle.
+Functions of a scene. Where a base could stand is known by `khala_bridge.state.ground`; here a place gets the tag that
+an agent can name it by, which is that of the resource nearest to its middle.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala_bridge.frames import Camera, MapFrame
-    from khala_bridge.observe.image.picture import Picture
+    from khala_bridge.observe.picture import Picture
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig

@@ -2,8 +2,8 @@
 
 Valid is what the game itself would take from some unit of the team (`Snapshot.abilities`); where the game was not
 asked, what nothing known speaks against. Reasons and costs come from `khala_bridge.knowledge`. A team without units is
-judged by the units of the whole side that would carry its actions out; which of them it will be, and where, is left
-to the rules of `khala_bridge.auto`. Whether a call is carried out is decided by `khala_bridge.act`, by the state it meets.
+judged by the units of the whole side that would carry its actions out; which of them it will be, and where, is left to
+the rules of `khala_bridge.auto`. Whether a call is carried out is decided by `khala_bridge.act`, by the state it meets.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Views of a whole side, for those who lead or build it: what it has, makes and knows of, and where it is in trouble.
 
 Functions of a scene, and of what is remembered of the episode; each makes one part of a `View`. What they see is made
-by `khala_bridge.observe.scene`, what is remembered by `khala_bridge.observe.chronicle`; which agent is told which part is decided
-by the sections of its text.
+by `khala_bridge.observe.scene`, what is remembered by `khala_bridge.observe.chronicle`; which agent is told which part
+is decided by the sections of its text.
 """
 
 from __future__ import annotations

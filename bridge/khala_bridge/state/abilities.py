@@ -1,9 +1,9 @@
 """What own units can be told to do now, as the game itself says it: a question for its query, and the answer read.
 
 The query of the SC2 API looks at everything that stands in the way of a use: tech, cost, supply, energy, cooldown,
-power, buffs. It names abilities by their special ids; text actions often end in a general one, so that both are
-handed on. What is sure without it, where the game was not asked, is here as well. Pure: `khala_bridge.game.pysc2_game` asks the
-question once for an observation.
+power, buffs. It names abilities by their special ids; text actions often end in a general one, so that both are handed
+on. What is sure without it, where the game was not asked, is here as well. Pure: `khala_bridge.game.pysc2_game` asks
+the question once for an observation.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What stays the same during an episode: the map, and the sizes of the game's own pictures.
 
-Read once an episode by `khala_bridge.state.read`. What can be built or walked on is worked out from it by `khala_bridge.state.ground`.
+Read once an episode by `khala_bridge.state.read`. What can be built or walked on is worked out from it by
+`khala_bridge.state.ground`.
 """
 
 from __future__ import annotations

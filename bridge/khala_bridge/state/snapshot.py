@@ -1,7 +1,7 @@
 """What one player knows of the game at one moment: one frozen value per player and step.
 
-Everything above the game is a function of snapshots. `khala_bridge.state.read` makes them; nothing else in Khala reads the
-messages of the SC2 API. A snapshot is no connection: it asks the game nothing.
+Everything above the game is a function of snapshots. `khala_bridge.state.read` makes them; nothing else in Khala reads
+the messages of the SC2 API. A snapshot is no connection: it asks the game nothing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The task that a map is played with when no task file is there for it: one commander for all of its units.
 
-So every map is a task. It is made of what `bridge/khala_bridge/data/maps.yaml` says of the map: what has to be done there, which
-types of units there are, and which upgrades the map grants. A file in `configs/tasks` of the map's name comes first.
+So every map is a task. It is made of what `bridge/khala_bridge/data/maps.yaml` says of the map: what has to be done
+there, which types of units there are, and which upgrades the map grants. A file in `configs/tasks` of the map's name
+comes first.
 """
 
 from __future__ import annotations

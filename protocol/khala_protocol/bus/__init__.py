@@ -1,9 +1,9 @@
 """The bus: bytes under keys, with promises. Two implementations keep the same promises and pass the same tests.
 
-`khala_protocol.bus.memory.MemoryBus` lives in one process and is what tests use; `khala_protocol.bus.zenoh.ZenohBus` joins
-machines. The tests are shipped, `khala_protocol.bus.testing`. Nothing here knows what the bytes mean (`khala_protocol.codec` does)
-or how keys are built (`khala_protocol.keys` does). Everything runs on one asyncio loop; nothing of a bus may be touched from
-another thread, or after a fork.
+`khala_protocol.bus.memory.MemoryBus` lives in one process and is what tests use; `khala_protocol.bus.zenoh.ZenohBus`
+joins machines. The tests are shipped, `khala_protocol.bus.testing`. Nothing here knows what the bytes mean
+(`khala_protocol.codec` does) or how keys are built (`khala_protocol.keys` does). Everything runs on one asyncio loop;
+nothing of a bus may be touched from another thread, or after a fork.
 
     ┌──────────┬─────────────────────────────────────┬──────────────────────┬──────────────────────────────┐
     │ Delivery │ used for                            │ a slow receiver      │ a receiver that joins later  │

@@ -1,7 +1,7 @@
 """How to reach the bus: typed, checked before anything is opened, and free of Zenoh.
 
-`settings` turns a `BusConfig` into the paths and values of Zenoh's own configuration; `khala_protocol.bus.zenoh` is the only
-reader. The numbers that are not Zenoh's defaults have their reason beside them.
+`settings` turns a `BusConfig` into the paths and values of Zenoh's own configuration; `khala_protocol.bus.zenoh` is the
+only reader. The numbers that are not Zenoh's defaults have their reason beside them.
 """
 
 from __future__ import annotations

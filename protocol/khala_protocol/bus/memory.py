@@ -1,8 +1,9 @@
 """The bus in one process, for tests and for matches without a network.
 
-A `MemoryBroker` is what a router is to Zenoh; each `session()` of it is a `khala_protocol.bus.Bus` of its own, as a process
-would have one. A `put` delivers before it returns, session by session as they were opened, so that a test is the same
-each time it runs. `kill`, `cut` and `mend` play what a SIGKILL, a pulled cable and a cable put back do to the others.
+A `MemoryBroker` is what a router is to Zenoh; each `session()` of it is a `khala_protocol.bus.Bus` of its own, as a
+process would have one. A `put` delivers before it returns, session by session as they were opened, so that a test is
+the same each time it runs. `kill`, `cut` and `mend` play what a SIGKILL, a pulled cable and a cable put back do to the
+others.
 
     broker = MemoryBroker()
     host, agent = broker.session(), broker.session()

@@ -1,7 +1,7 @@
 """Where a replay and its recording part: one value, with a text that names the place.
 
-Who replays is above (`khala_orchestrator.replay`, `khala_agents.replay`); what is compared is always bytes or words as they
-were sent.
+Who replays is above (`khala_orchestrator.replay`, `khala_agents.replay`); what is compared is always bytes or words as
+they were sent.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """One pass over a reply, from mark to mark and never back.
 
-Above it: `khala_protocol.speech`, which says the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting` and
+Above it: `khala_protocol.speech`, which says the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting`
+and
 `objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
 """
 

@@ -1,7 +1,7 @@
 """What a reply says, and what of all that stands in it counts.
 
-`khala_protocol.speech.reader` walks over the text and puts here what it finds; which calls are orders, which are only spoken
-of, and what was said twice is decided when the whole is known.
+`khala_protocol.speech.reader` walks over the text and puts here what it finds; which calls are orders, which are only
+spoken of, and what was said twice is decided when the whole is known.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Words of headings in the languages that models answer in: sections of a reply, teams, all teams, negations.
 
 Regular expressions without groups, to be matched without regard to case. A language that is not here costs little:
-sections without a heading count as they stand. Above it: `khala_protocol.speech.headings` and `khala_protocol.speech.reader`.
+sections without a heading count as they stand. Above it: `khala_protocol.speech.headings` and
+`khala_protocol.speech.reader`.
 """
 
 from __future__ import annotations

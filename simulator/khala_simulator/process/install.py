@@ -113,7 +113,7 @@ def _write_launcher(path: Path) -> None:
     # malloc: half a megabyte is made and freed for every observation; by default it goes back to the kernel each time,
     # and fetching the pages again costs more (235 page faults, 0.5 ms) than drawing what is in them.
     malloc = "export MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432"
-    code = f"import sys; sys.path.insert(0, {str(package_root)!r}); from khala_simulator.__main__ import main; main()"
+    code = f"import sys; sys.path.append({str(package_root)!r}); from khala_simulator.__main__ import main; main()"
     command = f'exec {shlex.quote(sys.executable)} -I -c {shlex.quote(code)} -executable "$0" "$@"'
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_suffix(".new")

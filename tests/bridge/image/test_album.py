@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from khala_bridge.observe import Observer
 from khala_bridge.observe.image import titles
-from khala_bridge.observe.image.picture import encoded
+from khala_bridge.observe.image.encoding import encoded
 from khala_bridge.observe.image.screen import Legend
 from khala_bridge.task.images import ImageSpec
 from khala_orchestrator.config import load_task
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
     from s2clientprotocol import sc2api_pb2 as sc_pb
 
-    from khala_bridge.observe.image.picture import Picture
+    from khala_bridge.observe.picture import Picture
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
 

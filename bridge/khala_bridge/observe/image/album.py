@@ -15,10 +15,10 @@ import cv2
 
 from khala_bridge.observe.image import features, minimap, own, screen, titles
 from khala_bridge.observe.image.canvas import Canvas, inner_px
+from khala_bridge.observe.image.encoding import encoded
 from khala_bridge.observe.image.layers import LAYERS, coloured, explain
 from khala_bridge.observe.image.minimap import Site
 from khala_bridge.observe.image.moment import Moment
-from khala_bridge.observe.image.picture import encoded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from khala_bridge.frames import Camera, MapFrame
     from khala_bridge.observe.image.layers import Cells, Layer
     from khala_bridge.observe.image.lettering import Image
-    from khala_bridge.observe.image.picture import Picture
     from khala_bridge.observe.observation import AgentObservation
+    from khala_bridge.observe.picture import Picture
     from khala_bridge.state import Snapshot
     from khala_bridge.task.images import ImageSpec
 

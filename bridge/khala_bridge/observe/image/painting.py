@@ -3,8 +3,8 @@
     painting = Painting.of(info)                 remembered: a map is painted once
     painting.seen(camera, size_px, veil)         the part of it under a camera, with creep and fog of the moment
 
-Arrays here are images: row 0 is the top of the map, (height, width); `upright` turns the grids of `khala_bridge.state.ground`,
-which have their first cell at the bottom left, into such. Units stand in `moment`.
+Arrays here are images: row 0 is the top of the map, (height, width); `upright` turns the grids of
+`khala_bridge.state.ground`, which have their first cell at the bottom left, into such. Units stand in `moment`.
 """
 
 from __future__ import annotations

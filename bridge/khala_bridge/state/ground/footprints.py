@@ -1,7 +1,8 @@
 """Footprints: which cells of the ground something stands on, and what a structure asks of the ground under it.
 
-A typed reading of `bridge/khala_bridge/data/footprints.yaml` and `bridge/khala_bridge/data/sites.yaml`. Cells are those of the world: cell
-(x, y) is the square from x to x + 1 and from y to y + 1. Whether a place is free is told by `khala_bridge.state.ground.land`.
+A typed reading of `bridge/khala_bridge/data/footprints.yaml` and `bridge/khala_bridge/data/sites.yaml`. Cells are those
+of the world: cell (x, y) is the square from x to x + 1 and from y to y + 1. Whether a place is free is told by
+`khala_bridge.state.ground.land`.
 """
 
 from __future__ import annotations

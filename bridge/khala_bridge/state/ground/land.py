@@ -1,7 +1,7 @@
 """The land: what stands on the ground at one moment, what lies on it, and what has to stay free.
 
-Made of a snapshot, remembered for the last one. Grids are indexed `[x, y]` as those of `khala_bridge.state.ground.terrain`. Which
-of the free places is the best is the business of `khala_bridge.auto`.
+Made of a snapshot, remembered for the last one. Grids are indexed `[x, y]` as those of
+`khala_bridge.state.ground.terrain`. Which of the free places is the best is the business of `khala_bridge.auto`.
 """
 
 from __future__ import annotations
