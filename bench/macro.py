@@ -23,7 +23,8 @@ from bridge.available import available, question
 from bridge.catalog import catalogue
 from bridge.ground import land_of
 from bridge.knowledge import knowledge
-from bridge.macro import RULES, Ask, Impossible, Ledger
+from bridge.macro import RULES, Ask, Impossible
+from bridge.means import ledger_of
 from bridge.snapshot import Snapshot
 from simulator.client import Client, interface
 
@@ -68,7 +69,7 @@ def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
     """What an answer took, in milliseconds, and whether it was orders."""
     found = catalogue()[action]
     assert found.rule is not None
-    asked = Ask(found, snapshot, Ledger.of(snapshot))
+    asked = Ask(found, snapshot, ledger_of(snapshot))
     asked.ledger.supply = 50
     began = time.process_time()
     try:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bridge.available import unmet
 from bridge.catalog import catalogue
 from bridge.knowledge import knowledge
+from bridge.rules import sure
 from bridge.task import AgentConfig, TaskConfig, TeamConfig
 from protocol.messages import Clock
 
@@ -69,5 +69,5 @@ def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
         action.group in GROUPS
         and action.subject != "side"
         and action.fits(unit)
-        and (_has_workers(spec) or unmet(action.pysc2, unit, spec.upgrades) is None)
+        and (_has_workers(spec) or sure(action.pysc2, unit, spec.upgrades) is None)
     )

@@ -7,14 +7,13 @@ from bridge.macro.army import army_attack, army_defend, army_retreat
 from bridge.macro.build import build_at, build_auto, build_near, lock_base
 from bridge.macro.cast import cancel_building, cast, recall_near, stop_building
 from bridge.macro.chrono import chrono_economy, chrono_military, chrono_research
-from bridge.macro.ledger import Ledger
 from bridge.macro.produce import morph_warpgates, research, train
 from bridge.macro.rule import Ask, Impossible, Order, Rule
 from bridge.macro.sights import scout
 from bridge.macro.spread import creep_tumor, inject, mule
 from bridge.macro.warp import warp_auto, warp_near
 
-__all__ = ["RULES", "Ask", "Impossible", "Ledger", "Order", "Rule"]
+__all__ = ["RULES", "Ask", "Impossible", "Order", "Rule"]
 
 RULES: dict[str, Rule] = {
     "train": train,

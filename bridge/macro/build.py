@@ -14,14 +14,12 @@ from bridge.ground import land_of, sites
 from bridge.ground.land import SEEN_NOW, addon_place
 from bridge.macro.builders import GAS_STRUCTURES, builder
 from bridge.macro.places import for_structure, free_base, free_geyser
-from bridge.macro.price import charge, check, require
 from bridge.macro.rule import Impossible, Order, never
-from bridge.macro.side import finished, name, place
+from bridge.macro.side import name, place
 from bridge.macro.sites import best, footprint_need, good, legal, near, on_corner, promised
 
 if TYPE_CHECKING:
     from bridge.ground import Base, Land
-    from bridge.knowledge import AbilityFacts
     from bridge.macro.rule import Ask
     from bridge.macro.side import Unit
 
@@ -40,7 +38,7 @@ def build_at(ask: Ask) -> list[Order]:
         Impossible: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
     """
     assert ask.point is not None, f"{ask.action.name} is said with a point"
-    _prepare(ask)
+    ask.able()
     if _is_gas(ask):
         near_by = [u for u in _free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
         if not near_by:
@@ -57,7 +55,7 @@ def build_near(ask: Ask) -> list[Order]:
         Impossible: as `build_at`, or there is no place near it.
     """
     unit = _named(ask)
-    _prepare(ask)
+    ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
         free = _free_geysers(ask)
@@ -82,7 +80,7 @@ def lock_base(ask: Ask) -> list[Order]:
         Impossible: as `build_at`.
     """
     unit = _named(ask)
-    _prepare(ask)
+    ask.able()
     footprint = footprint_need(_structure(ask))
     return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
@@ -93,7 +91,7 @@ def build_auto(ask: Ask) -> list[Order]:
     Raises:
         Impossible: there is no place, or as `build_at`.
     """
-    _prepare(ask)
+    ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
         orders = _on_geyser(ask, free_geyser(ask, _free_geysers(ask)))
@@ -108,14 +106,6 @@ def build_auto(ask: Ask) -> list[Order]:
 
 
 # the order ------------------------------------------------------------------------------------------------------------
-
-
-def _prepare(ask: Ask) -> None:
-    """Checks what does not depend on the place."""
-    facts = _facts(ask)
-    if facts is not None:
-        require(ask, facts)
-        check(ask, facts, _user(ask))
 
 
 def _checked(ask: Ask, middle: WorldPoint) -> list[Order]:
@@ -144,11 +134,7 @@ def _on_geyser(ask: Ask, geyser: Unit) -> list[Order]:
 
 
 def _go(ask: Ask, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[Order]:
-    if not ask.has(worker.tag):
-        raise never(ask, f"the game does not take it from your {name(worker)} at this moment; try again later.")
-    facts = _facts(ask)
-    if facts is not None:
-        charge(ask, facts, name(worker))
+    ask.charge(ask.facts(name(worker)))
     ask.ledger.take(worker.tag)
     return [Order(ask.function, (worker.tag,), target, queued)]
 
@@ -275,15 +261,3 @@ def _structure(ask: Ask) -> str:
 
 def _is_gas(ask: Ask) -> bool:
     return sites()[_structure(ask)].ground == "geyser"
-
-
-def _user(ask: Ask) -> str:
-    """Type of the worker, for what it costs."""
-    units = finished(ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units)
-    facts = _facts(ask)
-    users = facts.users if facts is not None else ask.action.units
-    return next((name(unit) for unit in units if name(unit) in users), users[0] if users else "")
-
-
-def _facts(ask: Ask) -> AbilityFacts | None:
-    return ask.facts(ask.action.units[0] if ask.action.units else "")

@@ -8,6 +8,7 @@ from bridge.knowledge import abilities, knowledge
 from bridge.macro.cast import caster
 from bridge.macro.rule import Order, never
 from bridge.macro.side import ability, finished, is_structure, name, place
+from bridge.rules import price_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,8 +71,7 @@ def _recharging(ask: Ask) -> list[Unit]:
     """WarpGates from which the game takes no Zealot, though it would be paid for."""
     known = ask.snapshot.abilities
     zealot = abilities()[ability(WARP)]
-    ledger = ask.ledger
-    if known is None or ledger.minerals < zealot.minerals or ledger.supply < zealot.supply:
+    if known is None or ask.ledger.short_of(price_of(zealot)):
         return []
     gates = [unit for unit in finished(ask.snapshot.own) if name(unit) == "WarpGate" and unit.is_powered]
     return [gate for gate in gates if not ask.can(gate.tag, zealot.id)]

@@ -17,9 +17,9 @@ from bridge.macro.sites import BASE_REACH, best, footprint_need, good, legal, ne
 if TYPE_CHECKING:
     from bridge.ground import Land
     from bridge.ground.terrain import Floats
-    from bridge.macro.ledger import Ledger
     from bridge.macro.rule import Ask
     from bridge.macro.side import Unit
+    from bridge.rules import Ledger
 
 OWN_GAS: Final = 10.0
 """A geyser so near to a town hall belongs to it; farther ones are not worth the way."""

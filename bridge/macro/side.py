@@ -12,8 +12,8 @@ from s2clientprotocol import raw_pb2
 
 from bridge.frames import WorldPoint
 from bridge.functions import functions, general
-from bridge.knowledge import knowledge, stand_ins
-from bridge.names import buff_name, unit_name, upgrade_name
+from bridge.knowledge import knowledge
+from bridge.names import buff_name, unit_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -147,13 +147,3 @@ def _among(ability: int, wanted: tuple[int, ...]) -> bool:
 def ability(function: str) -> int:
     """The ability that a function of PySC2 stands for."""
     return functions()[function].ability_id
-
-
-def stands(snapshot: Snapshot, structure: str) -> bool:
-    """Whether the player has a structure, or what counts as it, finished."""
-    return any(True for _ in finished(of_types(snapshot, stand_ins(structure))))
-
-
-def has_upgrade(snapshot: Snapshot, upgrade: str) -> bool:
-    """Whether the player has researched an upgrade, by PySC2's name."""
-    return upgrade in {upgrade_name(n) for n in snapshot.response.observation.raw_data.player.upgrade_ids}

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bridge.ground import Footprint, Land
     from bridge.ground.footprints import Cells
     from bridge.ground.terrain import Bools, Floats
-    from bridge.macro.ledger import Ledger
+    from bridge.rules import Ledger
 
 PYLON_REACH: Final = 4
 """A structure of 3 x 3 whose middle is at most so many cells away on both axes is in the field of a Pylon (6.5)."""

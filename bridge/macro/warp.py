@@ -10,11 +10,10 @@ import numpy as np
 from bridge.frames import WorldPoint
 from bridge.ground import land_of
 from bridge.ground.resources import coordinates, everywhere
-from bridge.macro.ledger import Ledger
-from bridge.macro.price import charge, check, require
 from bridge.macro.rule import Impossible, Order, never
 from bridge.macro.side import finished, is_structure, kind, name, of_types, place
 from bridge.macro.sites import best, near, promised
+from bridge.means import ledger_of
 
 if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from bridge.ground.terrain import Bools
     from bridge.macro.rule import Ask
     from bridge.macro.side import Unit
+    from bridge.rules import Ledger
     from bridge.snapshot import Snapshot
 
 BODY: Final = 0.625
@@ -48,7 +48,7 @@ class PowerField(NamedTuple):
 
 def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
     """The player's power fields, by ascending tags."""
-    ledger = Ledger.of(snapshot)
+    ledger = ledger_of(snapshot)
     return tuple(
         PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
         for source in land_of(snapshot).power_sources
@@ -95,9 +95,7 @@ def warp_auto(ask: Ask) -> list[Order]:
 
 
 def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
-    facts = ask.facts(name(gate))
-    if facts is not None:
-        charge(ask, facts, name(gate))
+    ask.charge(ask.facts(name(gate)))
     ask.ledger.take(gate.tag)
     point = WorldPoint(cell[0] + 0.5, cell[1] + 0.5)
     ask.ledger.promise(point, 1, 1)
@@ -106,24 +104,7 @@ def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
 
 def _gate(ask: Ask) -> Unit:
     """The gate that is ready; of several that with the least tag."""
-    if ask.units:
-        gates = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
-    else:
-        gates = of_types(ask.snapshot, ask.action.units)
-    gates = finished(gates)
-    if not gates:
-        raise never(ask, "you have no WarpGate; research WarpGate and turn a Gateway into one.")
-    powered = [gate for gate in gates if gate.is_powered]
-    if not powered:
-        raise never(ask, "no WarpGate has power; build a Pylon near one.")
-    facts = ask.facts(name(powered[0]))
-    if facts is not None:
-        require(ask, facts)
-        check(ask, facts, name(powered[0]))
-    ready = [gate for gate in powered if gate.tag not in ask.ledger.busy and ask.has(gate.tag)]
-    if not ready:
-        raise never(ask, "every WarpGate recharges; wait until one is ready.")
-    return ready[0]
+    return ask.snapshot.units[ask.able()[0].tag]
 
 
 # where ----------------------------------------------------------------------------------------------------------------

@@ -71,7 +71,7 @@ class Scene:
         self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
         observation = snapshot.response.observation
         self.upgrades = tuple(upgrade_name(number) for number in sorted(observation.raw_data.player.upgrade_ids))
-        self.possible = Possible(snapshot, self.bodies, self.upgrades)
+        self.possible = Possible(snapshot)
         self._arrange()
 
     def _arrange(self) -> None:

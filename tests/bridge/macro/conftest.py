@@ -12,7 +12,8 @@ from bridge.available import available, question
 from bridge.catalog import catalogue
 from bridge.functions import functions
 from bridge.knowledge import knowledge
-from bridge.macro import RULES, Ask, Impossible, Ledger
+from bridge.macro import RULES, Ask, Impossible
+from bridge.means import ledger_of
 from bridge.names import unit_name
 from bridge.snapshot import Snapshot
 from simulator.client import Client, command, interface
@@ -53,7 +54,7 @@ class Game:
         blind = Snapshot(response=response, info=self.info)
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = Snapshot(response=response, info=self.info, abilities=available(answer))
-        self.ledger = Ledger.of(self.snapshot)
+        self.ledger = ledger_of(self.snapshot)
         if self.fed:  # the game's cheat does not show in the supply that it tells
             self.ledger.supply = 100.0
         return self.snapshot

@@ -11,8 +11,9 @@ from s2clientprotocol import sc2api_pb2 as sc
 from bridge.available import available, question
 from bridge.catalog import catalogue
 from bridge.frames import WorldPoint
-from bridge.macro import RULES, Ask, Impossible, Ledger
+from bridge.macro import RULES, Ask, Impossible
 from bridge.macro.workers import automatic
+from bridge.means import ledger_of
 from bridge.snapshot import Snapshot
 from bridge.task import AutoConfig
 from simulator.client import Client, interface
@@ -50,7 +51,7 @@ def test_no_rule_fails(name: str) -> None:
         units = (chance.choice(own),) if own and chance.random() < 0.5 else ()
         point = WorldPoint(chance.uniform(-5, width + 5), chance.uniform(-5, height + 5))
         for rich in (False, True):
-            ledger = Ledger.of(snapshot)
+            ledger = ledger_of(snapshot)
             if rich:
                 ledger.minerals = ledger.vespene = ledger.supply = 9999.0
             try:
@@ -62,6 +63,6 @@ def test_no_rule_fails(name: str) -> None:
             assert all(order.units for order in orders)
             assert all(tag in own for order in orders for tag in order.units)
     everything = AutoConfig(gather=True, train_workers=True, warpgates=True)
-    automatic(everything, snapshot, Ledger.of(snapshot), frozenset())
+    automatic(everything, snapshot, ledger_of(snapshot), frozenset())
     assert answered or not own
     assert all(message.endswith(".") and message[0] != " " for message in said)

@@ -10,7 +10,8 @@ from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from bridge.catalog import catalogue
-from bridge.macro import RULES, Ask, Impossible, Ledger
+from bridge.macro import RULES, Ask, Impossible
+from bridge.means import ledger_of
 from bridge.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def answers(snapshot: Snapshot, race: str) -> list[str]:
     for action in SIDES[race]:
         assert action.rule is not None
         try:
-            said.append(repr(RULES[action.rule](Ask(action, snapshot, Ledger.of(snapshot)))))
+            said.append(repr(RULES[action.rule](Ask(action, snapshot, ledger_of(snapshot)))))
         except Impossible as impossible:
             said.append(impossible.message)
     return said
