@@ -100,8 +100,6 @@ def note(ask: Ask, unit: Unit) -> None:
 
 def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
     """Every unit that can use the action's ability now, that which should first; never none."""
-    if not ask.units and not ask.side.of_types(ask.action.units):
-        raise never(ask, f"you have no finished {' or '.join(ask.action.units)}.")
     able = ask.able()
     facts = ask.facts(able[0].type)
     goes = facts is not None and facts.range is not None
