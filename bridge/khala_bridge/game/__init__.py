@@ -1,1 +1,1 @@
-"""The game behind an interface: reset, play a plan, close; `pysc2_game` is the implementation, the only part that blocks."""
+"""The game behind an interface: reset, play a plan, close. `pysc2_game` implements it; only this package blocks."""
