@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("report", type=Path)
     parser.add_argument("packages", nargs="*", help="those that have to be covered")
     parser.add_argument("--at-least", type=float, default=0.0, metavar="PER_CENT")
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
     found = by_package(options.report)
     print("| package | lines | branches | covered |\n| --- | ---: | ---: | ---: |")
     for name, counts in [*found.items(), ("all", sum(found.values(), Counter[str]()))]:

@@ -20,12 +20,13 @@ from typing import Any
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.auto import RULES, Ask, Impossible
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
 from khala_bridge.state import EpisodeInfo, Snapshot, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_bridge.state.ground import land_of
+from khala_bridge.state.means import ledger_of
 from khala_simulator.process.client import Client, interface
 
 MAPS = ("Simple64", "Simple128")
@@ -69,7 +70,7 @@ def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
     """What an answer took, in milliseconds, and whether it was orders."""
     found = catalogue()[action]
     assert found.rule is not None
-    asked = Ask(found, snapshot, Ledger.of(snapshot))
+    asked = Ask(found, snapshot, ledger_of(snapshot))
     asked.ledger.supply = 50
     began = time.process_time()
     try:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.act import Actor, JointAction
-from khala_bridge.act.reasons import REASONS, cooldown, energy, otherwise, power, price, queue, tech, under_construction
-from khala_bridge.act.validity import Validity
-from khala_bridge.auto import Ledger
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions, general
 from khala_bridge.knowledge import ability_of
 from khala_bridge.observe import Observer
+from khala_bridge.rules import of_team, use_of, why_not
+from khala_bridge.state.means import ledger_of, side_of
 from khala_bridge.task.config import AgentConfig
 from khala_protocol.speech import parse
 
@@ -142,29 +141,15 @@ def test_what_the_game_does_not_allow_is_refused_with_the_reason(
     assert told(joint) == [("not_available", f"{CANNOT} {parse(call).calls[0].name} now: {why}.")]
 
 
-def test_every_reason_has_a_row() -> None:
-    words = " ".join(why for *_, why in NOT_NOW)
-    typical = {
-        tech: "needed first",
-        energy: "energy",
-        price: "minerals",
-        queue: "queue",
-        power: "power",
-        cooldown: "so soon",
-        otherwise: "does not let",
-    }
-    assert {under_construction, *typical} == set(REASONS)
-    assert [said for said in typical.values() if said not in words] == []
-
-
 def test_what_is_not_finished_cannot_do_anything(unit: Make, snapshot: Callable[..., Snapshot]) -> None:
     gateway = unit(A, "Gateway", 10, 10, build_progress=0.43)
     seen = snapshot([gateway], player=RICH, abilities={A: frozenset()})
     action = catalogue()["Train_Zealot"]
     assert action.pysc2 is not None
-    obstacle = Validity(seen, Ledger.of(seen)).obstacle(action, action.pysc2, seen.units[A])
-    assert obstacle is not None
-    assert obstacle.text == "Gateway is still under construction (43%)"
+    side = side_of(seen)
+    why = why_not(use_of(action.pysc2), side.units[A], side, ledger_of(seen))
+    assert why is not None
+    assert of_team(why) == "Gateway is still under construction (43%)"
 
 
 TARGETS = [

@@ -4,7 +4,7 @@ A command knows units, a function, a unit or a point of the world as its target,
 orders. It knows no frame: the two executors play the same commands.
 
     who       units of the team, those that are named, or whoever a rule of `khala_bridge.auto` finds
-    may they  `khala_bridge.act.validity`; only the units that can do it are told to
+    may they  `khala_bridge.rules`; only the units that can do it are told to
     at what   `khala_bridge.act.targets`
 
 Order of the commands of one turn, unit by unit: the first one replaces what the unit did, a later one waits for it
@@ -19,27 +19,28 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.reasons import facts_of
 from khala_bridge.act.refused import Refused, reject
 from khala_bridge.act.targets import Targets
-from khala_bridge.act.validity import Obstacle, Validity
-from khala_bridge.auto import RULES, Ask, Impossible, Ledger, Order
+from khala_bridge.auto import RULES, Ask, Impossible, Order
 from khala_bridge.frames import WorldPoint
 from khala_bridge.knowledge import knowledge
-from khala_bridge.names import buff_name, unit_name
-from khala_bridge.state.abilities import is_attack
+from khala_bridge.names import buff_name
+from khala_bridge.rules import Cost, facts_for, is_attack, is_free, nearest, of_team, price_of, use_of, why_not
+from khala_bridge.state.means import ledger_of, side_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_bridge.act.recognise import Recognised
     from khala_bridge.catalogue.functions import Function
+    from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.observe.observation import SideObservation
     from khala_bridge.state import Unit
     from khala_protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
 """Kinds of abilities that one unit of a team is enough for."""
+FREE = Cost(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +65,10 @@ class Translator:
         self._sight = sight
         self._snapshot = sight.snapshot
         self._max_actions = max_actions
-        self.ledger = Ledger.of(sight.snapshot)
+        self.ledger = ledger_of(sight.snapshot)
+        self._side = side_of(sight.snapshot)
         self.ordered: set[int] = set()
         """Tags of the units that were told something in this turn."""
-        self._validity = Validity(sight.snapshot, self.ledger)
         self._targets = Targets(sight)
         self._count: dict[tuple[str, str], int] = {}
 
@@ -109,10 +110,25 @@ class Translator:
         return found
 
     def _book(self, orders: Iterable[Order]) -> None:
-        """Takes from the ledger what orders cost and whom they keep busy; rules do so themselves."""
+        """Takes from the ledger what orders cost and which units they keep busy; rules do so themselves.
+
+        Energy only of a single unit: of a group that casts at one target, the game chooses who does it.
+        """
         for order in orders:
-            self.ledger.busy.update(order.units)
-            self._validity.pay(order.function, [self._snapshot.units[tag] for tag in order.units])
+            self.ledger.take(*order.units)
+            for tag in order.units:
+                if is_free(order.function.ability_id, self._side.units[tag].type):
+                    continue
+                facts = self._facts(order.function, tag)
+                assert facts is not None, "what is known to cost something is known"
+                self.ledger.pay(price_of(facts))
+                if facts.researches:
+                    self.ledger.begun.add(facts.id)
+                if facts.energy and len(order.units) == 1:
+                    self.ledger.energy[tag] += int(facts.energy)
+
+    def _facts(self, function: Function, tag: int) -> AbilityFacts | None:
+        return facts_for(function.ability_id, self._side.units[tag].type, self._side.upgrades)
 
     def _may_say(self, count: tuple[str, str]) -> bool:
         return self._count.get(count, 0) < self._max_actions[count[0]]
@@ -166,17 +182,22 @@ class Translator:
 
     def _able(self, said: Recognised, function: Function, tags: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some units that can do it now; one, if one is enough for it."""
-        obstacles = {tag: self._validity.obstacle(said.action, function, self._snapshot.units[tag]) for tag in tags}
-        able = tuple(tag for tag, obstacle in obstacles.items() if obstacle is None)
+        use = use_of(function, at_unit=said.action.target_kind == "tag")
+        found = {tag: why_not(use, self._side.units[tag], self._side, self.ledger) for tag in tags}
+        able = tuple(tag for tag, why in found.items() if why is None)
+        reasons = [why for why in found.values() if why is not None]
         if not able:
-            nearest = max((one for one in obstacles.values() if one), key=_nearness)
-            raise self._cannot(said, [nearest.text])
-        if said.action.subject == "two_units" and len(able) < len(tags):
-            raise self._cannot(said, [one.text for one in obstacles.values() if one])
-        facts = facts_of(function.ability_id, unit_name(self._snapshot.units[able[0]].unit_type))
-        if facts is not None and facts.does in MAKERS:
+            raise self._cannot(said, [of_team(nearest(reasons))])
+        if said.action.subject == "two_units" and reasons:
+            raise self._cannot(said, list(map(of_team, reasons)))
+        if all(is_free(function.ability_id, self._side.units[tag].type) for tag in able):
+            return able
+        facts = [self._facts(function, tag) for tag in able]
+        if facts[0] is not None and facts[0].does in MAKERS:
             return able[:1]
-        return self._validity.affordable(function, [self._snapshot.units[tag] for tag in able])
+        if self._snapshot.abilities is None:
+            return able
+        return able[: self.ledger.payable(FREE if one is None else price_of(one) for one in facts)]
 
     @staticmethod
     def _cannot(said: Recognised, reasons: list[str]) -> Refused:
@@ -221,7 +242,3 @@ def _reaches(unit_type: str, target_type: str, is_flying: bool) -> bool:  # a ke
         return True
     planes = {*other.planes, "air"} - {"ground"} if is_flying else {*other.planes, "ground"}
     return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
-
-
-def _nearness(obstacle: Obstacle) -> tuple[int, float]:
-    return obstacle.rank, obstacle.energy

@@ -12,9 +12,8 @@ from khala_bridge.auto.rule import Ask, Impossible, Order, Rule
 from khala_bridge.auto.scouting import scout
 from khala_bridge.auto.spread import creep_tumor, inject, mule
 from khala_bridge.auto.warp import warp_auto, warp_near
-from khala_bridge.state.ledger import Ledger
 
-__all__ = ["RULES", "Ask", "Impossible", "Ledger", "Order", "Rule"]
+__all__ = ["RULES", "Ask", "Impossible", "Order", "Rule"]
 
 RULES: dict[str, Rule] = {
     "train": train,

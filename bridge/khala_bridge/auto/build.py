@@ -9,18 +9,16 @@ import numpy as np
 
 from khala_bridge.auto.builders import GAS_STRUCTURES, builder
 from khala_bridge.auto.places import for_structure, free_base, free_geyser
-from khala_bridge.auto.price import charge, check, require
 from khala_bridge.auto.rule import Impossible, Order, never
 from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of, sites
 from khala_bridge.state.ground.land import SEEN_NOW, addon_place
-from khala_bridge.state.side import finished, name, place
+from khala_bridge.state.side import name, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import Ask
-    from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Base, Land
 
@@ -39,7 +37,7 @@ def build_at(ask: Ask) -> list[Order]:
         Impossible: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
     """
     assert ask.point is not None, f"{ask.action.name} is said with a point"
-    _prepare(ask)
+    ask.able()
     if _is_gas(ask):
         near_by = [u for u in _free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
         if not near_by:
@@ -56,7 +54,7 @@ def build_near(ask: Ask) -> list[Order]:
         Impossible: as `build_at`, or there is no place near it.
     """
     unit = _named(ask)
-    _prepare(ask)
+    ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
         free = _free_geysers(ask)
@@ -81,7 +79,7 @@ def lock_base(ask: Ask) -> list[Order]:
         Impossible: as `build_at`.
     """
     unit = _named(ask)
-    _prepare(ask)
+    ask.able()
     footprint = footprint_need(_structure(ask))
     return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
@@ -92,7 +90,7 @@ def build_auto(ask: Ask) -> list[Order]:
     Raises:
         Impossible: there is no place, or as `build_at`.
     """
-    _prepare(ask)
+    ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
         orders = _on_geyser(ask, free_geyser(ask, _free_geysers(ask)))
@@ -107,14 +105,6 @@ def build_auto(ask: Ask) -> list[Order]:
 
 
 # the order ------------------------------------------------------------------------------------------------------------
-
-
-def _prepare(ask: Ask) -> None:
-    """Checks what does not depend on the place."""
-    facts = _facts(ask)
-    if facts is not None:
-        require(ask, facts)
-        check(ask, facts, _user(ask))
 
 
 def _checked(ask: Ask, middle: WorldPoint) -> list[Order]:
@@ -143,11 +133,7 @@ def _on_geyser(ask: Ask, geyser: Unit) -> list[Order]:
 
 
 def _go(ask: Ask, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[Order]:
-    if not ask.has(worker.tag):
-        raise never(ask, f"the game does not take it from your {name(worker)} at this moment; try again later.")
-    facts = _facts(ask)
-    if facts is not None:
-        charge(ask, facts, name(worker))
+    ask.charge(ask.facts(name(worker)))
     ask.ledger.take(worker.tag)
     return [Order(ask.function, (worker.tag,), target, queued)]
 
@@ -274,15 +260,3 @@ def _structure(ask: Ask) -> str:
 
 def _is_gas(ask: Ask) -> bool:
     return sites()[_structure(ask)].ground == "geyser"
-
-
-def _user(ask: Ask) -> str:
-    """Type of the worker, for what it costs."""
-    units = finished(ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units)
-    facts = _facts(ask)
-    users = facts.users if facts is not None else ask.action.units
-    return next((name(unit) for unit in units if name(unit) in users), users[0] if users else "")
-
-
-def _facts(ask: Ask) -> AbilityFacts | None:
-    return ask.facts(ask.action.units[0] if ask.action.units else "")

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from khala_bridge.auto.rule import never
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import built_by
-from khala_bridge.state.side import ability, bears_resources, finished, is_doing, name, of_types, place
+from khala_bridge.state.side import ability, bears_resources, is_doing, name, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import Ask
@@ -20,21 +19,17 @@ def builder(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
     """The worker that builds at a place, and whether the order waits behind those that it has.
 
     Of a team the nearest one, and a second structure waits for the first. Of the side the nearest one among those that
-    are idle or gather minerals and carry nothing; then those that carry something, then those that gather gas. Who
+    are idle or gather minerals and carry nothing; then those that carry something, then those that gather gas. What
     builds, scouts or was ordered by an agent in this turn is left alone.
 
     Raises:
         Impossible: there is none.
     """
-    return _of_team(ask, where) if ask.units else (_of_side(ask, where), False)
+    able = [ask.snapshot.units[unit.tag] for unit in ask.able()]
+    return _of_team(ask, able, where) if ask.units else (_of_side(ask, able, where), False)
 
 
-def _of_team(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
-    units = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
-    able = [unit for unit in finished(units) if ask.facts_of(name(unit)) is not None]
-    if not able:
-        raise never(ask, "the team has no unit that builds it.")
-
+def _of_team(ask: Ask, able: list[Unit], where: WorldPoint) -> tuple[Unit, bool]:
     def rank(unit: Unit) -> tuple[bool, float, int]:
         return _has_more_to_do(ask, unit), math.dist(place(unit), where), unit.tag
 
@@ -47,14 +42,8 @@ def _has_more_to_do(ask: Ask, unit: Unit) -> bool:
     return unit.tag in ask.ledger.busy or any(built_by(order.ability_id) for order in unit.orders)
 
 
-def _of_side(ask: Ask, where: WorldPoint) -> Unit:
-    free = [unit for unit in finished(of_types(ask.snapshot, ask.action.units)) if unit.tag not in ask.ledger.busy]
-    ranked = [
-        (cost, math.dist(place(unit), where), unit.tag) for unit in free if (cost := use(ask.snapshot, unit)) < _USED
-    ]
-    if not ranked:
-        raise never(ask, f"you have no {' or '.join(ask.action.units)} that is free to build.")
-    return ask.snapshot.units[min(ranked)[2]]
+def _of_side(ask: Ask, able: list[Unit], where: WorldPoint) -> Unit:
+    return min(able, key=lambda unit: (use(ask.snapshot, unit), math.dist(place(unit), where), unit.tag))
 
 
 _IDLE, _LADEN, _ON_GAS, _USED = range(4)

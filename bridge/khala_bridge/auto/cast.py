@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from khala_bridge.auto.price import require
 from khala_bridge.auto.rule import Impossible, Order, never
 from khala_bridge.state.ground import land_of
-from khala_bridge.state.side import finished, is_structure, name, of_types, place
+from khala_bridge.state.side import is_structure, name, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import Ask
@@ -99,43 +98,16 @@ def note(ask: Ask, unit: Unit) -> None:
 
 def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
     """Every unit that can use the action's ability now, that which should first; never none."""
-    named = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
-    units = finished(named or of_types(ask.snapshot, ask.action.units))
-    if not units:
-        raise never(ask, f"you have no finished {' or '.join(ask.action.units)}.")
-    facts = ask.facts(name(units[0]))
-    if facts is not None:
-        require(ask, facts)
-    free = [unit for unit in units if is_structure(unit) or unit.tag not in ask.ledger.busy]
-    if not free:
-        raise never(ask, f"every {name(units[0])} has an order already in this turn.")
-    able = [unit for unit in free if _has_energy(ask, unit)]
-    if not able:
-        most = max(free, key=lambda unit: (_energy(ask, unit), -unit.tag))
-        need = facts.energy if facts is not None else 0.0
-        left = int(_energy(ask, most))
-        raise never(ask, f"it needs {need:g} energy, and your {name(most)} {hex(most.tag)} has {left}.")
-    ready = [unit for unit in able if ask.has(unit.tag)]
-    if not ready:
-        raise never(ask, f"the game does not take it from your {name(able[0])} at this moment; try again later.")
-
+    able = ask.able()
+    facts = ask.facts(able[0].type)
     goes = facts is not None and facts.range is not None
 
     def rank(unit: Unit) -> tuple[float, float, int]:
-        away, energy = 0.0 if where is None else math.dist(place(unit), where), -float(int(_energy(ask, unit)))
+        away = 0.0 if where is None else math.dist(place(unit), where)
+        energy = -float(int(unit.energy - ask.ledger.energy[unit.tag]))
         return (away, energy, unit.tag) if goes else (energy, away, unit.tag)
 
-    return sorted(ready, key=rank)
-
-
-def _has_energy(ask: Ask, unit: Unit) -> bool:
-    facts = ask.facts(name(unit))
-    return facts is None or _energy(ask, unit) >= facts.energy
-
-
-def _energy(ask: Ask, unit: Unit) -> float:
-    """Energy of a unit that earlier calls of this turn leave."""
-    return unit.energy - ask.ledger.energy[unit.tag]
+    return sorted((ask.snapshot.units[unit.tag] for unit in able), key=rank)
 
 
 # what at --------------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from khala_bridge.auto.cast import caster
 from khala_bridge.auto.rule import Order, never
 from khala_bridge.knowledge import abilities, knowledge
+from khala_bridge.rules import price_of
 from khala_bridge.state.side import ability, finished, is_structure, name, place
 
 if TYPE_CHECKING:
@@ -70,8 +71,7 @@ def _recharging(ask: Ask) -> list[Unit]:
     """WarpGates from which the game takes no Zealot, though it would be paid for."""
     known = ask.snapshot.abilities
     zealot = abilities()[ability(WARP)]
-    ledger = ask.ledger
-    if known is None or ledger.minerals < zealot.minerals or ledger.supply < zealot.supply:
+    if known is None or ask.ledger.short_of(price_of(zealot)):
         return []
     gates = [unit for unit in finished(ask.snapshot.own) if name(unit) == "WarpGate" and unit.is_powered]
     return [gate for gate in gates if not ask.can(gate.tag, zealot.id)]

@@ -15,10 +15,10 @@ from khala_bridge.state.side import finished, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import Ask
+    from khala_bridge.rules import Ledger
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Land
     from khala_bridge.state.ground.terrain import Floats
-    from khala_bridge.state.ledger import Ledger
 
 OWN_GAS: Final = 10.0
 """A geyser so near to a town hall belongs to it; farther ones are not worth the way."""

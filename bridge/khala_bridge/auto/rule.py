@@ -10,15 +10,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from khala_bridge.knowledge import abilities, ability_of
+from khala_bridge.knowledge import abilities
+from khala_bridge.rules import asked_by, facts_for, nearest, nobody, of_side, price_of, why_not
+from khala_bridge.state.means import side_of
 
 if TYPE_CHECKING:
     from khala_bridge.catalogue.action import Action
     from khala_bridge.catalogue.functions import Function
     from khala_bridge.frames import WorldPoint
     from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.rules import Ledger, Side, Unavailable, UnitState
     from khala_bridge.state import Snapshot
-    from khala_bridge.state.ledger import Ledger
     from khala_protocol.messages import RejectionReason
 
 
@@ -44,11 +46,35 @@ class Ask:
 
     def facts(self, unit_type: str) -> AbilityFacts | None:
         """What is known of the action's ability, by the type of its user where that makes a difference."""
-        return ability_of(self.function.ability_id, unit_type) or abilities().get(self.function.ability_id)
+        number = self.function.ability_id
+        return facts_for(number, unit_type, self.side.upgrades) or abilities().get(number)
 
-    def facts_of(self, unit_type: str) -> AbilityFacts | None:
-        """What the action's ability is for a type of unit, if the type has it."""
-        return ability_of(self.function.ability_id, unit_type)
+    @property
+    def side(self) -> Side:
+        """The player's side, as `khala_bridge.rules` knows it."""
+        return side_of(self.snapshot)
+
+    def able(self) -> list[UnitState]:
+        """Return the units that can do it now, of those that the words name or of the side; never none.
+
+        Raises:
+            Impossible: no unit can.
+        """
+        use = asked_by(self.action, of_side=not self.units)
+        assert use is not None, f"{self.action.name} has a rule and no function"
+        side, types = self.side, self.action.units or self._users()
+        units = [side.units[tag] for tag in self.units if tag in side.units] if self.units else side.of_types(types)
+        judged = [(unit, why_not(use, unit, side, self.ledger)) for unit in units]
+        able = [unit for unit, why in judged if why is None]
+        if not able:
+            reasons = [why for _, why in judged if why is not None]
+            raise never(self, nearest(reasons) if reasons else nobody(types))
+        return able
+
+    def charge(self, facts: AbilityFacts | None) -> None:
+        """Take the price of an ability from the ledger."""
+        if facts is not None:
+            self.ledger.pay(price_of(facts))
 
     def has(self, tag: int) -> bool:
         """Whether the game would take the action's ability from a unit now; true if the game was not asked."""
@@ -58,6 +84,10 @@ class Ask:
         """Whether the game would take an ability from a unit now; true if the game was not asked."""
         known = self.snapshot.abilities
         return known is None or ability in known.get(tag, ())
+
+    def _users(self) -> tuple[str, ...]:
+        facts = abilities().get(self.function.ability_id)
+        return facts.users if facts else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +104,12 @@ class Order:
 class Impossible(Exception):
     """There is nothing that the rule could answer; the message is a sentence for the model."""
 
-    def __init__(self, reason: RejectionReason, message: str, place: WorldPoint | None = None) -> None:
+    def __init__(
+        self, reason: RejectionReason, message: str, place: WorldPoint | None = None, why: Unavailable | None = None
+    ) -> None:
         self.reason, self.message = reason, message
+        self.why = why
+        """The judgement of `khala_bridge.rules`; None if the rule found no place or target."""
         self.place = place
         """The nearest place at which it would be possible, where there is one and the agent named another."""
         super().__init__(message)
@@ -84,6 +118,7 @@ class Impossible(Exception):
 Rule: TypeAlias = Callable[[Ask], list[Order]]
 
 
-def never(ask: Ask, why: str) -> Impossible:
+def never(ask: Ask, why: str | Unavailable) -> Impossible:
     """What stands in the way now, as an error to raise: `Build_Pylon is not possible now: <why>`."""
-    return Impossible("not_available", f"{ask.action.name} is not possible now: {why}")
+    said, judged = (why, None) if isinstance(why, str) else (of_side(why), why)
+    return Impossible("not_available", f"{ask.action.name} is not possible now: {said}", why=judged)

@@ -20,10 +20,10 @@ from khala_bridge.state.ground.resources import coordinates, everywhere
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from khala_bridge.rules import Ledger
     from khala_bridge.state.ground import Footprint, Land
     from khala_bridge.state.ground.footprints import Cells
     from khala_bridge.state.ground.terrain import Bools, Floats
-    from khala_bridge.state.ledger import Ledger
 
 PYLON_REACH: Final = 4
 """A structure of 3 x 3 whose middle is at most so many cells away on both axes is in the field of a Pylon (6.5)."""

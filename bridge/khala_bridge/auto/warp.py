@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from khala_bridge.auto.price import charge, check, require
 from khala_bridge.auto.rule import Impossible, Order, never
 from khala_bridge.auto.sites import best, near, promised
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.resources import coordinates, everywhere
-from khala_bridge.state.ledger import Ledger
+from khala_bridge.state.means import ledger_of
 from khala_bridge.state.side import finished, is_structure, kind, name, of_types, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import Ask
+    from khala_bridge.rules import Ledger
     from khala_bridge.state import PowerSource, Snapshot, Unit
     from khala_bridge.state.ground import Land
     from khala_bridge.state.ground.terrain import Bools
@@ -45,7 +45,7 @@ class PowerField(NamedTuple):
 
 def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
     """The player's power fields, by ascending tags."""
-    ledger = Ledger.of(snapshot)
+    ledger = ledger_of(snapshot)
     return tuple(
         PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
         for source in land_of(snapshot).power_sources
@@ -92,9 +92,7 @@ def warp_auto(ask: Ask) -> list[Order]:
 
 
 def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
-    facts = ask.facts(name(gate))
-    if facts is not None:
-        charge(ask, facts, name(gate))
+    ask.charge(ask.facts(name(gate)))
     ask.ledger.take(gate.tag)
     point = WorldPoint(cell[0] + 0.5, cell[1] + 0.5)
     ask.ledger.promise(point, 1, 1)
@@ -103,24 +101,7 @@ def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
 
 def _gate(ask: Ask) -> Unit:
     """The gate that is ready; of several that with the least tag."""
-    if ask.units:
-        gates = [ask.snapshot.units[tag] for tag in ask.units if tag in ask.snapshot.units]
-    else:
-        gates = of_types(ask.snapshot, ask.action.units)
-    gates = finished(gates)
-    if not gates:
-        raise never(ask, "you have no WarpGate; research WarpGate and turn a Gateway into one.")
-    powered = [gate for gate in gates if gate.is_powered]
-    if not powered:
-        raise never(ask, "no WarpGate has power; build a Pylon near one.")
-    facts = ask.facts(name(powered[0]))
-    if facts is not None:
-        require(ask, facts)
-        check(ask, facts, name(powered[0]))
-    ready = [gate for gate in powered if gate.tag not in ask.ledger.busy and ask.has(gate.tag)]
-    if not ready:
-        raise never(ask, "every WarpGate recharges; wait until one is ready.")
-    return ready[0]
+    return ask.snapshot.units[ask.able()[0].tag]
 
 
 # where ----------------------------------------------------------------------------------------------------------------

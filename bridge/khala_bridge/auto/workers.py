@@ -14,25 +14,17 @@ from khala_bridge.auto.builders import GAS_STRUCTURES
 from khala_bridge.auto.rule import Order
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.knowledge import abilities
+from khala_bridge.rules import price_of, use_of, why_not
 from khala_bridge.state.ground import land_of
-from khala_bridge.state.side import (
-    ability,
-    bears_resources,
-    finished,
-    has_upgrade,
-    is_doing,
-    name,
-    of_types,
-    place,
-    workers,
-)
+from khala_bridge.state.means import side_of
+from khala_bridge.state.side import ability, bears_resources, finished, is_doing, name, of_types, place, workers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_bridge.frames import WorldPoint
+    from khala_bridge.rules import Ledger
     from khala_bridge.state import Snapshot, Unit
-    from khala_bridge.state.ledger import Ledger
     from khala_bridge.task.config import AutoConfig
 
 PER_FIELD: Final = 2
@@ -79,18 +71,16 @@ def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: fro
 def _warpgates(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[Order]:
     gateways = [
         unit.tag
-        for unit in finished(of_types(snapshot, ("Gateway",)))
-        if not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken or unit.tag in ledger.changing)
-        and unit.is_powered
-        and _takes(snapshot, unit.tag, ability(MORPH), when_unasked=has_upgrade(snapshot, "WarpGateResearch"))
+        for unit in side_of(snapshot).of_types(("Gateway",))
+        if unit.tag not in taken and _can(MORPH, unit.tag, snapshot, ledger)
     ]
     ledger.changing.update(gateways)
     return [Order(functions()[MORPH], tuple(gateways))] if gateways else []
 
 
-def _takes(snapshot: Snapshot, tag: int, number: int, *, when_unasked: bool = True) -> bool:
-    known = snapshot.abilities
-    return when_unasked if known is None else number in known.get(tag, ())
+def _can(function: str, tag: int, snapshot: Snapshot, ledger: Ledger) -> bool:
+    side = side_of(snapshot)
+    return why_not(use_of(functions()[function], by_host=True, of_side=True), side.units[tag], side, ledger) is None
 
 
 # training -------------------------------------------------------------------------------------------------------------
@@ -106,11 +96,9 @@ def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int])
     orders = []
     for unit in (*producers, *larvae):
         function = functions()[TRAINED[name(unit)]]
-        facts = abilities()[function.ability_id]
-        free = not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken or unit.tag in ledger.changing)
-        paid = ledger.minerals >= facts.minerals and ledger.supply >= 1
-        if left > 0 and free and paid and _takes(snapshot, unit.tag, function.ability_id):
-            ledger.pay(facts.minerals, facts.vespene, 1)
+        free = not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken)
+        if left > 0 and free and _can(function.name, unit.tag, snapshot, ledger):
+            ledger.pay(price_of(abilities()[function.ability_id]))
             ledger.queued[unit.tag] += 1
             orders.append(Order(function, (unit.tag,)))
             left -= 1

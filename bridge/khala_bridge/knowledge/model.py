@@ -159,7 +159,7 @@ class AbilityFacts(Frozen):
     vespene: float = 0
     """What is charged, without what it is made of."""
     supply: float = 0
-    """Supply that what it makes uses in all."""
+    """Supply that a use adds: of what a unit becomes, only what is above its own."""
     cooldown_s: float = 0
     charges: int = 0
     requires: tuple[str, ...] = ()

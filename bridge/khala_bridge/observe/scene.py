@@ -68,7 +68,7 @@ class Scene:
         self.totals = {tag: view.health + view.shield for tag, view in views.items()}
         """Health and shield by tag."""
         self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
-        self.possible = Possible(snapshot, self.bodies, snapshot.upgrades)
+        self.possible = Possible(snapshot)
         self._arrange()
 
     def _arrange(self) -> None:

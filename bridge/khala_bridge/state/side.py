@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.functions import functions, general
 from khala_bridge.frames import WorldPoint
-from khala_bridge.knowledge import knowledge, stand_ins
+from khala_bridge.knowledge import knowledge
 from khala_bridge.names import buff_name, unit_name
 
 if TYPE_CHECKING:
@@ -144,13 +144,3 @@ def _among(ability: int, wanted: tuple[int, ...]) -> bool:
 def ability(function: str) -> int:
     """The ability that a function of PySC2 stands for."""
     return functions()[function].ability_id
-
-
-def stands(snapshot: Snapshot, structure: str) -> bool:
-    """Whether the player has a structure, or what counts as it, finished."""
-    return any(True for _ in finished(of_types(snapshot, stand_ins(structure))))
-
-
-def has_upgrade(snapshot: Snapshot, upgrade: str) -> bool:
-    """Whether the player has researched an upgrade, by PySC2's name."""
-    return upgrade in snapshot.upgrades

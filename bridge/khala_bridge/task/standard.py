@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
-from khala_bridge.state.abilities import unmet
+from khala_bridge.rules import sure
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 from khala_protocol.messages import Clock
 
@@ -70,5 +70,5 @@ def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
         action.group in GROUPS
         and action.subject != "side"
         and action.fits(unit)
-        and (_has_workers(spec) or unmet(action.pysc2, unit, spec.upgrades) is None)
+        and (_has_workers(spec) or sure(action.pysc2, unit, spec.upgrades) is None)
     )

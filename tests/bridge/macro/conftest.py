@@ -9,13 +9,14 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.auto import RULES, Ask, Impossible
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.knowledge import knowledge
 from khala_bridge.names import unit_name
 from khala_bridge.state import Snapshot, Unit, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
+from khala_bridge.state.means import ledger_of
 from khala_simulator.process.client import Client, command, interface
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class Game:
         blind = read_snapshot(response, self.info)
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = dataclasses.replace(blind, abilities=available(answer))
-        self.ledger = Ledger.of(self.snapshot)
+        self.ledger = ledger_of(self.snapshot)
         if self.fed:  # the game's cheat does not show in the supply that it tells
             self.ledger.supply = 100.0
         return self.snapshot

@@ -84,7 +84,7 @@ def test_units_near_the_named_one_are_recalled(protoss: Game) -> None:
 def test_a_mule_is_dropped_on_minerals_of_the_own_base(make_game: Callable[..., Game]) -> None:
     game = make_game("Flat64", "terran")
     assert game.refusal("Calldown_MULE").message == (
-        "Calldown_MULE is not possible now: you have no finished OrbitalCommand."
+        "Calldown_MULE is not possible now: you have no OrbitalCommand; build one first."
     )
     game.put("OrbitalCommand", 40.5, 30.5)
     game.energize("OrbitalCommand")

@@ -8,12 +8,13 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.auto import RULES, Ask, Impossible, Ledger
+from khala_bridge.auto import RULES, Ask, Impossible
 from khala_bridge.auto.workers import automatic
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
+from khala_bridge.state.means import ledger_of
 from khala_bridge.task.config import AutoConfig
 from khala_simulator.process.client import Client, interface
 
@@ -50,7 +51,7 @@ def test_no_rule_fails(name: str) -> None:
         units = (chance.choice(own),) if own and chance.random() < 0.5 else ()
         point = WorldPoint(chance.uniform(-5, width + 5), chance.uniform(-5, height + 5))
         for rich in (False, True):
-            ledger = Ledger.of(snapshot)
+            ledger = ledger_of(snapshot)
             if rich:
                 ledger.minerals = ledger.vespene = ledger.supply = 9999.0
             try:
@@ -62,6 +63,6 @@ def test_no_rule_fails(name: str) -> None:
             assert all(order.units for order in orders)
             assert all(tag in own for order in orders for tag in order.units)
     everything = AutoConfig(gather=True, train_workers=True, warpgates=True)
-    automatic(everything, snapshot, Ledger.of(snapshot), frozenset())
+    automatic(everything, snapshot, ledger_of(snapshot), frozenset())
     assert answered or not own
     assert all(message.endswith(".") and message[0] != " " for message in said)

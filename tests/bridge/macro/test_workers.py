@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 from s2clientprotocol import debug_pb2
 
-from khala_bridge.auto import Ledger
 from khala_bridge.auto.workers import automatic
 from khala_bridge.names import unit_name
+from khala_bridge.rules import Cost
 from khala_bridge.state.ground import land_of
+from khala_bridge.state.means import ledger_of
 from khala_bridge.task.config import AutoConfig
 from khala_simulator.process.client import command
 
@@ -122,7 +124,7 @@ def test_town_halls_train_workers_one_at_a_time(
 
 def test_agents_minerals_come_first(make_game: Callable[..., Game]) -> None:
     game = make_game("Flat64")
-    game.ledger.pay(40, 0)
+    game.ledger.pay(Cost(40, 0, 0))
     assert auto(game, train_workers=True) == []
 
 
@@ -144,8 +146,8 @@ def test_free_gateways_become_warpgates(make_game: Callable[..., Game]) -> None:
     assert auto(game, warpgates=True) == []
     gateway = game.own("Gateway")[0].tag
     with_upgrade = {**(game.snapshot.abilities or {}), gateway: frozenset({1518})}
-    object.__setattr__(game.snapshot, "abilities", with_upgrade)
+    game.snapshot = replace(game.snapshot, abilities=with_upgrade)
     (order,) = auto(game, warpgates=True)
     assert (order.function.name, order.units) == ("Morph_WarpGate_quick", (gateway,))
-    game.ledger = Ledger.of(game.snapshot)
+    game.ledger = ledger_of(game.snapshot)
     assert auto(game, gateway, warpgates=True) == []

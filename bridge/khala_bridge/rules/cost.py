@@ -1,0 +1,62 @@
+"""What the use of an ability costs, and which case of a general ability is meant."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_bridge.knowledge import abilities, ability_of
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from khala_bridge.knowledge import AbilityFacts
+
+
+class Cost(NamedTuple):
+    """What a use takes from the accounts."""
+
+    minerals: float
+    vespene: float
+    supply: float
+
+
+class Shortfall(NamedTuple):
+    """An account that does not suffice."""
+
+    account: str
+    """`minerals`, `vespene` or `supply`."""
+    needs: float
+    has: float
+    """What is left for it; less than 0 for supply above the cap."""
+    aside: float = 0.0
+    """What is set aside for what workers are on their way to build, and no part of what is left."""
+
+
+def price_of(facts: AbilityFacts) -> Cost:
+    """Return the price of an ability; its supply is net, what a unit becomes counts above what it was."""
+    return Cost(facts.minerals, facts.vespene, facts.supply)
+
+
+@functools.cache
+def cases(ability: int, unit_type: str) -> tuple[AbilityFacts, ...]:
+    """Return what an ability is for a type of unit: one case, the levels of a research in their order, or none."""
+    facts = ability_of(ability, unit_type)
+    if facts is None:
+        return ()
+    special = [abilities()[number] for number in sorted(abilities()[ability].special)]
+    return tuple(level for level in special if level.researches and unit_type in level.users) or (facts,)
+
+
+@functools.cache
+def is_free(ability: int, unit_type: str) -> bool:
+    """Return True if the use of an ability takes nothing: no minerals, vespene, supply or energy, and no research."""
+    return not any(any(price_of(one)) or one.energy or one.researches for one in cases(ability, unit_type))
+
+
+def facts_for(ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:
+    """Return what is known of an ability for a type of unit: of several levels of research, the next one."""
+    found = cases(ability, unit_type)
+    if len(found) <= 1:
+        return found[0] if found else None
+    return next((facts for facts in found if facts.researches not in upgrades), found[-1])

@@ -1,0 +1,286 @@
+"""Why not now: the reasons, the order in which they are tried, and which of them count when.
+
+The judge is the game, which is asked once an observation what each unit can do. Why it says no is worked out here from
+the state and from what is known of the ability:
+
+| the game              | what counts for a team              | besides, where the host chooses the unit          |
+|-----------------------|-------------------------------------|---------------------------------------------------|
+| says yes              | weapon, research, energy, price     | unfinished, add-on, orders, queue, power          |
+| says no               | everything; at last "the game"      |                                                   |
+| was not asked         | a weapon or an upgrade is missing   | everything but the cooldown and "the game"        |
+
+Even after a yes the price, the energy and the research are judged, since earlier calls of the turn spend and begin.
+The host picks one of many, and looks at what each has to do by itself. Range is no reason: units walk.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from khala_bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins, upgrades
+from khala_bridge.rules.cost import facts_for, is_free, price_of
+from khala_bridge.rules.unavailable import Unavailable, rank
+from khala_bridge.rules.weapons import can_shoot, is_attack
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Sequence
+
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.catalogue.functions import Function
+    from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.rules.ledger import Ledger
+    from khala_bridge.rules.values import Side, UnitState
+
+QUEUE, REACTOR_QUEUE = 5, 8
+"""Orders that a structure holds, the one at work among them; with a Reactor more."""
+QUEUED = frozenset({"train", "research"})
+"""Kinds of abilities that a structure puts into its queue."""
+AT_ONCE = frozenset({"build_addon", "grow", "morph", "structure_morph"})
+"""Kinds of abilities that a structure does at once or not at all."""
+
+
+class Use(NamedTuple):
+    """What is asked about. `use_of` and `asked_by` make it."""
+
+    ability: int
+    switch: bool
+    """Whether it sets an autocast, about which the game is not asked."""
+    attack: bool
+    by_host: bool
+    """Whether the host chooses the unit, so that it looks at what each of them has to do."""
+    at_unit: bool
+    """Whether it is aimed at a unit: what has no weapon may attack a place, and just goes there."""
+    of_side: bool
+    """Whether any unit of the side may do it: no worker is taken then from other work than gathering."""
+
+
+@functools.lru_cache(4096)
+def use_of(function: Function, *, by_host: bool = False, at_unit: bool = False, of_side: bool = False) -> Use:
+    """Return what a function of PySC2 asks about."""
+    return Use(function.ability_id, function.kind == "autocast", is_attack(function), by_host, at_unit, of_side)
+
+
+def asked_by(action: Action, *, of_side: bool) -> Use | None:
+    """Return what an action asks about; None for one that orders nothing."""
+    function, by_host = action.pysc2, action.rule is not None
+    if function is None:
+        return None
+    return use_of(function, by_host=by_host, at_unit=action.target_kind == "tag", of_side=of_side)
+
+
+class _Case(NamedTuple):
+    """One unit and one ability: what the reasons look at."""
+
+    use: Use
+    facts: AbilityFacts
+    unit: UnitState
+    side: Side
+    ledger: Ledger
+
+
+Reason: TypeAlias = "Callable[[_Case], Unavailable | None]"
+
+
+def why_not(use: Use, unit: UnitState, side: Side, ledger: Ledger) -> Unavailable | None:
+    """Return why a unit cannot do something now; None if it can."""
+    able = unit.able
+    says_yes = None if able is None or use.switch else use.ability in able
+    if use.attack and _needs_weapon(use, unit, says_yes=says_yes):
+        return Unavailable("weapon", unit.type, unit.tag)
+    if says_yes and not use.by_host and is_free(use.ability, unit.type):
+        return None
+    facts = facts_for(use.ability, unit.type, side.upgrades)
+    if facts is None and use.by_host and says_yes:
+        facts = abilities().get(use.ability)
+    if facts is None:
+        return Unavailable("ability", unit.type, unit.tag) if says_yes is False or use.by_host else None
+    case = _Case(use, facts, unit, side, ledger)
+    found = (reason(case) for reason in _reasons(says_yes, by_host=use.by_host))
+    return next((why for why in found if why is not None), None)
+
+
+def why_no_one(use: Use, units: Sequence[UnitState], side: Side, ledger: Ledger) -> Unavailable | None:
+    """Return why none of some units can do something now, as of the nearest to it; None if one can.
+
+    There has to be a unit.
+    """
+    found: list[Unavailable] = []
+    for unit in units:
+        why = why_not(use, unit, side, ledger)
+        if why is None:
+            return None
+        found.append(why)
+    return nearest(found)._replace(among=tuple(dict.fromkeys([unit.type for unit in units])))
+
+
+def nobody(types: Sequence[str]) -> Unavailable:
+    """Return the reason where there is no unit of some types."""
+    return Unavailable("nobody", " or ".join(types[:3]))
+
+
+def nearest(reasons: Sequence[Unavailable]) -> Unavailable:
+    """Return the one of some reasons that is the least in the way."""
+    return reasons[0] if len(reasons) == 1 else max(reasons, key=rank)
+
+
+def sure(function: Function | None, unit_type: str, researched: Collection[str]) -> Unavailable | None:
+    """Return why units of a type surely cannot do something, whatever their state; None if the game has to be asked."""
+    if function is None:
+        return None
+    if is_attack(function) and not is_armed(unit_type):
+        return Unavailable("weapon", unit_type)
+    facts = ability_of(function.ability_id, unit_type)
+    missing = tuple(need for need in sorted(facts.requires) if _lacks(need, researched)) if facts else ()
+    return Unavailable("requirement", unit_type, names=missing) if missing else None
+
+
+@functools.cache
+def _reasons(says_yes: bool | None, *, by_host: bool) -> tuple[Reason, ...]:  # a key of the cache
+    """The reasons that count, in their order."""
+    last: tuple[Reason, ...] = (_cooldown, _otherwise)
+    if by_host:
+        tech = () if says_yes else (_requirement,)
+        own = (_taken, _occupied, _queue, _attached, _work, _power)
+        return (_unfinished, _research, *tech, _addon, _energy, _price, *own, *(last if says_yes is False else ()))
+    if says_yes:
+        return _research, _energy, _price
+    if says_yes is None:
+        return (_upgrade,)
+    return _unfinished, _research, _requirement, _addon, _energy, _price, _queue, _power, *last
+
+
+def _needs_weapon(use: Use, unit: UnitState, *, says_yes: bool | None) -> bool:
+    if says_yes:
+        return use.at_unit and not can_shoot(unit.type, unit.able or frozenset())
+    return not is_armed(unit.type)
+
+
+def _lacks(need: str, researched: Collection[str]) -> bool:
+    return need in upgrades() and need not in researched
+
+
+# --- the reasons --------------------------------------------------------------------------------------------------
+
+
+def _unfinished(case: _Case) -> Unavailable | None:
+    """It is not there yet."""
+    unit = case.unit
+    return None if unit.finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
+
+
+def _research(case: _Case) -> Unavailable | None:
+    """It is researched, or somebody is at it."""
+    facts, unit = case.facts, case.unit
+    if not facts.researches:
+        return None
+    if facts.researches in case.side.upgrades:
+        return Unavailable("researched", unit.type, unit.tag, names=(facts.researches,))
+    if facts.id in case.side.ordered or facts.id in case.ledger.begun:
+        return Unavailable("researching", unit.type, unit.tag, names=(facts.researches,))
+    return None
+
+
+def _requirement(case: _Case) -> Unavailable | None:
+    """A structure or an upgrade is missing."""
+    missing = tuple(sorted((need for need in case.facts.requires if not case.side.has(need)), key=_is_upgrade))
+    if not missing:
+        return None
+    begun = tuple(need for need in missing if need in knowledge() and case.side.builds(need))
+    return Unavailable("requirement", case.unit.type, case.unit.tag, names=missing, begun=begun)
+
+
+def _is_upgrade(need: str) -> bool:
+    """Structures are named before upgrades, which are researched in them."""
+    return need not in knowledge()
+
+
+def _upgrade(case: _Case) -> Unavailable | None:
+    """An upgrade is missing; of structures nothing is sure where the game was not asked."""
+    missing = tuple(need for need in case.facts.requires if _lacks(need, case.side.upgrades))
+    return Unavailable("requirement", case.unit.type, case.unit.tag, names=missing) if missing else None
+
+
+def _addon(case: _Case) -> Unavailable | None:
+    """An add-on is missing."""
+    addon, unit = case.facts.addon, case.unit
+    if not addon or unit.addon in stand_ins(addon):
+        return None
+    return Unavailable("addon", unit.type, unit.tag, names=(addon,))
+
+
+def _energy(case: _Case) -> Unavailable | None:
+    """It has too little energy, after what earlier calls of the turn took."""
+    unit, needs = case.unit, case.facts.energy
+    left = unit.energy - case.ledger.energy[unit.tag] if needs else 0.0
+    return None if needs <= left else Unavailable("energy", unit.type, unit.tag, needs=needs, has=left)
+
+
+def _price(case: _Case) -> Unavailable | None:
+    """Minerals, vespene or supply do not suffice, after what earlier calls of the turn took."""
+    missing = case.ledger.short_of(price_of(case.facts))
+    return Unavailable("price", case.unit.type, case.unit.tag, missing=missing) if missing else None
+
+
+def _taken(case: _Case) -> Unavailable | None:
+    """An earlier call of the turn uses it; structures go on with their other work."""
+    unit, does = case.unit, case.facts.does
+    goes_on = does == "build" or (does != "warp_in" and _is_structure(unit.type))
+    if goes_on or unit.tag not in case.ledger.busy:
+        return None
+    return Unavailable("taken", unit.type, unit.tag)
+
+
+def _occupied(case: _Case) -> Unavailable | None:
+    """It is a worker that has more to do than to gather; the worker of a team builds one thing after the other."""
+    unit = case.unit
+    if case.facts.does != "build" or not case.use.of_side or (unit.gathers and unit.tag not in case.ledger.busy):
+        return None
+    return Unavailable("occupied", unit.type, unit.tag)
+
+
+def _queue(case: _Case) -> Unavailable | None:
+    """Its queue of production is full."""
+    unit, ledger = case.unit, case.ledger
+    if case.facts.does not in QUEUED or not _is_structure(unit.type):
+        return None
+    places = REACTOR_QUEUE if unit.addon in stand_ins("Reactor") else QUEUE
+    full = unit.orders + ledger.queued[unit.tag] >= places or unit.tag in ledger.changing
+    return Unavailable("queue", unit.type, unit.tag) if full else None
+
+
+def _attached(case: _Case) -> Unavailable | None:
+    """It has an add-on already, finished or not."""
+    has_one = case.facts.does == "build_addon" and case.unit.attached
+    return Unavailable("attached", case.unit.type, case.unit.tag) if has_one else None
+
+
+def _work(case: _Case) -> Unavailable | None:
+    """It has something to do, and would have to do this at once."""
+    unit, ledger = case.unit, case.ledger
+    if case.facts.does not in AT_ONCE or not _is_structure(unit.type):
+        return None
+    idle = not unit.orders and not ledger.queued[unit.tag] and unit.tag not in ledger.changing
+    return None if idle else Unavailable("at_work", unit.type, unit.tag)
+
+
+def _power(case: _Case) -> Unavailable | None:
+    """No Pylon powers it."""
+    return None if case.unit.powered else Unavailable("power", case.unit.type, case.unit.tag)
+
+
+def _cooldown(case: _Case) -> Unavailable | None:
+    """It was used a short while ago; the game does not show it, but nothing else is left."""
+    pause = case.facts.cooldown_s
+    return Unavailable("cooldown", case.unit.type, case.unit.tag, needs=pause) if pause else None
+
+
+def _otherwise(case: _Case) -> Unavailable:
+    """Nothing that is known speaks against it, but the game does."""
+    return Unavailable("game", case.unit.type, case.unit.tag, has=case.unit.orders)
+
+
+@functools.cache
+def _is_structure(unit_type: str) -> bool:
+    known = knowledge().get(unit_type)
+    return known is not None and known.structure

@@ -1,0 +1,34 @@
+"""Who can shoot: units without a weapon go where others attack, and some types shoot without one of their own."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Final
+
+from khala_bridge.knowledge import abilities, is_armed
+
+if TYPE_CHECKING:
+    from khala_bridge.catalogue.functions import Function
+
+ATTACK: Final = 3674
+"""The general ability to attack."""
+SCAN_MOVE: Final = 19
+"""What units without a weapon do on an order to attack: they walk there."""
+
+
+def is_attack(function: Function) -> bool:
+    """Return True if a function attacks; scanning has the same general ability, and is for what has no weapon."""
+    return ATTACK in (function.ability_id, function.general_id) and function.stem != "Scan_Move"
+
+
+def can_shoot(unit_type: str, able: frozenset[int]) -> bool:
+    """Return True if a unit that the game lets attack has a weapon now.
+
+    What has none scans on the same order. Bunkers, and Oracles with their beam, shoot though their type has no weapon.
+    """
+    return is_armed(unit_type) or not able.isdisjoint(_shots())
+
+
+@functools.cache
+def _shots() -> frozenset[int]:
+    return frozenset(abilities()[ATTACK].special) - {SCAN_MOVE}
