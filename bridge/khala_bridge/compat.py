@@ -9,7 +9,8 @@ Three things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
   `random.shuffle(palette, function)`. Python 3.11 removed the second parameter, so it is given back
   while these two are being imported, and taken away again;
 * `pysc2.env.sc2_env` imports a renderer, and with it pygame, which greets on stdout, and skvideo, which
-  imports the deprecated `scipy.misc`. The greeting and the warnings are muted for the import only.
+  imports the deprecated `scipy.misc` and most of SciPy: two of the three seconds that PySC2 takes. The greeting and the
+  warnings are muted for the import only; skvideo is imported when the renderer writes a video, which Khala never does.
 
 All that the bridge uses of PySC2 is imported here, and taken from here by the other modules, so that the order
 of imports is right by construction, also where warnings are errors. It is no adapter: PySC2 itself stays as it
@@ -19,9 +20,12 @@ was installed.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import random
+import sys
 import warnings
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -39,6 +43,7 @@ def _shuffle(x: MutableSequence[object], random_: Callable[[], float] | None = N
 
 
 _SHUFFLE = random.shuffle
+_VIDEO = "pysc2.lib.video_writer"
 
 
 @contextlib.contextmanager
@@ -66,6 +71,25 @@ def quiet_pygame() -> Iterator[None]:
             os.environ[name] = before
 
 
+class _Late(ModuleType):
+    """A module that is imported when something of it is used."""
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(importlib.import_module(self.__name__), name)
+
+
+@contextlib.contextmanager
+def late_video() -> Iterator[None]:
+    """Give the renderer a stand-in for the module that writes videos, which imports the real one when it is used."""
+    stand_in = _Late(_VIDEO)
+    sys.modules.setdefault(_VIDEO, stand_in)
+    try:
+        yield
+    finally:
+        if sys.modules[_VIDEO] is stand_in:
+            del sys.modules[_VIDEO]
+
+
 def protobuf_kind() -> str:
     """The protobuf implementation in use: `upb` is fast, `python` is about 80 times slower."""
     from google.protobuf.internal import api_implementation  # noqa: PLC0415  # only the doctor asks
@@ -73,7 +97,7 @@ def protobuf_kind() -> str:
     return api_implementation.Type()
 
 
-with old_shuffle(), quiet_pygame(), warnings.catch_warnings():
+with old_shuffle(), quiet_pygame(), late_video(), warnings.catch_warnings():
     warnings.simplefilter("ignore")
     from pysc2 import run_configs
     from pysc2.env import environment, sc2_env
@@ -85,6 +109,7 @@ __all__ = [
     "buffs",
     "environment",
     "features",
+    "late_video",
     "maps",
     "old_shuffle",
     "point",

@@ -20,6 +20,15 @@ assert warnings.filters == filters
 assert dict(os.environ) == environ
 assert sys.path == path
 """
+VIDEO = f"""
+import sys, warnings
+{IMPORT}
+assert "scipy" not in sys.modules and "pysc2.lib.video_writer" not in sys.modules
+warnings.simplefilter("ignore")
+from pysc2.lib import renderer_human, video_writer
+assert renderer_human.video_writer.VideoWriter is video_writer.VideoWriter
+assert "scipy" in sys.modules
+"""
 OWN_TESTS = ("lib.features_test", "lib.named_array_test", "lib.point_test", "tests.dummy_observation_test")
 RUN_OWN_TESTS = f"""
 import sys, unittest
@@ -43,6 +52,11 @@ def run(code: str, *args: str) -> subprocess.CompletedProcess[str]:
 def test_the_import_is_silent_and_changes_nothing_even_when_warnings_are_errors() -> None:
     done = run(UNCHANGED)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_scipy_is_imported_when_a_video_is_written_and_not_before() -> None:
+    done = run(VIDEO)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_unit_tests_of_pysc2_pass() -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PLAYED = """
 import sys
-from simulator import commands
+from khala_simulator.abilities import commands
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tick import advance, new_game
 world = new_game(load_map(sys.argv[1]), seed=int(sys.argv[2]))
