@@ -20,7 +20,7 @@ from typing import Any
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
 from khala_bridge.state import EpisodeInfo, Snapshot, read_info, read_snapshot
@@ -70,13 +70,13 @@ def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
     """What an answer took, in milliseconds, and whether it was orders."""
     found = catalogue()[action]
     assert found.rule is not None
-    asked = Ask(found, snapshot, ledger_of(snapshot))
+    asked = RuleRequest(found, snapshot, ledger_of(snapshot))
     asked.ledger.supply = 50
     began = time.process_time()
     try:
         RULES[found.rule](asked)
         answer = "orders"
-    except Impossible as impossible:
+    except NotAvailable as impossible:
         answer = impossible.message
     return 1000 * (time.process_time() - began), answer
 

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key, run_key
-from khala_protocol.messages import ChatMessage, Exchange, Observation, Reply, Report, TeamView, UnitView, View
+from khala_protocol.messages import ChatMessage, ModelCall, Observation, Reply, Report, TeamView, UnitView, View
 from khala_protocol.recording import Recorder, read
 
 AGENTS = 8
@@ -58,7 +58,7 @@ def step_samples(step: int) -> list[tuple[str, bytes]]:
             where | {"game_loop": step * 8, "answer_within_s": 15.0, "text": text}
             | {"view": View(time_s=step / 2.8, teams=(team,))}
         )  # fmt: skip
-        exchange = Exchange.model_validate(
+        exchange = ModelCall.model_validate(
             where | {"attempt": 1, "model": "m", "endpoint": "http://localhost", "status": "ok", "started_s": 0.1}
             | {"prompt": (ChatMessage(role="user", content=text),), "completion": text[:1_400], "latency_s": 1.0}
         )  # fmt: skip

@@ -22,12 +22,12 @@ from rich.table import Table
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.api.game import Game, Setup
+from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.layers import Frame
 from khala_simulator.maps.game_map import load_map
 
 if TYPE_CHECKING:
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.seat import PlayerSeat
 
 SIZES = (128, 256, 512, 1024)
 MINIMAP = 128
@@ -35,10 +35,10 @@ FRAMES = 200
 ARMY = ("Marine", "Marauder", "Stalker", "Zealot", "Roach", "Zergling", "Hydralisk", "Colossus", "VoidRay", "Mutalisk")
 
 
-def stage(screen: int, units: int) -> tuple[Game, Seat]:
+def stage(screen: int, units: int) -> tuple[HostedGame, PlayerSeat]:
     """A game in which `units` units face each other in view."""
     players = (sc.PlayerSetup(type=sc.Participant, race=common_pb2.Protoss), sc.PlayerSetup(type=sc.Computer))
-    game = Game(
+    game = HostedGame(
         Setup(load_map("llm_smac/3s_vs_3z"), b"", "bench", players, 1, disable_fog=False, realtime=False), "4.10"
     )
     size = common_pb2.Size2DI(x=screen, y=screen)
@@ -55,7 +55,7 @@ def stage(screen: int, units: int) -> tuple[Game, Seat]:
     return game, seat
 
 
-def frame(game: Game, seat: Seat) -> Frame:
+def frame(game: HostedGame, seat: PlayerSeat) -> Frame:
     """What the seat is to be shown now."""
     sight = seat.look()
     chosen = seat.selection.rows(sight)

@@ -34,7 +34,7 @@ from khala.children import Children
 from khala.local import one_side, shares
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
-from khala_bridge.state.teams import Roster, Team
+from khala_bridge.state.teams import Team, TeamRoster
 from khala_orchestrator.announce import Announcer
 from khala_orchestrator.brief import briefing
 from khala_orchestrator.config import MatchConfig, load_task
@@ -47,7 +47,7 @@ from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as
 from khala_protocol.keys import Topic, every_agent
 from khala_protocol.keys import parse as parse_key
-from khala_protocol.messages import Exchange, Observation, Run
+from khala_protocol.messages import ModelCall, Observation, Run
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class Bench:
 
         seat, answer = max(answers.by_seat.items(), key=arrival)
         assert answer.reply is not None and answer.latency_s is not None
-        request = decode_as(Exchange, self.exchanges[seat.agent])
+        request = decode_as(ModelCall, self.exchanges[seat.agent])
         return {
             "before": ask_s - answer.latency_s,  # until its own observation was made and put
             "bus": answer.latency_s - answer.reply.latency_s,
@@ -187,7 +187,7 @@ class Bench:
                 await self.arrived.wait()
 
 
-class Everybodys(Roster):
+class Everybodys(TeamRoster):
     """Gives the first agent's units to every agent: as many agents as one likes, each with a whole battle to see."""
 
     def __init__(self, agents: Sequence[AgentConfig]) -> None:

@@ -20,7 +20,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.painting import palette
 from khala_simulator.api.painting.silhouettes import OUTLINES
-from khala_simulator.api.painting.sprites import Look, wardrobe
+from khala_simulator.api.painting.sprites import SpriteLook, wardrobe
 from khala_simulator.api.sight import Alliance
 from khala_simulator.process.client import Client, command, interface
 from khala_simulator.tables.catalog import load_catalog
@@ -246,7 +246,7 @@ def gallery() -> Image:
         row = catalog.unit(name).row
         left, top = k // rows * CELL[0], k % rows * CELL[1]
         for side, turn, column in ((Alliance.SELF, 0, 34), (Alliance.ENEMY, 8, 102)):
-            look = Look(row, side, turn, veiled=False, unfinished=False)
+            look = SpriteLook(row, side, turn, veiled=False, unfinished=False)
             sprites.sprite(look).stamp(image, left + column, top + CELL[1] // 2)
         _write(image, name, (left + 138, top + CELL[1] // 2 + 5), TEXT, 14)
     return np.ascontiguousarray(image[..., ::-1])

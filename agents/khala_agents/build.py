@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_agents.llm.client import LLMClient
-    from khala_protocol.messages import Exchange
+    from khala_protocol.messages import ModelCall
 
 
 def client_for(config: ModelConfig) -> LLMClient:
@@ -127,14 +127,14 @@ def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, 
         raise ConfigError(fault["msg"].removeprefix("Value error, "), source=source, field=field) from None
 
 
-def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[str, LLMPolicy]:
+def replay_policies(exchanges: Iterable[ModelCall], *, memory: int = 0) -> dict[str, LLMPolicy]:
     """A policy for each agent that made the recorded requests; it gets the recorded answers, and waits for none.
 
     Args:
         exchanges: of one run, in any order.
         memory: as the recorded agents had it.
     """
-    by_agent: dict[str, list[Exchange]] = {}
+    by_agent: dict[str, list[ModelCall]] = {}
     for exchange in exchanges:
         by_agent.setdefault(exchange.agent, []).append(exchange)
     at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
@@ -146,7 +146,7 @@ def replay_policies(exchanges: Iterable[Exchange], *, memory: int = 0) -> dict[s
     }
 
 
-def _vision_of(exchanges: Iterable[Exchange]) -> Vision | None:
+def _vision_of(exchanges: Iterable[ModelCall]) -> Vision | None:
     """Whether the model of these requests was shown pictures."""
     shown = [len(message.images) for exchange in exchanges for message in exchange.prompt]
     return Vision(max_images=max(shown)) if any(shown) else None

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala_agents.policy import Policy
-    from khala_agents.worker import Tally
+    from khala_agents.worker import WorkerTally
     from khala_protocol.messages import Usage
 
 T = TypeVar("T")
@@ -108,7 +108,7 @@ def _settle_memory() -> None:
 
 async def _play(
     config: BusConfig, run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
-) -> dict[str, Tally]:
+) -> dict[str, WorkerTally]:
     await _check(policies.values())
     bus = await open_bus(config)
     try:
@@ -128,7 +128,7 @@ async def _check(policies: Iterable[Policy]) -> None:
             group.create_task(policy.check())
 
 
-def _sentence(name: str, tally: Tally) -> str:
+def _sentence(name: str, tally: WorkerTally) -> str:
     fallbacks = ", ".join(f"{count} {why}" for why, count in tally.fallbacks.most_common())
     text = f"{name}: {tally.replies['ok']} replies, {tally.replies['fallback']} fallbacks"
     text += f" ({fallbacks})" if fallbacks else ""
@@ -141,7 +141,7 @@ def _price(usage: Usage) -> str:
     return "price unknown" if usage.cost_usd is None else f"{usage.cost_usd:.4f} USD"
 
 
-def _plain(tally: Tally) -> dict[str, Any]:
+def _plain(tally: WorkerTally) -> dict[str, Any]:
     return {
         "replies": dict(tally.replies),
         "fallbacks": dict(tally.fallbacks),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from khala_protocol.codec import encode
 from khala_protocol.errors import BusClosed, BusError
-from khala_protocol.messages import Exchange, Usage
+from khala_protocol.messages import ModelCall, Usage
 
 if TYPE_CHECKING:
     from khala_protocol.bus import Publisher
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 Step = tuple[int, int]
 
 
-class Ledger:
+class UsageLedger:
     """The exchanges of one agent.
 
     Attributes:
@@ -34,13 +34,13 @@ class Ledger:
         self._agent = agent
         self._step: Step | None = None
         self._spent: list[Usage] = []
-        self._waiting: asyncio.Queue[Exchange] = asyncio.Queue()
+        self._waiting: asyncio.Queue[ModelCall] = asyncio.Queue()
 
     def open(self, step: Step) -> None:
         """Begins the account of a step, given as episode and number."""
         self._step, self._spent = step, []
 
-    def note(self, exchange: Exchange) -> None:
+    def note(self, exchange: ModelCall) -> None:
         """Takes an exchange. What belongs to an older step is published, and not on the account of this one."""
         if (exchange.episode, exchange.step) == self._step:
             self._spent.append(exchange.usage)
@@ -64,7 +64,7 @@ class Ledger:
         except BusClosed:
             log.info("agent %s: the bus was closed before all exchanges were sent", self._agent)
 
-    async def _put(self, exchange: Exchange, publisher: Publisher) -> None:
+    async def _put(self, exchange: ModelCall, publisher: Publisher) -> None:
         try:
             await publisher.put(encode(exchange))
         except BusClosed:

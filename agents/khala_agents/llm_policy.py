@@ -26,7 +26,7 @@ from khala_agents.memory import Memory, NoMemory
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Policy
 from khala_agents.prompt import Prompt
-from khala_protocol.messages import Exchange, Usage
+from khala_protocol.messages import ModelCall, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -194,7 +194,7 @@ class _Tries:
 
     def _trace(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
         seen = self._context.observation
-        exchange = Exchange(
+        exchange = ModelCall(
             run=seen.run,
             agent=seen.agent,
             side=seen.side,

@@ -23,7 +23,7 @@ PATIENCE_S = 0.5
 """How long a picture is waited for that is not there yet."""
 
 
-class Pictures:
+class PictureStore:
     """Holds the newest pictures of one agent."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:

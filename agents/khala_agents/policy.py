@@ -22,13 +22,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeAlias, TypeVar
 
 from khala_agents.deadline import time_to_decide_s
-from khala_agents.pictures import Pictures
+from khala_agents.pictures import PictureStore
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_protocol.messages import Briefing, Exchange, Observation
+    from khala_protocol.messages import Briefing, ModelCall, Observation
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -56,7 +56,7 @@ Said: TypeAlias = str | Decision
 """What `decide` returns: a reply, or a reply with what is to be known about it."""
 
 
-def _untraced(exchange: Exchange) -> None:
+def _untraced(exchange: ModelCall) -> None:
     """Drop an exchange that nobody wants."""
 
 
@@ -79,8 +79,8 @@ class Context:
 
     briefing: Briefing
     observation: Observation
-    pictures: Pictures = field(default_factory=Pictures)
-    trace: Callable[[Exchange], None] = _untraced
+    pictures: PictureStore = field(default_factory=PictureStore)
+    trace: Callable[[ModelCall], None] = _untraced
     arrived: float = field(default_factory=_now)
 
     @property

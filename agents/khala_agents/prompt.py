@@ -15,7 +15,7 @@ from khala_protocol.messages import ChatMessage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from khala_protocol.messages import ActionSpec, Briefing, Clock, Correspondent, Frames, ImageRef, TeamSpec
+    from khala_protocol.messages import ActionSpec, Briefing, Clock, Contact, Frames, ImageRef, TeamSpec
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
 """Tags of the example; a game's own tags are longer, so that one that was copied is seen at once."""
@@ -137,7 +137,7 @@ def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
     return "\n".join(f"- {name}: {meaning}" for name, meaning in meanings.items() if name in used)
 
 
-def _communication(correspondents: Sequence[Correspondent], channels: Sequence[str]) -> str:
+def _communication(correspondents: Sequence[Contact], channels: Sequence[str]) -> str:
     if not correspondents and not channels:
         return ""
     lines = [f"- {who.name}" + (f": {who.role}" if who.role else "") for who in correspondents]

@@ -17,7 +17,7 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic, agent_key, image_key, run_key
-from khala_protocol.messages import Briefing, Exchange, Observation, Reply
+from khala_protocol.messages import Briefing, ModelCall, Observation, Reply
 from khala_protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
     if run is None or card is None:
         raise RecordingError(f"{recording.path} has no agent {agent}")
     if policy is None:
-        policies = replay_policies(recording.of(Exchange, agent=agent))
+        policies = replay_policies(recording.of(ModelCall, agent=agent))
         if agent not in policies:
             raise RecordingError(
                 f"{recording.path} has no requests of {agent} to a model: give the policy it played with"

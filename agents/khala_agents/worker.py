@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 from khala_agents.briefings import Briefings
 from khala_agents.deadline import time_to_decide_s
 from khala_agents.guard import Guard
-from khala_agents.ledger import Ledger
+from khala_agents.ledger import UsageLedger
 from khala_agents.links import Links, join
-from khala_agents.pictures import Pictures
+from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, BusError, PeerError
@@ -45,7 +45,7 @@ UNWIND_S = 1.0
 
 
 @dataclass(slots=True)
-class Tally:
+class WorkerTally:
     """What a worker has done.
 
     Attributes:
@@ -71,7 +71,7 @@ async def run_worker(
     policy: Policy,
     *,
     stop: asyncio.Event | None = None,
-) -> Tally:
+) -> WorkerTally:
     """Plays one agent until the run's last result, or until `stop` is set or the bus is closed.
 
     Args:
@@ -92,7 +92,7 @@ async def run_workers(
     policies: Mapping[str, Policy],
     *,
     stop: asyncio.Event | None = None,
-) -> dict[str, Tally]:
+) -> dict[str, WorkerTally]:
     """Plays several agents in one process, each with its own policy, until all have ended."""
     stop = stop or asyncio.Event()
     async with asyncio.TaskGroup() as group:
@@ -107,23 +107,23 @@ class Worker:
     """One agent's part in one run; see the module."""
 
     def __init__(self, bus: Bus, run: str, side: str, name: str, policy: Policy) -> None:
-        self.tally = Tally()
+        self.tally = WorkerTally()
         self._bus = bus
         self._run, self._side, self._name = run, side, name
         self._policy = policy
         self._guard = Guard(name)
         self._clock = asyncio.get_running_loop().time
         self._ended = asyncio.Event()
-        self._ledger = Ledger(name)
+        self._ledger = UsageLedger(name)
         self._briefings = Briefings()
-        self._pictures = Pictures()
+        self._pictures = PictureStore()
         self._card: Run | None = None
         self._last_result: int | None = None
         self._newest: tuple[int, int] | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
 
-    async def play(self, stop: asyncio.Event) -> Tally:
+    async def play(self, stop: asyncio.Event) -> WorkerTally:
         """Joins, answers, and leaves; see `run_worker`."""
         async with AsyncExitStack() as stack:
             stack.push_async_callback(self._guard.safely, "closing the policy", self._policy.close)

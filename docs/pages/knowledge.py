@@ -13,7 +13,7 @@ from khala_bridge.knowledge.words import price
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_bridge.knowledge import AbilityFacts, UnitType, UpgradeFacts, Weapon
+    from khala_bridge.knowledge import AbilityFacts, UnitFacts, UpgradeFacts, WeaponFacts
 
 SOURCE = "`bridge/data/knowledge`"
 MAKING = {"train", "warp_in", "build", "build_addon", "grow", "structure_morph"}
@@ -101,7 +101,7 @@ def upgrades_page() -> str:
     )
 
 
-def _race(race: str, known: list[UnitType]) -> str:
+def _race(race: str, known: list[UnitFacts]) -> str:
     words = [
         (kind.name, kind.about, kind.uses, ", ".join(kind.counters), ", ".join(kind.countered_by), _own(kind))
         for kind in known
@@ -113,11 +113,11 @@ def _race(race: str, known: list[UnitType]) -> str:
     )
 
 
-def _own(kind: UnitType) -> str:
+def _own(kind: UnitFacts) -> str:
     return "; ".join(f"*{title}*: {said}" for title, said in kind.abilities.items())
 
 
-def _facts(kind: UnitType) -> tuple[object, ...]:
+def _facts(kind: UnitFacts) -> tuple[object, ...]:
     needs = (*kind.requires, *((f"{kind.addon} at the producer",) if kind.addon else ()))
     flags = (("flying", kind.flying), ("cloaked", kind.cloaked), ("burrowed", kind.burrowed))
     numbers = (kind.health, kind.shield, kind.energy, kind.armor, kind.speed, kind.sight, kind.detects, kind.supply)
@@ -134,7 +134,7 @@ def _facts(kind: UnitType) -> tuple[object, ...]:
     )
 
 
-def _weapon(weapon: Weapon) -> str:
+def _weapon(weapon: WeaponFacts) -> str:
     attacks = f" x {weapon.attacks}" if weapon.attacks > 1 else ""
     nearest = f"{n(weapon.min_range)} to " if weapon.min_range else ""
     bonus = "".join(f", +{n(amount)} against {attribute}" for attribute, amount in weapon.bonus.items())

@@ -25,7 +25,7 @@ from khala_simulator.tick import SYSTEMS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_simulator.tables.mechanics import Entry
+    from khala_simulator.tables.mechanics import Constant
     from khala_simulator.world.world import World
 
 SOURCES = "SOURCES.md"
@@ -127,7 +127,7 @@ def _sourced() -> str:
     return table(("constant", "value", "unit", "meaning", "source"), rows)
 
 
-def _value(entry: Entry) -> object:
+def _value(entry: Constant) -> object:
     return {True: "yes", False: "no"}[entry.value] if isinstance(entry.value, bool) else entry.value
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_simulator.tables.catalog import Catalog
-    from khala_simulator.tables.records import Hit, Production, UnitType, Weapon
+    from khala_simulator.tables.records import Hit, ProductionRecord, UnitType, Weapon
 
 
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
@@ -88,7 +88,7 @@ def _origin(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
     }
 
 
-def _counts(way: Production, unit: UnitType, catalog: Catalog) -> bool:
+def _counts(way: ProductionRecord, unit: UnitType, catalog: Catalog) -> bool:
     """Whether someone can be told to make the type in this way: no cocoon, and not back from one of its own modes."""
     made = catalog.row_of_name.get(way.producer)
     if made is None or way.producer not in unit_names():

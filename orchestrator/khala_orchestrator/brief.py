@@ -7,10 +7,10 @@ import platform
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue_sha256
-from khala_protocol.messages import Briefing, Correspondent, Run
+from khala_protocol.messages import Briefing, Contact, Run
 
 if TYPE_CHECKING:
-    from khala_bridge.game.game import GameInfo
+    from khala_bridge.game.game import GameIdentity
     from khala_bridge.task.config import AgentConfig, TaskConfig
     from khala_orchestrator.config import MatchConfig
 
@@ -29,7 +29,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Br
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),
         actions=tuple(action.spec for action in agent.catalogue()),
-        correspondents=tuple(Correspondent(name=other.name, role=other.role) for other in others),
+        correspondents=tuple(Contact(name=other.name, role=other.role) for other in others),
         channels=task.channels if others else (),
         frames=task.frames,
         clock=task.clock,
@@ -37,7 +37,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Br
     )
 
 
-def run_card(config: MatchConfig, game: GameInfo) -> Run:
+def run_card(config: MatchConfig, game: GameIdentity) -> Run:
     """All that one needs to know to repeat the run, or to trust its numbers."""
     task = config.task
     return Run(

@@ -103,13 +103,13 @@ def replay(
 ) -> None:
     """Tell what was said and done in a recorded run."""
     from khala_orchestrator.transcript import (  # noqa: PLC0415  # zstd is not for --help
-        Selection,
+        StepSelection,
         save_pictures,
         summary,
         transcript,
     )
 
-    selection = Selection.of(agent, steps)
+    selection = StepSelection.of(agent, steps)
     if images is not None:
         saved = save_pictures(file, selection, images)
         data = {"pictures": [str(path) for path in saved]}

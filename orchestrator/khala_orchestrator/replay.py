@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from khala_bridge.game.game import OneSide
     from khala_orchestrator.turn import Question
     from khala_protocol.messages import AgentReport
-    from khala_protocol.recording import Recording, Step
+    from khala_protocol.recording import RecordedStep, Recording
 
 
 def recorded_config(recording: Recording) -> MatchConfig:
@@ -66,7 +66,7 @@ class RecordedTurn:
 
     def __init__(self, recording: Recording) -> None:
         self.differences: list[Difference] = []
-        self._steps: Iterator[Step] = recording.by_step()
+        self._steps: Iterator[RecordedStep] = recording.by_step()
         self._replies: dict[tuple[int, int, str], Reply] = {}
         for reply in recording.of(Reply):
             self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
@@ -91,7 +91,7 @@ class RecordedTurn:
         reply = self._replies[report.episode, report.step, agent.agent] if taken else None
         return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
 
-    def _compare(self, step: Step, observations: Iterable[Observation]) -> None:
+    def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
         sent = {observation.agent: encode(observation).decode() for observation in observations}
         for sample in step.samples:
             message = sample.message
@@ -103,7 +103,7 @@ class RecordedTurn:
         for agent, now in sent.items():
             self._differ(agent, step, "", now)
 
-    def _differ(self, agent: str, step: Step, recorded: str, sent: str) -> None:
+    def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:
         self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
+class StepSelection:
     """Which part of a recording is shown."""
 
     agent: str | None = None
@@ -56,7 +56,7 @@ class Selection:
         return in_time and (agent is None or self.agent in {None, agent})
 
 
-def transcript(path: Path, selection: Selection, *, whole: bool = False) -> Iterator[RenderableType]:
+def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> Iterator[RenderableType]:
     """Yield what is to be printed of a recording, in its order.
 
     Args:
@@ -84,7 +84,7 @@ def transcript(path: Path, selection: Selection, *, whole: bool = False) -> Iter
                 yield from _report(report, selection)
 
 
-def summary(path: Path, selection: Selection) -> dict[str, Any]:
+def summary(path: Path, selection: StepSelection) -> dict[str, Any]:
     """The run card, the results and the reports of a recording, as JSON data."""
     found: dict[str, list[Wire]] = {"run": [], "result": [], "report": []}
     topics: Counter[str] = Counter()
@@ -102,7 +102,7 @@ def summary(path: Path, selection: Selection) -> dict[str, Any]:
     }
 
 
-def _report(report: Report, selection: Selection) -> Iterator[Text]:
+def _report(report: Report, selection: StepSelection) -> Iterator[Text]:
     yield Text(f"step {report.step}  {clock(report.game_loop)}  score {report.score:g}", "bold")
     for agent in report.agents:
         if selection.holds(report.step, agent.agent):
@@ -119,7 +119,7 @@ def _agent(agent: AgentReport) -> Iterator[Text]:
         yield Text.assemble((f"    {fault.text}", "red"), f"  {fault.reason}: {fault.message}")
 
 
-def save_pictures(path: Path, selection: Selection, directory: Path) -> list[Path]:
+def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list[Path]:
     """Writes the pictures that agents were shown into a directory, and returns their files.
 
     Args:

@@ -3,7 +3,7 @@
 One page for every package that is configured by files. It is no configuration system: there are no
 defaults here (the model has them), no interpolation, no environment. A file may begin with all that another one says:
 
-    like: pvz_task1_level1     # the file beside this one, or a path from here that ends in .yaml
+    extends: pvz_task1_level1  # the file beside this one, or a path from here that ends in .yaml
     map: pvz_task1_level2      # a field that is given takes the place of the other file's, as a whole
 
 Above it are the modules `config` of the packages; below it are PyYAML, read with its safe loader, and pydantic.
@@ -29,7 +29,7 @@ M = TypeVar("M", bound=BaseModel)
 Place = tuple[str | int, ...]
 """Keys and indices from the top of the document to a value."""
 
-LIKE = "like"
+EXTENDS = "extends"
 """Field at the top of a file that names another one."""
 ELSEWHERE = "ELSEWHERE"
 """Class variable of a model: fields that users look for in it, and a sentence without its subject about each."""
@@ -62,7 +62,7 @@ def _fitted(document: _Document, model: type[M]) -> M:
 
 
 def _opened(path: Path, *users: Path) -> _Document:
-    """The document at a path, laid over the one that it is like; `users` are those that are like it."""
+    """The document at a path, over the one that it extends; `users` are the files that extend it."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -74,13 +74,15 @@ def _opened(path: Path, *users: Path) -> _Document:
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", source=str(path)) from None
     document = _Document(text, str(path))
-    if isinstance(document.data, dict) and isinstance(name := document.data.get(LIKE), str):
+    if isinstance(document.data, dict) and isinstance(name := document.data.get(EXTENDS), str):
         other = path.parent / (name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
         if other in (path, *users):
-            raise ConfigError("this file is like itself", source=str(path), line=document.lines[(LIKE,)], field=LIKE)
+            raise ConfigError(
+                "this file extends itself", source=str(path), line=document.lines[(EXTENDS,)], field=EXTENDS
+            )
         if not other.is_file():
             fault = f"there is no file {other.name} for it"
-            raise ConfigError(fault, source=str(path), line=document.lines[(LIKE,)], field=LIKE)
+            raise ConfigError(fault, source=str(path), line=document.lines[(EXTENDS,)], field=EXTENDS)
         document.lay_over(_opened(other, path, *users))
     return document
 
@@ -99,7 +101,7 @@ class _Document:
         """Takes the fields of another document that this one does not give itself."""
         if isinstance(self.data, dict) and isinstance(other.data, dict):
             self._below = other
-            self.data = other.data | {key: value for key, value in self.data.items() if key != LIKE}
+            self.data = other.data | {key: value for key, value in self.data.items() if key != EXTENDS}
 
     def origin(self, place: Place) -> tuple[str, int | None]:
         """File and line of the value at `place`."""

@@ -210,7 +210,7 @@ class Event(Frozen):
     """Health and shield lost (`hurt`) or regained (`healed`)."""
 
 
-class Offer(Frozen):
+class ActionCost(Frozen):
     """What a valid action costs."""
 
     action: str
@@ -225,7 +225,7 @@ class Offer(Frozen):
     """Whether it makes a structure of which there is none yet."""
 
 
-class Barred(Frozen):
+class UnavailableAction(Frozen):
     """An action that is not valid now."""
 
     action: str
@@ -247,9 +247,9 @@ class TeamView(Frozen):
     events: tuple[Event, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
     """What is valid for this team now."""
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[ActionCost, ...] = ()
     """Of those, the ones that cost something."""
-    barred: tuple[Barred, ...] = ()
+    barred: tuple[UnavailableAction, ...] = ()
     """What it may be told, but not now."""
     resources: tuple[UnitView, ...] = ()
     """Minerals and geysers on its screen; for builders only."""
@@ -402,7 +402,7 @@ class Received(Frozen):
     text: str
 
 
-class Correspondent(Frozen):
+class Contact(Frozen):
     """Somebody an agent may write to."""
 
     name: str
@@ -447,7 +447,7 @@ class Briefing(Wire):
     teams: tuple[TeamSpec, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
     """Every action that any of its teams may ever use."""
-    correspondents: tuple[Correspondent, ...] = ()
+    correspondents: tuple[Contact, ...] = ()
     channels: tuple[str, ...] = ()
     frames: Frames = Frames()
     clock: Clock = Clock()
@@ -563,7 +563,7 @@ class ChatMessage(Frozen):
     """Pictures that stand before the text, in their order."""
 
 
-class Exchange(Wire):
+class ModelCall(Wire):
     """Agent → recorder: one request to a model and what came back. Never a key."""
 
     kind: Literal["exchange"] = "exchange"
@@ -706,7 +706,7 @@ class Result(Wire):
 
 
 AnyMessage = Annotated[
-    Run | Briefing | Observation | Reply | Message | Exchange | Report | Result,
+    Run | Briefing | Observation | Reply | Message | ModelCall | Report | Result,
     Field(discriminator="kind"),
 ]
-MESSAGE_TYPES: tuple[type[Wire], ...] = (Run, Briefing, Observation, Reply, Message, Exchange, Report, Result)
+MESSAGE_TYPES: tuple[type[Wire], ...] = (Run, Briefing, Observation, Reply, Message, ModelCall, Report, Result)

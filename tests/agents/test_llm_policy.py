@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.llm.client import LLMError, Unavailable, Unreachable
+from khala_agents.llm.client import EndpointUnavailable, LLMError, Unreachable
 from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.replay import NotRecorded
@@ -19,7 +19,7 @@ from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import LastSteps
 from khala_agents.policy import Context
 from khala_protocol.codec import decode_as, encode
-from khala_protocol.messages import Exchange, Usage
+from khala_protocol.messages import ModelCall, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Briefing, Observation
 
 CLOCK = "jumps"
-BUSY = Unavailable("busy", status="http 429")
+BUSY = EndpointUnavailable("busy", status="http 429")
 NO_JITTER = RetryRule(jitter_s=0)
 
 
@@ -36,13 +36,13 @@ class Asked:
     """A policy as a worker asks it, with a list of what is traced."""
 
     policy: LLMPolicy
-    exchanges: list[Exchange] = field(default_factory=list)
+    exchanges: list[ModelCall] = field(default_factory=list)
 
     async def decide(self, briefing: Briefing, observation: Observation) -> str:
         return await self.policy.decide(Context(briefing, observation, trace=self.exchanges.append))
 
 
-def traced(model: Any, **options: Any) -> tuple[Asked, list[Exchange]]:
+def traced(model: Any, **options: Any) -> tuple[Asked, list[ModelCall]]:
     asked = Asked(LLMPolicy(model, rng=random.Random(0), **({"retry": NO_JITTER} | options)))
     return asked, asked.exchanges
 
@@ -83,7 +83,7 @@ async def test_no_try_is_begun_that_cannot_end_before_the_deadline(
 ) -> None:
     model = listed_model(*[BUSY] * 9)
     policy, exchanges = traced(model, retry=RetryRule(tries=9, jitter_s=0))
-    with pytest.raises(Unavailable):
+    with pytest.raises(EndpointUnavailable):
         await policy.decide(briefing(), observation(within_s=4.0))
     assert model.times_s == [0, 1, 3]
     assert len(exchanges) == 3
@@ -114,7 +114,7 @@ async def test_a_spent_budget_stops_requests_before_they_are_made(
 async def test_memory_is_of_one_episode_and_of_answered_steps_only(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    model = listed_model("one", Unavailable("x", status="http 500"), "three", "four")
+    model = listed_model("one", EndpointUnavailable("x", status="http 500"), "three", "four")
     policy, _ = traced(model, memory=LastSteps(5), retry=RetryRule(tries=1))
     await policy.policy.prepare(briefing())
     await policy.decide(briefing(), observation(0))
@@ -135,7 +135,7 @@ async def test_recorded_exchanges_give_the_recorded_replies_without_a_wait(
 ) -> None:
     policy, exchanges = traced(listed_model(BUSY, 4.0, "first", Unreachable("x"), Unreachable("x"), 2.0, "second"))
     said = [await policy.decide(briefing(), observation(step, within_s=None)) for step in range(2)]
-    recorded = [decode_as(Exchange, encode(exchange)) for exchange in exchanges]
+    recorded = [decode_as(ModelCall, encode(exchange)) for exchange in exchanges]
     began = asyncio.get_running_loop().time()
     replayed = Asked(replay_policies(recorded)["Stalkers"])
     assert [await replayed.decide(briefing(), observation(step, within_s=None)) for step in range(2)] == said

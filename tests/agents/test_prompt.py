@@ -8,7 +8,7 @@ import pytest
 
 from khala_agents.memory import LastSteps, NoMemory
 from khala_agents.prompt import Prompt, system_text
-from khala_protocol.messages import ActionSpec, ChatMessage, Clock, Correspondent, TeamSpec
+from khala_protocol.messages import ActionSpec, ChatMessage, Clock, Contact, TeamSpec
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def told(briefing: Callable[..., Briefing]) -> Briefing:
     return briefing(
         teams=(TeamSpec(name="Stalker-1", unit_types=("Stalker",), task="Hold the ramp."),),
         actions=actions,
-        correspondents=(Correspondent(name="Zealots", role="They fight hand to hand."),),
+        correspondents=(Contact(name="Zealots", role="They fight hand to hand."),),
         channels=("Channel-1",),
         max_actions=2,
     )

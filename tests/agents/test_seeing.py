@@ -18,13 +18,13 @@ from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.vision import ANTHROPIC, Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import LastSteps
-from khala_agents.pictures import Pictures
+from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context, Policy
 from khala_agents.worker import run_worker
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.keys import image_key
-from khala_protocol.messages import Exchange, ImageRef
+from khala_protocol.messages import ImageRef, ModelCall
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Mapping
@@ -58,7 +58,7 @@ def by_hash(*pictures: bytes) -> dict[str, bytes]:
 
 
 async def test_pictures_that_are_there_are_had_at_once() -> None:
-    pictures = Pictures()
+    pictures = PictureStore()
     for data in (ONE, TWO, THREE):
         await pictures.put(data)
     began = asyncio.get_running_loop().time()
@@ -67,7 +67,7 @@ async def test_pictures_that_are_there_are_had_at_once() -> None:
 
 
 async def test_a_picture_that_is_on_its_way_is_waited_for() -> None:
-    pictures = Pictures()
+    pictures = PictureStore()
     waiting = asyncio.create_task(pictures.get([ref(ONE), ref(TWO)], within_s=0.5))
     await asyncio.sleep(0.1)
     await pictures.put(ONE)
@@ -79,21 +79,21 @@ async def test_a_picture_that_is_on_its_way_is_waited_for() -> None:
 
 
 async def test_what_does_not_come_in_time_is_left_out() -> None:
-    pictures = Pictures()
+    pictures = PictureStore()
     await pictures.put(ONE)
     assert await pictures.get([ref(ONE), ref(TWO)], within_s=0.5) == by_hash(ONE)
     assert asyncio.get_running_loop().time() == pytest.approx(0.5)
 
 
 async def test_the_oldest_are_forgotten_when_there_are_too_many() -> None:
-    pictures = Pictures(most_bytes=len(ONE) + len(TWO) + len(THREE) - 1)
+    pictures = PictureStore(most_bytes=len(ONE) + len(TWO) + len(THREE) - 1)
     for data in (ONE, TWO, ONE, THREE):  # the second time makes the first one new
         await pictures.put(data)
     assert await pictures.get([ref(ONE), ref(TWO), ref(THREE)], within_s=0) == by_hash(ONE, THREE)
 
 
 async def test_a_picture_that_is_too_large_alone_is_kept_until_the_next() -> None:
-    pictures = Pictures(most_bytes=3)
+    pictures = PictureStore(most_bytes=3)
     await pictures.put(ONE)
     assert await pictures.get([ref(ONE)], within_s=0) == by_hash(ONE)
     await pictures.put(TWO)
@@ -108,14 +108,14 @@ class Asked:
     """A policy as a worker asks it: with one place for pictures and one list of what is traced."""
 
     policy: LLMPolicy
-    pictures: Pictures = field(default_factory=Pictures)
-    exchanges: list[Exchange] = field(default_factory=list)
+    pictures: PictureStore = field(default_factory=PictureStore)
+    exchanges: list[ModelCall] = field(default_factory=list)
 
     async def decide(self, briefing: Briefing, observation: Observation) -> str:
         return await self.policy.decide(Context(briefing, observation, self.pictures, self.exchanges.append))
 
 
-def policy_of(model: Any, **options: Any) -> tuple[Asked, list[Exchange]]:
+def policy_of(model: Any, **options: Any) -> tuple[Asked, list[ModelCall]]:
     asked = Asked(LLMPolicy(model, **({"vision": SEES} | options)))
     return asked, asked.exchanges
 
@@ -249,7 +249,7 @@ async def test_recorded_prompts_with_pictures_get_their_recorded_answers(
     policy, exchanges = policy_of(listed_model("go"))
     await policy.pictures.put(ONE)
     await policy.decide(briefing(), observation(images=(ref(ONE),)))
-    recorded = [decode_as(Exchange, encode(exchange)) for exchange in exchanges]
+    recorded = [decode_as(ModelCall, encode(exchange)) for exchange in exchanges]
     replayed = Asked(replay_policies(recorded)["Stalkers"])
     await replayed.pictures.put(ONE)
     assert await replayed.decide(briefing(), observation(images=(ref(ONE),))) == "go"

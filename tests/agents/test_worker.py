@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_agents.llm.client import LLMError, Refused
+from khala_agents.llm.client import LLMError, RequestRefused
 from khala_agents.llm.limits import Budget, Limits
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Decision, FunctionPolicy, Policy
 from khala_agents.scripted.policies import Fixed
-from khala_agents.worker import Tally, run_worker, run_workers
+from khala_agents.worker import WorkerTally, run_worker, run_workers
 from khala_protocol.errors import BusError
 from khala_protocol.keys import Topic, every_agent
-from khala_protocol.messages import Exchange, Reply, Usage
+from khala_protocol.messages import ModelCall, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
@@ -38,10 +38,10 @@ class Players:
     def __init__(self, broker: MemoryBroker) -> None:
         self._broker = broker
         self._stop = asyncio.Event()
-        self._tasks: list[asyncio.Task[Tally]] = []
+        self._tasks: list[asyncio.Task[WorkerTally]] = []
         self.buses: list[MemoryBus] = []
 
-    async def start(self, policy: Policy) -> asyncio.Task[Tally]:
+    async def start(self, policy: Policy) -> asyncio.Task[WorkerTally]:
         bus = self._broker.session()
         self.buses.append(bus)
         task = asyncio.create_task(run_worker(bus, RUN, SIDE, AGENT, policy, stop=self._stop))
@@ -49,7 +49,7 @@ class Players:
         await asyncio.sleep(0.001)
         return task
 
-    async def end(self) -> Tally:
+    async def end(self) -> WorkerTally:
         self._stop.set()
         return (await asyncio.gather(*self._tasks))[0]
 
@@ -277,7 +277,7 @@ FAILURES = [
     (_raises(ValueError("no")), "ValueError"),
     (_raises(TimeoutError()), "TimeoutError"),
     (_raises(asyncio.CancelledError()), "cancelled"),
-    (_raises(Refused("http 400: no", status="http 400")), "http 400"),
+    (_raises(RequestRefused("http 400: no", status="http 400")), "http 400"),
     (_raises(LLMError("nothing left", status="budget")), "budget"),
     (_returns(None), "returned NoneType"),
     (_returns(b"text"), "returned bytes"),
@@ -373,7 +373,7 @@ async def test_exchanges_are_published_and_summed_up_in_the_reply(
     host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing],
     observation: Callable[..., Observation],
 ) -> None:  # fmt: skip
-    await players.start(LLMPolicy(listed_model(Refused("no", status="http 400"), ATTACK)))
+    await players.start(LLMPolicy(listed_model(RequestRefused("no", status="http 400"), ATTACK)))
     await host.say(briefing())
     for step in range(2):
         await host.say(observation(step=step))
@@ -383,7 +383,7 @@ async def test_exchanges_are_published_and_summed_up_in_the_reply(
     assert (good.status, good.attempts) == ("ok", 1)
     assert good.usage == Usage(requests=1, prompt_tokens=100, completion_tokens=10, cost_usd=0.5)
     tally = await players.end()
-    assert [(e.step, e.attempt, e.status, e.completion) for e in host.of(Exchange)] == [
+    assert [(e.step, e.attempt, e.status, e.completion) for e in host.of(ModelCall)] == [
         (0, 1, "http 400", None),
         (1, 1, "ok", ATTACK),
     ]
@@ -401,7 +401,7 @@ async def test_a_request_that_the_deadline_cut_off_is_counted_as_unknown_and_not
     assert (reply.status, reply.detail, reply.attempts) == ("fallback", "timeout", 1)
     assert reply.usage == Usage(requests=1, unknown_requests=1)
     await players.end()
-    (exchange,) = host.of(Exchange)
+    (exchange,) = host.of(ModelCall)
     assert (exchange.status, exchange.completion) == ("cancelled", None)
 
 
@@ -535,7 +535,7 @@ async def test_a_reply_that_cannot_be_sent_costs_its_step_and_not_the_worker(
     await host.replies(1)
     stop.set()
     await playing
-    assert [reply.step for reply in host.of(Reply)] == [exchange.step for exchange in host.of(Exchange)] == [1]
+    assert [reply.step for reply in host.of(Reply)] == [exchange.step for exchange in host.of(ModelCall)] == [1]
     assert sorted(record.getMessage() for record in caplog.records) == [
         "agent Stalkers: an exchange of step 0 is lost: the link is congested",
         "agent Stalkers: the reply to step 0 could not be sent: the link is congested",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.act import Actor, JointAction
-from khala_bridge.auto import RULES, Impossible, Order
+from khala_bridge.auto import RULES, NotAvailable, RuleOrder
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from khala_bridge.auto import Ask
+    from khala_bridge.auto import RuleRequest
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
 
@@ -139,11 +139,11 @@ def test_one_unit_twice_is_not_two_units(act: Callable[..., JointAction]) -> Non
 def test_a_rule_is_asked_with_the_units_of_the_team_and_the_point_in_the_world(
     act: Callable[..., JointAction], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[Ask] = []
+    asked: list[RuleRequest] = []
 
-    def rule(ask: Ask) -> list[Order]:
+    def rule(ask: RuleRequest) -> list[RuleOrder]:
         asked.append(ask)
-        return [Order(ask.function, ask.units[:1], ask.point)]
+        return [RuleOrder(ask.function, ask.units[:1], ask.point)]
 
     monkeypatch.setitem(RULES, str(catalogue()["Build_Pylon_Screen"].rule), rule)
     joint = act("Team Probe-1:\n<Build_Pylon_Screen([14, 10])>")
@@ -162,8 +162,8 @@ def test_a_rule_is_asked_with_the_units_of_the_team_and_the_point_in_the_world(
 def test_why_a_rule_finds_nothing_is_told_with_the_place_that_would_do(
     place: WorldPoint | None, better: str, act: Callable[..., JointAction], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def rule(_: Ask) -> list[Order]:
-        raise Impossible("invalid_target", "There is no room.", place)
+    def rule(_: RuleRequest) -> list[RuleOrder]:
+        raise NotAvailable("invalid_target", "There is no room.", place)
 
     monkeypatch.setitem(RULES, str(catalogue()["Build_Pylon_Screen"].rule), rule)
     (rejection,) = act("Team Probe-1:\n<Build_Pylon_Screen([14, 10])>").rejections["Boss"]
@@ -175,9 +175,9 @@ def test_what_the_host_does_by_itself_comes_last_and_is_nobodys_word(
 ) -> None:
     told: list[frozenset[int]] = []
 
-    def automatic(auto: AutoConfig, *_: object) -> list[Order]:
+    def automatic(auto: AutoConfig, *_: object) -> list[RuleOrder]:
         told.append(_[-1])  # type: ignore[arg-type]  # the tags that agents ordered
-        return [Order(functions()["Train_Probe_quick"], (NEXUS,))] if auto.train_workers else []
+        return [RuleOrder(functions()["Train_Probe_quick"], (NEXUS,))] if auto.train_workers else []
 
     monkeypatch.setattr("khala_bridge.act.actor.automatic", automatic)
     joint = act("Team Stalker-1:\n<Stop()>", auto=AutoConfig(train_workers=True))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from khala_bridge.act import Command, Executor, Played, Step
+    from khala_bridge.act import Command, Executor, PlanStep, Played
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
 
@@ -50,7 +50,7 @@ class Table:
         self.traits: dict[int, dict[str, Any]] = {FOE: {"alliance": "enemy"}}
         self.selected: set[int] = set()
         self.groups: dict[int, set[int]] = {}
-        self.steps: list[Step] = []
+        self.steps: list[PlanStep] = []
         self.stuck = False
         """Whether the camera stays where it is, as at the edge of a map."""
 

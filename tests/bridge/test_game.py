@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act import JointAction, Played, Step
+from khala_bridge.act import JointAction, PlanStep, Played
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
-from khala_bridge.game.game import GameConfig, GameInfo, GameThread, OneSide, StepResult, find_sc2
+from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, OneSide, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.task.maps import known_maps
@@ -40,8 +40,8 @@ class FakeGame:
         self.threads: set[int] = set()
 
     @property
-    def info(self) -> GameInfo:
-        return GameInfo("4.10.0.75689", "B89B", "m.SC2Map", "0" * 64)
+    def info(self) -> GameIdentity:
+        return GameIdentity("4.10.0.75689", "B89B", "m.SC2Map", "0" * 64)
 
     def reset(self) -> tuple[Snapshot, ...]:
         self._note("reset")
@@ -137,10 +137,10 @@ class StubEnv:
         return SimpleNamespace(observation=observation, last=lambda: ended)
 
 
-def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[StepResult, ...]]:
+def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[StepResult, ...]]:
     """Plays plans of two players that return how many steps they took."""
 
-    def plan(steps: list[Step]) -> Plan:
+    def plan(steps: list[PlanStep]) -> Plan:
         for step in steps:
             if (yield step).ended:
                 break
@@ -154,7 +154,7 @@ def play(plans: list[list[Step]], last_loop: int) -> tuple[StubEnv, tuple[StepRe
 
 
 def test_two_players_share_the_steps_and_each_action_enters_once() -> None:
-    env, turns = play([[Step(("a",), 1), Step(("b",), 3)], [Step(("c",), 8)]], last_loop=99)
+    env, turns = play([[PlanStep(("a",), 1), PlanStep(("b",), 3)], [PlanStep(("c",), 8)]], last_loop=99)
     assert env.entered == [([["a"], ["c"]], 1), ([["b"], []], 3), ([[], []], 4)]
     assert [turn.snapshot.game_loop for turn in turns] == [8, 8]
     assert [turn.snapshot.dead for turn in turns] == [{101, 104, 108}, {201, 204, 208}]
@@ -162,7 +162,7 @@ def test_two_players_share_the_steps_and_each_action_enters_once() -> None:
 
 
 def test_plans_end_with_the_episode() -> None:
-    env, turns = play([[Step(("a",), 1), Step(("b",), 1)], [Step(("c",), 8)]], last_loop=1)
+    env, turns = play([[PlanStep(("a",), 1), PlanStep(("b",), 1)], [PlanStep(("c",), 8)]], last_loop=1)
     assert env.entered == [([["a"], ["c"]], 1)]
     assert [(turn.snapshot.ended, turn.snapshot.outcome) for turn in turns] == [(True, "win"), (True, "loss")]
     assert [turn.played.functions for turn in turns] == [("2 steps",), ("1 steps",)]

@@ -10,8 +10,8 @@ from s2clientprotocol import raw_pb2
 
 from khala_bridge.compat import units as pysc2_units
 from khala_bridge.knowledge.forms import FORMS, form_of, forms_of
-from khala_bridge.state import Player, Unit, read_unit
-from khala_bridge.state.teams import Roster
+from khala_bridge.state import PlayerState, Unit, read_unit
+from khala_bridge.state.teams import TeamRoster
 from khala_bridge.task.config import AgentConfig, TaskConfig
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def _read(units: Iterable[raw_pb2.Unit]) -> list[Unit]:
 
 
 def grouped(agents: Iterable[AgentConfig], units: Iterable[raw_pb2.Unit], **player: int) -> dict[str, list[int]]:
-    roster = Roster(agents)
-    roster.update(_read(sorted(units, key=lambda unit: unit.tag)), Player(**player))
+    roster = TeamRoster(agents)
+    roster.update(_read(sorted(units, key=lambda unit: unit.tag)), PlayerState(**player))
     return {t.name: list(t.tags) for a in agents for t in roster.teams(a.name)}
 
 
@@ -66,9 +66,9 @@ def test_other_kinds_take_the_head_within_15_then_an_empty_team_then_the_nearest
 
 def test_of_a_select_team_every_unit_is_a_team_with_a_number_of_its_own(unit: Callable[..., raw_pb2.Unit]) -> None:
     agents = [agent("A", team("Obs", "Observer", kind="select"))]
-    roster = Roster(agents)
+    roster = TeamRoster(agents)
     for tags in ([1, 2], [2], [2, 3]):
-        roster.update(_read([unit(tag, "Observer", 9, 9) for tag in tags]), Player())
+        roster.update(_read([unit(tag, "Observer", 9, 9) for tag in tags]), PlayerState())
     assert [(t.name, t.tags) for t in roster.teams("A")] == [("Obs-2", (2,)), ("Obs-3", (3,))]
 
 
@@ -113,25 +113,25 @@ def test_a_unit_that_is_not_finished_or_not_listed_is_nobodys(unit: Callable[...
 
 
 def test_the_head_is_the_oldest_unit_and_stays_it(unit: Callable[..., raw_pb2.Unit]) -> None:
-    roster = Roster([agent("A", team("Z", "Zealot"))])
+    roster = TeamRoster([agent("A", team("Z", "Zealot"))])
     heads = []
     for tags in ([5, 7], [3, 5, 7], [3, 7], [3, 5, 7]):
-        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), Player())
+        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), PlayerState())
         (z,) = roster.teams("A")
         heads.append((z.head, z.tags))
     assert heads == [(5, (5, 7)), (5, (5, 7, 3)), (7, (7, 3)), (7, (7, 3, 5))]
 
 
 def test_a_unit_that_comes_back_returns_to_its_team(unit: Callable[..., raw_pb2.Unit]) -> None:
-    roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
+    roster = TeamRoster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
     for tags in ([1, 2], [1], [1, 2]):
-        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), Player())
+        roster.update(_read([unit(tag, "Zealot", 5, 5) for tag in tags]), PlayerState())
     assert [t.tags for t in roster.teams("A")] == [(1,), (2,)]
 
 
 def test_a_team_without_units_is_named_as_idle(unit: Callable[..., raw_pb2.Unit]) -> None:
-    roster = Roster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
-    roster.update(_read([unit(1, "Zealot", 5, 5)]), Player())
+    roster = TeamRoster([agent("A", team("Z-1", "Zealot"), team("Z-2", "Zealot"))])
+    roster.update(_read([unit(1, "Zealot", 5, 5)]), PlayerState())
     assert roster.idle_teams("A") == ("Z-2",)
 
 
@@ -148,8 +148,8 @@ def test_the_army_of_2s3z_is_grouped_as_in_the_paper(
 
 def test_a_side_team_has_no_units_and_is_always_there() -> None:
     side = {"name": "Base", "kind": "side", "actions": ["All_Units_Attack"]}
-    roster = Roster([agent("D", side, team("Z", "Zealot"))])
-    roster.update([], Player())
+    roster = TeamRoster([agent("D", side, team("Z", "Zealot"))])
+    roster.update([], PlayerState())
     assert [(t.name, t.kind, t.tags) for t in roster.teams("D")] == [("Base", "side", ())]
     assert roster.idle_teams("D") == ("Z",)
 
@@ -166,13 +166,13 @@ def followed(
     agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None
 ) -> list[dict[int, str]]:
     """Agent and team of every unit at each moment; a moment says of what type the units are then."""
-    roster = Roster(agents)
+    roster = TeamRoster(agents)
     found: list[dict[int, str]] = []
     for moment in moments:
         own = [raw_pb2.Unit(tag=tag, unit_type=NUMBERS[name], build_progress=1) for tag, name in sorted(moment.items())]
         for unit in own:
             unit.pos.x = (at or {}).get(unit.tag, 10.0)
-        roster.update(_read(own), Player(food_workers=12))
+        roster.update(_read(own), PlayerState(food_workers=12))
         found.append({tag: f"{t.agent} {t.name}" for a in agents for t in roster.teams(a.name) for tag in t.tags})
     return found
 
@@ -263,7 +263,7 @@ def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
     agents = [agent("B", team("Builder", "Probe"), admits="builder"), agent("C", team("Z", "Zealot", "Stalker"))]
     names = ["Probe"] * 70 + ["Zealot"] * 60 + ["Stalker"] * 50 + ["Nexus"] * 20
     own = _read(raw_pb2.Unit(tag=n, unit_type=NUMBERS[name], build_progress=1) for n, name in enumerate(names, 1))
-    roster, player, took_s = Roster(agents), Player(food_workers=70), []
+    roster, player, took_s = TeamRoster(agents), PlayerState(food_workers=70), []
     for _ in range(20):
         began = time.perf_counter()
         roster.update(own, player)

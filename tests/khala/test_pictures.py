@@ -13,7 +13,7 @@ from khala_agents.replay import replay_agent
 from khala_agents.worker import run_worker
 from khala_orchestrator.record import RecordingBus
 from khala_orchestrator.roster import Roster, Seat
-from khala_orchestrator.transcript import Selection, save_pictures, summary, transcript
+from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
 from khala_orchestrator.turn import Question, Turn
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
@@ -148,14 +148,14 @@ async def test_a_replayed_agent_is_shown_the_recorded_pictures(recording: Path) 
 
 
 async def test_a_recording_is_told_with_its_pictures(recording: Path) -> None:
-    told = [str(part) for part in transcript(recording, Selection(), whole=True)]
+    told = [str(part) for part in transcript(recording, StepSelection(), whole=True)]
     assert [line for line in told if "picture" in line] == [
         "  picture screen-0 (512 x 512 PNG, 0 kB): Screen 0.",
         "  picture screen-1 (512 x 512 PNG, 102 kB): Screen 1.",
         "  picture screen-0 (512 x 512 PNG, 0 kB): Screen 0.",
         "  picture screen-1 (512 x 512 PNG, 102 kB): Screen 1.",
     ]
-    assert summary(recording, Selection())["samples"][f"khala/{RUN}/blue/Stalkers/image/1"] == 2
+    assert summary(recording, StepSelection())["samples"][f"khala/{RUN}/blue/Stalkers/image/1"] == 2
 
 
 @pytest.mark.parametrize(
@@ -169,11 +169,11 @@ async def test_a_recording_is_told_with_its_pictures(recording: Path) -> None:
 async def test_pictures_are_written_out_of_a_recording(
     recording: Path, tmp_path: Path, steps: Any, names: list[str]
 ) -> None:
-    saved = save_pictures(recording, Selection.of(None, steps), tmp_path / "out")
+    saved = save_pictures(recording, StepSelection.of(None, steps), tmp_path / "out")
     assert [path.name for path in saved] == [f"{step}-Stalkers-screen-{k}.png" for step in names for k in (0, 1)]
     assert all(path.read_bytes() in (b"one", b"three", BIG) for path in saved)
 
 
 async def test_a_directory_that_cannot_be_made_is_named(recording: Path) -> None:
     with pytest.raises(RecordingError, match=r"r\.mcap/x cannot be written: Not a directory"):
-        save_pictures(recording, Selection(), recording / "x")
+        save_pictures(recording, StepSelection(), recording / "x")

@@ -114,25 +114,25 @@ def written(directory: Path, **files: str) -> Path:
     return directory / f"{name}.yaml"
 
 
-def test_a_file_has_all_that_the_one_it_is_like_has_but_what_it_gives_itself(tmp_path: Path) -> None:
-    path = written(tmp_path, a=GOOD, b="like: a\nclock: token\n", c="like: b.yaml\nteams: [{name: C}]\n")
+def test_a_file_has_all_of_the_one_that_it_extends_but_what_it_gives_itself(tmp_path: Path) -> None:
+    path = written(tmp_path, a=GOOD, b="extends: a\nclock: token\n", c="extends: b.yaml\nteams: [{name: C}]\n")
     assert load(path, Match) == Match(task="2s3z", clock="token", teams=[Team(name="C")], limits={"usd": 1.5})
 
 
-LIKE_ERRORS = [
-    ({"b": "\nlike: a\n"}, "b.yaml:2 (like): there is no file a.yaml for it"),
-    ({"b": "like: b\n"}, "b.yaml:1 (like): this file is like itself"),
-    ({"a": "like: b\n", "b": "like: a\n"}, "a.yaml:1 (like): this file is like itself"),
-    ({"a": "clock: token\nteams: [{name: A, size: 0}]\n", "b": "task: x\nlike: a\n"},
+EXTENDS_ERRORS = [
+    ({"b": "\nextends: a\n"}, "b.yaml:2 (extends): there is no file a.yaml for it"),
+    ({"b": "extends: b\n"}, "b.yaml:1 (extends): this file extends itself"),
+    ({"a": "extends: b\n", "b": "extends: a\n"}, "a.yaml:1 (extends): this file extends itself"),
+    ({"a": "clock: token\nteams: [{name: A, size: 0}]\n", "b": "task: x\nextends: a\n"},
      "a.yaml:2 (teams.0.size): input should be greater than or equal to 1, not 0"),
-    ({"a": GOOD, "b": "like: a\n\ntask: unknown\n"}, "b.yaml:3 (task): there is no task of this name"),
-    ({"a": "task: unknown\n", "b": "like: a\nclock: slow\n"},
+    ({"a": GOOD, "b": "extends: a\n\ntask: unknown\n"}, "b.yaml:3 (task): there is no task of this name"),
+    ({"a": "task: unknown\n", "b": "extends: a\nclock: slow\n"},
      "b.yaml:2 (clock): 'slow' is none of 'frozen' or 'token' (and 1 more)"),
-    ({"a": "clock: token\n", "b": "like: a\n"}, "b.yaml:1 (task): is required and not given"),
+    ({"a": "clock: token\n", "b": "extends: a\n"}, "b.yaml:1 (task): is required and not given"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("files", "sentence"), LIKE_ERRORS, ids=[sentence for _, sentence in LIKE_ERRORS])
+@pytest.mark.parametrize(("files", "sentence"), EXTENDS_ERRORS, ids=[sentence for _, sentence in EXTENDS_ERRORS])
 def test_an_error_names_the_file_that_it_is_in(files: dict[str, str], sentence: str, tmp_path: Path) -> None:
     path = written(tmp_path, **files)
     with pytest.raises(ConfigError) as error:
@@ -140,6 +140,6 @@ def test_an_error_names_the_file_that_it_is_in(files: dict[str, str], sentence: 
     assert str(error.value).removeprefix(f"{tmp_path}/") == sentence
 
 
-def test_a_text_without_a_file_can_be_like_nothing() -> None:
+def test_a_text_without_a_file_can_extend_nothing() -> None:
     with pytest.raises(ConfigError, match="no such field"):
-        loads("like: a\ntask: x\n", Match, source="m")
+        loads("extends: a\ntask: x\n", Match, source="m")

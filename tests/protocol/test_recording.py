@@ -23,8 +23,8 @@ from khala_protocol.messages import (
     Casualties,
     ChatMessage,
     Clock,
-    Exchange,
     Message,
+    ModelCall,
     Observation,
     Reply,
     Report,
@@ -71,7 +71,7 @@ def agent_messages(agent: str, step: int) -> Iterator[Wire]:
         where
         | {"game_loop": 8 * step, "answer_within_s": 15, "text": f"seen {step} ünï", "view": View(time_s=0.4 * step)}
     )
-    yield Exchange.model_validate(
+    yield ModelCall.model_validate(
         where
         | {"attempt": 1, "model": "m", "endpoint": "http://x", "prompt": [ChatMessage(role="user", content="go")]}
         | {"completion": "<Stop()>", "status": "ok", "started_s": 0.0, "latency_s": 0.1}
@@ -160,7 +160,7 @@ def test_a_recording_tells_what_it_holds(path: Path) -> None:
     assert [observation.step for observation in recording.observations("B")] == [0, 1]
     assert [(reply.agent, reply.step) for reply in recording.replies(1)] == [("A", 1), ("B", 1)]
     assert recording.replies(1, episode=1) == ()
-    assert [exchange.agent for exchange in recording.of(Exchange)] == ["A", "B"] * 2
+    assert [exchange.agent for exchange in recording.of(ModelCall)] == ["A", "B"] * 2
 
 
 def test_a_recording_is_read_step_by_step(path: Path) -> None:
@@ -200,7 +200,7 @@ def test_each_payload_obeys_the_schema_that_stands_beside_it(path: Path) -> None
             jsonschema.Draft202012Validator.check_schema(content)
             jsonschema.validate(json.loads(message.data), content)
             seen.add(schema.name)
-    names = "Run Briefing Observation Reply Message Exchange Report Result"
+    names = "Run Briefing Observation Reply Message ModelCall Report Result"
     assert seen == {f"khala.{name}" for name in names.split()}
 
 

@@ -131,13 +131,13 @@ class LLMError(KhalaError):
         super().__init__(message)
 
 
-class Refused(LLMError):
+class RequestRefused(LLMError):
     """The endpoint will never accept this request."""
 
     may_be_billed = False
 
 
-class Unauthorized(Refused):
+class Unauthorized(RequestRefused):
     """The endpoint does not accept the key."""
 
 
@@ -147,7 +147,7 @@ class OutOfMoney(LLMError):
     may_be_billed = False
 
 
-class Unavailable(LLMError):
+class EndpointUnavailable(LLMError):
     """The endpoint cannot answer now.
 
     Attributes:

@@ -23,13 +23,13 @@ from pydantic_core import from_json
 
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.client import (
+    EndpointUnavailable,
     LLMError,
     MalformedCompletion,
     OutOfMoney,
-    Refused,
+    RequestRefused,
     TryTimeout,
     Unauthorized,
-    Unavailable,
     Unreachable,
 )
 from khala_agents.llm.retry import is_retried
@@ -145,8 +145,8 @@ def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes
     if status == 402 or code in _SPENT_CODES:
         return OutOfMoney(f"{said}; the account has no money or quota left", status=name)
     if is_retried(status):
-        return Unavailable(said, status=name, retry_after_s=retry_after_s(headers))
-    return Refused(said, status=name)
+        return EndpointUnavailable(said, status=name, retry_after_s=retry_after_s(headers))
+    return RequestRefused(said, status=name)
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

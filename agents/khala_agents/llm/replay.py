@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 from khala_agents.llm.client import (
     Completion,
+    EndpointUnavailable,
     LLMError,
     MalformedCompletion,
     Request,
     Scalar,
     TryTimeout,
-    Unavailable,
     Unreachable,
     prompt_sha256,
 )
@@ -24,7 +24,7 @@ from khala_agents.llm.client import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from khala_protocol.messages import ChatMessage, Exchange
+    from khala_protocol.messages import ChatMessage, ModelCall
 
 Key = tuple[str, int, int, int]
 
@@ -41,8 +41,8 @@ class NotRecorded(LLMError):
 class ReplayClient:
     """An `LLMClient` that answers from recorded exchanges, of one agent or of several."""
 
-    def __init__(self, exchanges: Iterable[Exchange]) -> None:
-        self._recorded: dict[Key, Exchange] = {(e.agent, e.episode, e.step, e.attempt): e for e in exchanges}
+    def __init__(self, exchanges: Iterable[ModelCall]) -> None:
+        self._recorded: dict[Key, ModelCall] = {(e.agent, e.episode, e.step, e.attempt): e for e in exchanges}
         first = next(iter(self._recorded.values()), None)
         self.model = first.model if first else "replay"
         self.endpoint = first.endpoint if first else "recording"
@@ -71,7 +71,7 @@ class ReplayClient:
     async def close(self) -> None:
         """Does nothing."""
 
-    def _look_up(self, request: Request) -> Exchange:
+    def _look_up(self, request: Request) -> ModelCall:
         agent, episode, step, attempt = key = _key(request)
         exchange = self._recorded.get(key)
         if exchange is None:
@@ -88,7 +88,7 @@ class _Final(LLMError):
     """A failure that was not tried again then, and so is not now."""
 
     @classmethod
-    def of(cls, exchange: Exchange) -> LLMError:
+    def of(cls, exchange: ModelCall) -> LLMError:
         status = "timeout" if exchange.status == "cancelled" else exchange.status
         kind = _FinalUnbilled if status.startswith("http ") else cls
         return kind(f"recorded: {exchange.status}", status=status)
@@ -98,7 +98,7 @@ class _FinalUnbilled(_Final):
     may_be_billed: ClassVar[bool] = False
 
 
-def _passing(exchange: Exchange) -> LLMError:
+def _passing(exchange: ModelCall) -> LLMError:
     text = f"recorded: {exchange.status}"
     match exchange.status:
         case "timeout" | "cancelled":
@@ -107,7 +107,7 @@ def _passing(exchange: Exchange) -> LLMError:
             return Unreachable(text)
         case "malformed":
             return MalformedCompletion(text)
-    return Unavailable(text, status=exchange.status)
+    return EndpointUnavailable(text, status=exchange.status)
 
 
 def _key(request: Request) -> Key:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import Field
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception, stop_after_attempt
 
-from khala_agents.llm.client import LLMError, Unavailable
+from khala_agents.llm.client import EndpointUnavailable, LLMError
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _wait(rule: RetryRule, rng: random.Random) -> Callable[[RetryCallState], flo
         error = state.outcome.exception() if state.outcome else None
         doubled = rule.base_s * 2.0 ** (state.attempt_number - 1)
         backoff = min(doubled, rule.cap_s) + rng.random() * rule.jitter_s
-        asked = error.retry_after_s if isinstance(error, Unavailable) else None
+        asked = error.retry_after_s if isinstance(error, EndpointUnavailable) else None
         return backoff if asked is None else max(backoff, asked)
 
     return wait_s

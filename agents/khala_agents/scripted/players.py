@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, Literal
 
-from khala_agents.scripted.reading import Action, Situation, Team, Unit, read
+from khala_agents.scripted.reading import Situation, TextAction, TextTeam, TextUnit, read
 from khala_agents.scripted.skilled import skilled
 from khala_agents.scripted.writing import call, inside, point, reply
 
@@ -73,7 +73,7 @@ PLAYERS: dict[PlayerName, Callable[[str, random.Random], str]] = {
 # --- whom to shoot ----------------------------------------------------------------------------------
 
 
-def in_reach(team: Team) -> list[Unit]:
+def in_reach(team: TextTeam) -> list[TextUnit]:
     """The enemies that are about as near as the nearest one."""
     if not team.enemies:
         return []
@@ -81,18 +81,18 @@ def in_reach(team: Team) -> list[Unit]:
     return [unit for unit in team.enemies if unit.distance <= nearest + REACH or math.isinf(nearest)]
 
 
-def _common_target(teams: Iterable[Team]) -> Unit | None:
+def _common_target(teams: Iterable[TextTeam]) -> TextUnit | None:
     """The enemy that most teams reach; of those the weakest, then the nearest."""
     seen = [unit for team in teams for unit in in_reach(team)]
     reached_by = Counter(unit.tag for unit in seen)
     return min(seen, key=lambda unit: (-reached_by[unit.tag], *_weakness(unit)), default=None)
 
 
-def _weakness(unit: Unit) -> tuple[float, float, str]:
+def _weakness(unit: TextUnit) -> tuple[float, float, str]:
     return unit.hit_points, unit.distance, unit.tag
 
 
-def _fight(team: Team, target: Unit | None) -> list[str]:
+def _fight(team: TextTeam, target: TextUnit | None) -> list[str]:
     actions = {action.name: action for action in team.actions}
     reached = in_reach(team)
     if reached and "Attack_Unit" in actions:
@@ -105,7 +105,7 @@ def _fight(team: Team, target: Unit | None) -> list[str]:
     return []
 
 
-def _middle(team: Team) -> tuple[float, float]:
+def _middle(team: TextTeam) -> tuple[float, float]:
     """Where the allies of a team are, on its screen."""
     x = sum(unit.x for unit in team.allies) / len(team.allies)
     y = sum(unit.y for unit in team.allies) / len(team.allies)
@@ -115,7 +115,7 @@ def _middle(team: Team) -> tuple[float, float]:
 # --- arguments --------------------------------------------------------------------------------------
 
 
-def _pools(action: Action, team: Team) -> list[list[Unit]]:
+def _pools(action: TextAction, team: TextTeam) -> list[list[TextUnit]]:
     """For each tag that an action takes, the units that it may be."""
     hostile = any(word in action.name for word in ("Attack", "Storm", "Feedback", "Beam", "Stasis"))
     targets = team.enemies if hostile else team.allies or team.own
@@ -125,7 +125,7 @@ def _pools(action: Action, team: Team) -> list[list[Unit]]:
     return [targets] * count
 
 
-def _random_values(action: Action, team: Team, rng: random.Random) -> list[str]:
+def _random_values(action: TextAction, team: TextTeam, rng: random.Random) -> list[str]:
     pools = iter(_pools(action, team))
     values = []
     for kind in action.args:

@@ -64,7 +64,7 @@ POWERFUL = frozenset({"Pylon", "WarpPrismPhasing"})
 """Types that give power."""
 
 
-class Unit(NamedTuple):
+class TextUnit(NamedTuple):
     """A unit on a team's screen, as its line tells."""
 
     tag: str
@@ -105,7 +105,7 @@ class Price(NamedTuple):
     times: int = 1
 
 
-class Action(NamedTuple):
+class TextAction(NamedTuple):
     """A valid action and the kinds of its arguments."""
 
     name: str
@@ -113,14 +113,14 @@ class Action(NamedTuple):
 
 
 @dataclass(slots=True)
-class Team:
+class TextTeam:
     """A team, as its block and its line of valid actions tell."""
 
     name: str
-    own: list[Unit] = field(default_factory=list)
-    allies: list[Unit] = field(default_factory=list)
-    enemies: list[Unit] = field(default_factory=list)
-    actions: list[Action] = field(default_factory=list)
+    own: list[TextUnit] = field(default_factory=list)
+    allies: list[TextUnit] = field(default_factory=list)
+    enemies: list[TextUnit] = field(default_factory=list)
+    actions: list[TextAction] = field(default_factory=list)
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
     hit: set[str] = field(default_factory=set)
@@ -140,7 +140,7 @@ class Team:
 class Situation:
     """All that was understood of an observation."""
 
-    teams: dict[str, Team] = field(default_factory=dict)
+    teams: dict[str, TextTeam] = field(default_factory=dict)
     max_actions: int = 1
     correspondents: list[str] = field(default_factory=list)
     time_s: float = 0.0
@@ -200,8 +200,8 @@ def points(text: str) -> list[Point]:
     return [(float(x), float(y)) for x, y in _AT.findall(text)]
 
 
-def _team(situation: Situation, name: str) -> Team:
-    return situation.teams.setdefault(name, Team(name))
+def _team(situation: Situation, name: str) -> TextTeam:
+    return situation.teams.setdefault(name, TextTeam(name))
 
 
 def _read_game(situation: Situation, body: str) -> None:
@@ -244,7 +244,7 @@ def _read_task(situation: Situation, body: str) -> None:
     situation.task = " ".join(general)
 
 
-def _read_team(team: Team, body: str) -> None:
+def _read_team(team: TextTeam, body: str) -> None:
     groups = {"Your": team.own, "Allied": team.allies, "Enemy": team.enemies}
     for whose, lines in _UNITS.findall(body):
         groups[whose] += [unit for line in lines.splitlines() if (unit := _unit(line.strip()))]
@@ -258,7 +258,7 @@ def _read_team(team: Team, body: str) -> None:
 
 
 @functools.lru_cache(4096)
-def _unit(line: str) -> Unit | None:
+def _unit(line: str) -> TextUnit | None:
     """A unit of its line; None for a line that is no unit with a tag, a place and health."""
     name, *parts = line.split(" | ")
     fields: dict[str, str] = {}
@@ -269,7 +269,7 @@ def _unit(line: str) -> Unit | None:
     if tag is None or at is None or health is None:
         return None
     shield = _PART.match(fields.get("shield", ""))
-    return Unit(
+    return TextUnit(
         tag=tag[1],
         type=name.split(" ")[0],
         x=float(at[1]),
@@ -297,7 +297,7 @@ def _first(text: str, otherwise: float = 0.0) -> float:
 def _read_valid_actions(situation: Situation, body: str) -> None:
     for team, listed in _VALID.findall(body):
         _team(situation, team).actions += [
-            Action(name, tuple(args.split(", ")) if args else ()) for name, args in _ACTION.findall(listed)
+            TextAction(name, tuple(args.split(", ")) if args else ()) for name, args in _ACTION.findall(listed)
         ]
     for name, price, times in _COSTS.findall(body):
         amounts = {what: int(amount) for amount, what in _PRICE.findall(price)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from khala_agents.scripted.reading import Point, Team
+    from khala_agents.scripted.reading import Point, TextTeam
 
 MARGIN = 0.5
 """Distance that a point keeps from the edge of a screen, in its cells."""
@@ -23,7 +23,7 @@ def point(at: Point) -> str:
     return f"[{at[0]:.1f}, {at[1]:.1f}]"
 
 
-def inside(at: Point, team: Team) -> Point:
+def inside(at: Point, team: TextTeam) -> Point:
     """The point of a team's screen that is nearest to another one, and on the map."""
     x0, x1, y0, y1 = team.bounds
     return min(max(at[0], x0 + MARGIN), x1 - MARGIN), min(max(at[1], y0 + MARGIN), y1 - MARGIN)

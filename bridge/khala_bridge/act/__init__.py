@@ -7,7 +7,7 @@ out.
 """
 
 from khala_bridge.act.actor import Actor, JointAction, executor_of
-from khala_bridge.act.plan import Executor, Plan, Played, Refusal, Step
+from khala_bridge.act.plan import Executor, GameRefusal, Plan, PlanStep, Played
 from khala_bridge.act.translate import Command
 
-__all__ = ["Actor", "Command", "Executor", "JointAction", "Plan", "Played", "Refusal", "Step", "executor_of"]
+__all__ = ["Actor", "Command", "Executor", "GameRefusal", "JointAction", "Plan", "PlanStep", "Played", "executor_of"]

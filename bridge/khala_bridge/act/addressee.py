@@ -19,7 +19,7 @@ import difflib
 import re
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.refused import Refused
+from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.vocabulary import squashed
 
 if TYPE_CHECKING:
@@ -58,10 +58,10 @@ class Addressees:
             tags: the tags among its arguments.
 
         Raises:
-            Refused: no team is meant, or one that is not there, or more than one may be.
+            CallRejected: no team is meant, or one that is not there, or more than one may be.
         """
         if not self._agent.teams:
-            raise Refused("unknown_team", "You have no units left, so no team can act.")
+            raise CallRejected("unknown_team", "You have no units left, so no team can act.")
         if heading is None:
             return [self._unnamed(action, tags)]
         named = self._named(heading, action)
@@ -89,7 +89,7 @@ class Addressees:
             if len(candidates) == 1:
                 return candidates[0]
         ask = 'write "Team <name>:" above the action'
-        raise Refused("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
+        raise CallRejected("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
 
     def _named(self, heading: str, action: Action) -> Sequence[TeamObservation]:
         """The teams that a heading names."""
@@ -102,10 +102,10 @@ class Addressees:
         if len(several) > 1 and None not in several:
             return list({team.view.name: team for team in several if team is not None}.values())
         if plain in map(squashed, self._agent.idle_teams):
-            raise Refused("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
+            raise CallRejected("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
         close = difflib.get_close_matches(plain, self._by_name, n=1, cutoff=0.75)
         meant = f"did you mean {self._by_name[close[0]].view.name}? Your" if close else "your"
-        raise Refused("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
+        raise CallRejected("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
 
     def _one(self, name: str) -> TeamObservation | None:
         """The one team that a name can mean."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_bridge.catalogue.action import Action
-    from khala_bridge.knowledge import AbilityFacts, UnitType
+    from khala_bridge.knowledge import AbilityFacts, UnitFacts
     from khala_bridge.state import Unit
 
 _STATES: dict[str, Callable[[Unit], bool]] = {
@@ -82,7 +82,7 @@ def needs_sight(action: Action) -> bool:
     return facts is not None and facts.target != "unit" and "visible" in facts.must
 
 
-def _is(word: str, unit: Unit, known: UnitType | None) -> bool | None:
+def _is(word: str, unit: Unit, known: UnitFacts | None) -> bool | None:
     """Whether a word of the filters holds for a unit; None if nothing is known of its type."""
     if word in _STATES:
         return _STATES[word](unit)

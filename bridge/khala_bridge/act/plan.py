@@ -11,7 +11,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
-from khala_bridge.act.recognise import Refused, reject
+from khala_bridge.act.recognise import CallRejected, reject
 from khala_bridge.names import order_name
 from khala_bridge.state import Snapshot
 
@@ -26,7 +26,7 @@ GameAction: TypeAlias = Any
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PlanStep:
     """What enters one `SC2Env.step`."""
 
     actions: tuple[GameAction, ...]
@@ -35,7 +35,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class GameRefusal:
     """A command that did not do what was asked, found out while it was played."""
 
     agent: str
@@ -48,10 +48,10 @@ class Played:
 
     functions: tuple[str, ...] = ()
     """What entered the game, in PySC2's words."""
-    refusals: tuple[Refusal, ...] = ()
+    refusals: tuple[GameRefusal, ...] = ()
 
 
-Plan: TypeAlias = Generator[Step, Snapshot, Played]
+Plan: TypeAlias = Generator[PlanStep, Snapshot, Played]
 
 
 class Executor(Protocol):
@@ -64,18 +64,20 @@ class Executor(Protocol):
         """A plan that carries the commands out and lets `loops` game loops pass, or more if it needs them."""
 
 
-def refuse(command: Command, why: str) -> Refusal | None:
+def refuse(command: Command, why: str) -> GameRefusal | None:
     """The game said no to a command; `why` is the end of a sentence. None if it was the host's own command."""
     said = command.said
     if said is None:
         return None
     message = f"The game refused {said.action.name}: {why}."
-    return Refusal(said.team.team.agent, reject(said.call, Refused("refused_by_game", message), said.team.view.name))
+    return GameRefusal(
+        said.team.team.agent, reject(said.call, CallRejected("refused_by_game", message), said.team.view.name)
+    )
 
 
-def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[Refusal, ...]:
+def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameRefusal, ...]:
     """The refusals among the errors that the game reported; one for each command at most."""
-    found: dict[int, Refusal | None] = {}
+    found: dict[int, GameRefusal | None] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
         same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.plan import Plan, Played, Step, listed, refused_by_game, written
+from khala_bridge.act.plan import Plan, PlanStep, Played, listed, refused_by_game, written
 from khala_bridge.state.requests import autocast_switch, unit_order
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class RawExecutor:
 
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:  # noqa: ARG002  # the other executor looks at it
         """One step with all commands, and `loops` game loops."""
-        after = yield Step(tuple(_action(command) for command in commands), loops)
+        after = yield PlanStep(tuple(_action(command) for command in commands), loops)
         return Played(tuple(_words(command) for command in commands), refused_by_game(commands, after))
 
 

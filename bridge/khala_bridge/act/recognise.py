@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.refused import Refused, reject
+from khala_bridge.act.rejected import CallRejected, reject
 from khala_protocol.speech import written
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe.observation import TeamObservation
     from khala_protocol.messages import Call, Point, Rejection
 
-__all__ = ["Recognised", "Refused", "recognise", "reject"]
+__all__ = ["CallRejected", "Recognised", "recognise", "reject"]
 
 EXAMPLES: dict[ArgKind, str] = {"tag": "0x100140001", "screen": "[12, 9.5]", "minimap": "[30, 41]"}
 _SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, no tags
@@ -73,7 +73,7 @@ def recognise(call: Call, words: Vocabulary, addressees: Addressees) -> list[Rec
         action = _action(call, words, addressees)
         tags, point = _arguments(call, action)
         teams = addressees.meant(call.team, action, tags)
-    except Refused as refused:
+    except CallRejected as refused:
         return reject(call, refused)
     return [Recognised(call, action, team, tags, point) for team in teams]
 
@@ -82,7 +82,7 @@ def _action(call: Call, words: Vocabulary, addressees: Addressees) -> Action:
     if action := words.find(call.name):
         return action
     hint = words.hint(call.name, addressees.listening(call.team))
-    raise Refused("unknown_action", f"There is no action {call.name}; {hint}")
+    raise CallRejected("unknown_action", f"There is no action {call.name}; {hint}")
 
 
 def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | None]:
@@ -93,7 +93,7 @@ def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | Non
     points = [value for value in given if isinstance(value, tuple)]
     wanted = action.args.count("tag")
     if len(given) != len(action.args) or len(tags) != wanted or len(points) != len(action.args) - wanted:
-        raise Refused("wrong_arguments", _right_form(action))
+        raise CallRejected("wrong_arguments", _right_form(action))
     return tags, points[0] if points else None
 
 

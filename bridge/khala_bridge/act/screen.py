@@ -25,7 +25,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.aim import RealScreen
-from khala_bridge.act.plan import Plan, Played, Refusal, Step, refuse, refused_by_game, written
+from khala_bridge.act.plan import GameRefusal, Plan, PlanStep, Played, refuse, refused_by_game, written
 from khala_bridge.act.select import Hand, Missed
 from khala_bridge.catalogue.functions import raw_forms
 from khala_bridge.compat import actions as pysc2
@@ -86,18 +86,18 @@ class _Tour:
         self.now = snapshot
         self.loops = 0
         self.functions: list[str] = []
-        self.refusals: list[Refusal] = []
+        self.refusals: list[GameRefusal] = []
         self._hand = Hand(self, groups)
         self._wanted: WorldPoint | None = None
 
-    def step(self, action: GameAction | None, loops: int = 1) -> Generator[Step, Snapshot, None]:
+    def step(self, action: GameAction | None, loops: int = 1) -> Generator[PlanStep, Snapshot, None]:
         """Lets something enter the game, and loops pass."""
-        self.now = yield Step(() if action is None else (action,), loops)
+        self.now = yield PlanStep(() if action is None else (action,), loops)
         self.loops += loops
         if self.now.ended:
             raise _EpisodeOver
 
-    def look_at(self, place: WorldPoint) -> Generator[Step, Snapshot, None]:
+    def look_at(self, place: WorldPoint) -> Generator[PlanStep, Snapshot, None]:
         """Moves the camera, unless it is there or was sent there last."""
         if self._wanted is not None and math.dist(place, self._wanted) < SAME_PLACE:
             return
@@ -105,13 +105,13 @@ class _Tour:
         self.functions.append(written("camera_move", f"[{place.x:.1f}, {place.y:.1f}]"))
         yield from self.step(camera_move(place))
 
-    def function(self, name: str, *arguments: object) -> Generator[Step, Snapshot, None]:
+    def function(self, name: str, *arguments: object) -> Generator[PlanStep, Snapshot, None]:
         """Calls a function of PySC2."""
         shown = [list(value) if isinstance(value, tuple) else value for value in arguments]
         self.functions.append(written(name, *shown))
         yield from self.step(pysc2.FUNCTIONS[name](*arguments))
 
-    def visit(self, commands: Sequence[Command]) -> Generator[Step, Snapshot, None]:
+    def visit(self, commands: Sequence[Command]) -> Generator[PlanStep, Snapshot, None]:
         """Carries out the commands of one team."""
         home = _home(commands[0])
         if home is not None:
@@ -127,7 +127,7 @@ class _Tour:
         if refusal := refuse(command, why):
             self.refusals.append(refusal)
 
-    def _call(self, command: Command) -> Generator[Step, Snapshot, None]:
+    def _call(self, command: Command) -> Generator[PlanStep, Snapshot, None]:
         function = command.function
         if function.id not in self.now.functions:
             raise Missed(f"{function.name} is not available to what is selected")
@@ -157,7 +157,7 @@ class _Tour:
             return unit
         raise Missed("the target is gone")
 
-    def _pixel(self, command: Command) -> Generator[Step, Snapshot, Pixel]:
+    def _pixel(self, command: Command) -> Generator[PlanStep, Snapshot, Pixel]:
         """Where to click for the target, with the camera moved if that is needed."""
         for place in (None, _home(command), self._place(command)):
             if place is not None:

@@ -15,12 +15,12 @@ from khala_bridge.state.teams import WORKERS
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
-    from khala_bridge.act.plan import Step
+    from khala_bridge.act.plan import PlanStep
     from khala_bridge.act.translate import Command
     from khala_bridge.frames import WorldPoint
     from khala_bridge.state import Snapshot
 
-    Way: TypeAlias = Generator[Step, Snapshot, None]
+    Way: TypeAlias = Generator[PlanStep, Snapshot, None]
 
 TRIES = 2
 """Clicks on one unit before it is given up."""

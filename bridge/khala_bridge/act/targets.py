@@ -13,7 +13,7 @@ import operator
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.filters import needs_sight, unfit
-from khala_bridge.act.refused import Refused
+from khala_bridge.act.rejected import CallRejected
 from khala_bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
@@ -51,7 +51,7 @@ class Targets:
         """The units that the first arguments name.
 
         Raises:
-            Refused: one of them is no unit of the team, or named twice.
+            CallRejected: one of them is no unit of the team, or named twice.
         """
         tags = said.tags[: said.action.named]
         for tag in tags:
@@ -59,14 +59,14 @@ class Targets:
                 raise self._not_of_team(said, tag)
         if twice := [tag for place, tag in enumerate(tags) if tag in tags[:place]]:
             what = f"{said.action.name} takes two different units, {hex(twice[0])} stands there twice."
-            raise Refused("wrong_arguments", what)
+            raise CallRejected("wrong_arguments", what)
         return tags
 
     def unit(self, said: Recognised) -> Unit:
         """The unit that the last tag names.
 
         Raises:
-            Refused: there is none, it is dead or out of sight, or the action cannot be used on it.
+            CallRejected: there is none, it is dead or out of sight, or the action cannot be used on it.
         """
         tag, anywhere = said.tags[-1], said.action.rule is not None or said.team.camera is None
         unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
@@ -76,19 +76,21 @@ class Targets:
             raise self._out_of_sight(said, unit)
         if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
             what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
-            raise Refused("invalid_target", f"{what}; {said.action.name} needs {reason}.")
+            raise CallRejected("invalid_target", f"{what}; {said.action.name} needs {reason}.")
         return unit
 
     def place(self, said: Recognised) -> WorldPoint:
         """The point among the arguments, in the world.
 
         Raises:
-            Refused: it lies outside of its frame, beyond the edge of the map, or where it would have to be seen.
+            CallRejected: it lies outside of its frame, beyond the edge of the map, or where it would have to be seen.
         """
         point = self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
         if needs_sight(said.action) and not self._is_seen(point):
             where = f"[{said.point[0]:g}, {said.point[1]:g}]" if said.point else "The place"
-            raise Refused("invalid_target", f"{where} is out of your sight; {said.action.name} needs a place in sight.")
+            raise CallRejected(
+                "invalid_target", f"{where} is out of your sight; {said.action.name} needs a place in sight."
+            )
         return point
 
     def instead(self, said: Recognised, place: WorldPoint) -> str:
@@ -114,13 +116,13 @@ class Targets:
     def _screen_point(self, said: Recognised) -> WorldPoint:
         name, camera = said.team.view.name, said.team.camera
         if camera is None:
-            raise Refused("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
+            raise CallRejected("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
         x, y = self._in_frame(said, "screen", camera.size, "minimap", self._sight.map.minimap_size)
         point = camera.world(ScreenPoint(x, y))
         if not self._sight.map.holds(point):
             x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
             inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
+            raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
         return point
 
     def _minimap_point(self, said: Recognised) -> WorldPoint:
@@ -128,7 +130,9 @@ class Targets:
         x, y = self._in_frame(said, "minimap", self._sight.map.minimap_size, "screen", screen)
         point = self._sight.map.world(MinimapPoint(x, y))
         if not self._sight.map.holds(point):
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map.")
+            raise CallRejected(
+                "out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map."
+            )
         return point
 
     def _in_frame(self, said: Recognised, frame: str, size: float, other: str, its_size: float) -> tuple[float, float]:
@@ -137,13 +141,15 @@ class Targets:
         if 0 <= x <= size and 0 <= y <= size:
             return x, y
         if not (0 <= x <= its_size and 0 <= y <= its_size):
-            raise Refused("out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}.")
+            raise CallRejected(
+                "out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}."
+            )
         sister = said.action.name.replace(frame.capitalize(), other.capitalize())
         agent = self._sight.agents[said.team.team.agent].agent
         has_sister = sister in {action.name for action in agent.catalogue()}
         hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
         where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
-        raise Refused("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
+        raise CallRejected("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
 
     # --- tags that are wrong ----------------------------------------------------------------------------------
 
@@ -152,35 +158,35 @@ class Targets:
         """What is there under the fog as far as the side knows: resources and structures that it saw once."""
         return self._sight.snapshot.known
 
-    def _nowhere(self, said: Recognised, tag: int) -> Refused:
+    def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
         if tag in self._sight.snapshot.dead:
-            return Refused("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
+            return CallRejected("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
         wanted = said.action.target
         fits = [unit.tag for unit in self._units.values() if self._may_be_meant(said, unit, wanted)]
         hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
-        return Refused("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
+        return CallRejected("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
 
     def _may_be_meant(self, said: Recognised, unit: Unit, wanted: str | None) -> bool:
         if said.team.camera is not None and not _shows(said.team.camera, unit):
             return False
         return wanted is None or unit.is_enemy == (wanted == "enemy")
 
-    def _not_of_team(self, said: Recognised, tag: int) -> Refused:
+    def _not_of_team(self, said: Recognised, tag: int) -> CallRejected:
         name, own = said.team.view.name, said.team.team.tags
         if tag in self._sight.snapshot.dead:
-            return Refused("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
+            return CallRejected("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
         units = f"units of team {name} are {', '.join(map(hex, own))}"
         unit = self._units.get(tag)
         if unit is None:
             hint = self._near_miss(tag, own) or f"{units}."
-            return Refused("unknown_target", f"There is no unit {hex(tag)}; {hint}")
+            return CallRejected("unknown_target", f"There is no unit {hex(tag)}; {hint}")
         what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
         if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
             right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
-            return Refused("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
+            return CallRejected("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
         owner = self._team_of(tag)
         whose = f" of team {owner}" if owner else ""
-        return Refused("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
+        return CallRejected("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
 
     def _team_of(self, tag: int) -> str | None:
         teams = (team for agent in self._sight.agents.values() for team in agent.teams)
@@ -195,11 +201,11 @@ class Targets:
             return None
         return f"did you mean {hex(meant)} ({self._units[meant].name})?"
 
-    def _out_of_sight(self, said: Recognised, unit: Unit) -> Refused:
+    def _out_of_sight(self, said: Recognised, unit: Unit) -> CallRejected:
         x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
         what = f"{_SIDES[unit.alliance]} {unit.name} {hex(unit.tag)}"
         away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
-        return Refused("unknown_target", f"The {what} {away}; move there first.")
+        return CallRejected("unknown_target", f"The {what} {away}; move there first.")
 
 
 def _slips(wanted: str, known: str) -> int | None:

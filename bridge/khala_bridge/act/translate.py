@@ -19,9 +19,9 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.refused import Refused, reject
+from khala_bridge.act.rejected import CallRejected, reject
 from khala_bridge.act.targets import Targets
-from khala_bridge.auto import RULES, Ask, Impossible, Order
+from khala_bridge.auto import RULES, NotAvailable, RuleOrder, RuleRequest
 from khala_bridge.frames import WorldPoint
 from khala_bridge.knowledge import knowledge
 from khala_bridge.names import buff_name
@@ -76,11 +76,11 @@ class Translator:
         """Commands for a call: none for an action that orders nothing, two if only some of its units have to wait."""
         try:
             orders = self._orders(said)
-        except Refused as refused:
+        except CallRejected as refused:
             return reject(said.call, refused, said.team.view.name)
         return [command for order in orders for command in self.commands(order, said)]
 
-    def commands(self, order: Order, said: Recognised | None = None) -> list[Command]:
+    def commands(self, order: RuleOrder, said: Recognised | None = None) -> list[Command]:
         """An order in its place behind those that its units were given before in this turn."""
         queues = said is not None and said.action.queue
         first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
@@ -89,11 +89,11 @@ class Translator:
         found = [Command(said, order.function, first, order.target, order.queued)] if first else []
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
 
-    def _orders(self, said: Recognised) -> list[Order]:
+    def _orders(self, said: Recognised) -> list[RuleOrder]:
         """What a call orders; it is counted if it can be carried out.
 
         Raises:
-            Refused: it cannot.
+            CallRejected: it cannot.
         """
         count = (said.team.team.agent, said.team.team.name)
         if said.action.rule is not None:
@@ -103,13 +103,13 @@ class Translator:
         if not self._may_say(count):
             allowed = self._max_actions[said.team.team.agent]
             limit = f"{allowed} action{'s' if allowed > 1 else ''}"
-            raise Refused("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
+            raise CallRejected("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
         self._count[count] = self._count.get(count, 0) + 1
         if said.action.rule is None:
             self._book(found)
         return found
 
-    def _book(self, orders: Iterable[Order]) -> None:
+    def _book(self, orders: Iterable[RuleOrder]) -> None:
         """Takes from the ledger what orders cost and which units they keep busy; rules do so themselves.
 
         Energy only of a single unit: of a group that casts at one target, the game chooses who does it.
@@ -133,18 +133,18 @@ class Translator:
     def _may_say(self, count: tuple[str, str]) -> bool:
         return self._count.get(count, 0) < self._max_actions[count[0]]
 
-    def _by_rule(self, said: Recognised, rule: str) -> list[Order]:
+    def _by_rule(self, said: Recognised, rule: str) -> list[RuleOrder]:
         """What a rule makes of a call; it takes the price from the ledger itself."""
         units = self._having(said, self._units(said)) if said.team.team.tags else ()
         tag = self._targets.unit(said).tag if said.action.target_kind == "tag" else None
         point = None if said.point is None else self._targets.place(said)
         try:
-            return RULES[rule](Ask(said.action, self._snapshot, self.ledger, units, tag, point))
-        except Impossible as impossible:
+            return RULES[rule](RuleRequest(said.action, self._snapshot, self.ledger, units, tag, point))
+        except NotAvailable as impossible:
             better = "" if impossible.place is None else self._targets.instead(said, impossible.place)
-            raise Refused(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
+            raise CallRejected(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
 
-    def _as_said(self, said: Recognised) -> list[Order]:
+    def _as_said(self, said: Recognised) -> list[RuleOrder]:
         """The order of a call whose words say it all."""
         function = said.action.pysc2
         if function is None and not said.team.team.tags:
@@ -155,11 +155,11 @@ class Translator:
         able = self._able(said, function, units)
         match said.action.target_kind:
             case None:
-                return [Order(function, able)]
+                return [RuleOrder(function, able)]
             case "tag":
                 return [self._at_unit(said, function, able)]
             case _:
-                return [Order(function, able, self._targets.place(said))]
+                return [RuleOrder(function, able, self._targets.place(said))]
 
     # --- who --------------------------------------------------------------------------------------------------
 
@@ -200,29 +200,31 @@ class Translator:
         return able[: self.ledger.payable(FREE if one is None else price_of(one) for one in facts)]
 
     @staticmethod
-    def _cannot(said: Recognised, reasons: list[str]) -> Refused:
+    def _cannot(said: Recognised, reasons: list[str]) -> CallRejected:
         why = "; ".join(dict.fromkeys(reasons))
-        return Refused("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
+        return CallRejected("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
 
     # --- at what ----------------------------------------------------------------------------------------------
 
-    def _at_unit(self, said: Recognised, function: Function, able: tuple[int, ...]) -> Order:
+    def _at_unit(self, said: Recognised, function: Function, able: tuple[int, ...]) -> RuleOrder:
         """The order at the unit that is named, for those of the able ones that it can be aimed at by."""
         unit = self._targets.unit(said)
         if said.action.aim == "place":
-            return Order(function, able, WorldPoint(unit.pos.x, unit.pos.y))
+            return RuleOrder(function, able, WorldPoint(unit.pos.x, unit.pos.y))
         aiming = tuple(tag for tag in able if tag != unit.tag)
         if is_attack(function):
             aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
             where = "in the air" if _is_aloft(unit) else "on the ground"
             what = f"{hex(unit.tag)} is a {unit.name} {where}"
             if not aiming:
-                raise Refused("invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that.")
+                raise CallRejected(
+                    "invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that."
+                )
         if not aiming:
-            raise Refused(
+            raise CallRejected(
                 "invalid_target", f"{hex(unit.tag)} is the unit itself; {said.action.name} needs another one."
             )
-        return Order(function, aiming, unit.tag)
+        return RuleOrder(function, aiming, unit.tag)
 
     @staticmethod
     def _hits(unit: Unit, target: Unit) -> bool:

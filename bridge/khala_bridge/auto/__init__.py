@@ -8,12 +8,12 @@ from khala_bridge.auto.build import build_at, build_auto, build_near, lock_base
 from khala_bridge.auto.cast import cancel_building, cast, recall_near, stop_building
 from khala_bridge.auto.chrono import chrono_economy, chrono_military, chrono_research
 from khala_bridge.auto.produce import morph_warpgates, research, train
-from khala_bridge.auto.rule import Ask, Impossible, Order, Rule
+from khala_bridge.auto.rule import NotAvailable, Rule, RuleOrder, RuleRequest
 from khala_bridge.auto.scouting import scout
 from khala_bridge.auto.spread import creep_tumor, inject, mule
 from khala_bridge.auto.warp import warp_auto, warp_near
 
-__all__ = ["RULES", "Ask", "Impossible", "Order", "Rule"]
+__all__ = ["RULES", "NotAvailable", "Rule", "RuleOrder", "RuleRequest"]
 
 RULES: dict[str, Rule] = {
     "train": train,

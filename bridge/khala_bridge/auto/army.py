@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_bridge.auto.places import front
-from khala_bridge.auto.rule import Order, never
+from khala_bridge.auto.rule import RuleOrder, not_available
 from khala_bridge.auto.scouting import unseen_places
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
@@ -24,7 +24,7 @@ from khala_bridge.state.side import (
 )
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.state import Unit
 
 NEAR_ARMY: Final = 24.0
@@ -35,13 +35,13 @@ INTRUDES: Final = 15.0
 """Enemies so near to an own structure are intruders; the same."""
 
 
-def army_attack(ask: Ask) -> list[Order]:
+def army_attack(ask: RuleRequest) -> list[RuleOrder]:
     """Fights its way to enemies near the army, else to the nearest known enemy structure, else to where they may be.
 
     Of the enemies near it those that fight come first, then structures and workers.
 
     Raises:
-        Impossible: there is no army that is free.
+        NotAvailable: there is no army that is free.
     """
     units = _army(ask)
     middle = _middle(units)
@@ -52,13 +52,13 @@ def army_attack(ask: Ask) -> list[Order]:
     return _send(ask, units, unseen_places(ask.snapshot, middle)[0], fight=True)
 
 
-def army_defend(ask: Ask) -> list[Order]:
+def army_defend(ask: RuleRequest) -> list[RuleOrder]:
     """Fights intruders, those nearest to a town hall first; without any it waits in front of the foremost base.
 
     Queens fight intruders too, and do not wait.
 
     Raises:
-        Impossible: there is no army that is free.
+        NotAvailable: there is no army that is free.
     """
     units = _army(ask, home=True)
     homes = [place(unit) for unit in own_structures(ask.snapshot)]
@@ -71,26 +71,26 @@ def army_defend(ask: Ask) -> list[Order]:
     return _send(ask, units, _rally(ask, _middle(units)), fight=True)
 
 
-def army_retreat(ask: Ask) -> list[Order]:
+def army_retreat(ask: RuleRequest) -> list[RuleOrder]:
     """Goes back to the foremost base without fighting.
 
     Raises:
-        Impossible: there is no army that is free, or nothing to retreat to.
+        NotAvailable: there is no army that is free, or nothing to retreat to.
     """
     units = _army(ask)
     if not own_structures(ask.snapshot):
-        raise never(ask, "you have no base to retreat to; name a place with a Move action.")
+        raise not_available(ask, "you have no base to retreat to; name a place with a Move action.")
     return _send(ask, units, _rally(ask, _middle(units)), fight=False)
 
 
-def _army(ask: Ask, *, home: bool = False) -> list[Unit]:
+def _army(ask: RuleRequest, *, home: bool = False) -> list[Unit]:
     """The army, without units that an agent has ordered in this turn: what was said of them holds."""
     found = army(ask.snapshot, home=home)
     if not found:
-        raise never(ask, "you have no army; train units first.")
+        raise not_available(ask, "you have no army; train units first.")
     free = [unit for unit in found if unit.tag not in ask.ledger.busy]
     if not free:
-        raise never(ask, "every unit of the army has an order already in this turn.")
+        raise not_available(ask, "every unit of the army has an order already in this turn.")
     return free
 
 
@@ -111,7 +111,7 @@ def _nearest(units: list[Unit], to: list[WorldPoint]) -> WorldPoint:
     return place(min(units, key=away))
 
 
-def _rally(ask: Ask, middle: WorldPoint) -> WorldPoint:
+def _rally(ask: RuleRequest, middle: WorldPoint) -> WorldPoint:
     """In front of the base to which the enemy has the shortest way; where the army is if there is no base."""
     land = land_of(ask.snapshot)
     fronts = [front(land, place(hall)) for hall in land.own_halls]
@@ -125,7 +125,7 @@ def _rally(ask: Ask, middle: WorldPoint) -> WorldPoint:
     return min(fronts, key=lambda point: (float(ways[int(point.x), int(point.y)]), point))
 
 
-def _send(ask: Ask, units: list[Unit], to: WorldPoint, *, fight: bool) -> list[Order]:
+def _send(ask: RuleRequest, units: list[Unit], to: WorldPoint, *, fight: bool) -> list[RuleOrder]:
     tags = tuple(unit.tag for unit in units)
     ask.ledger.take(*tags)
-    return [Order(functions()["Attack_minimap" if fight else "Move_minimap"], tags, to)]
+    return [RuleOrder(functions()["Attack_minimap" if fight else "Move_minimap"], tags, to)]

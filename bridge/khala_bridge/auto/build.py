@@ -9,7 +9,7 @@ import numpy as np
 
 from khala_bridge.auto.builders import GAS_STRUCTURES, builder
 from khala_bridge.auto.places import for_structure, free_base, free_geyser
-from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
@@ -18,7 +18,7 @@ from khala_bridge.state.ground.land import SEEN_NOW, addon_place
 from khala_bridge.state.side import name, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Base, Land
 
@@ -30,28 +30,28 @@ OF_BASE = 12.0
 """A unit so near to a place for a town hall means this place."""
 
 
-def build_at(ask: Ask) -> list[Order]:
+def build_at(ask: RuleRequest) -> list[RuleOrder]:
     """Builds at a point, on the nearest cells of the grid.
 
     Raises:
-        Impossible: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
+        NotAvailable: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
     """
     assert ask.point is not None, f"{ask.action.name} is said with a point"
     ask.able()
     if _is_gas(ask):
         near_by = [u for u in _free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
         if not near_by:
-            raise Impossible("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
+            raise NotAvailable("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
         return _on_geyser(ask, near_by[0])
     footprint = footprint_need(_structure(ask))
     return _checked(ask, footprint.middle(footprint.cell(*ask.point)))
 
 
-def build_near(ask: Ask) -> list[Order]:
+def build_near(ask: RuleRequest) -> list[RuleOrder]:
     """Builds near a unit: a town hall on the base place of its resources, gas on the geyser, others as near as may be.
 
     Raises:
-        Impossible: as `build_at`, or there is no place near it.
+        NotAvailable: as `build_at`, or there is no place near it.
     """
     unit = _named(ask)
     ask.able()
@@ -60,7 +60,7 @@ def build_near(ask: Ask) -> list[Order]:
         free = _free_geysers(ask)
         found = min(free, key=lambda u: (math.dist(place(u), place(unit)), u.tag), default=None)
         if found is None or math.dist(place(found), place(unit)) > NEAR:
-            raise Impossible("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
+            raise NotAvailable("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
         return _on_geyser(ask, found)
     if sites()[structure].clear:
         return _checked(ask, _base_of(ask, unit).place)
@@ -68,15 +68,15 @@ def build_near(ask: Ask) -> list[Order]:
     cell = best(good(land, ask.ledger, structure), cost) or best(legal(land, ask.ledger, structure), cost)
     if cell is None:
         what = f"{name(unit)} {hex(unit.tag)}{_lack(structure)}"
-        raise Impossible("invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {what}.")
+        raise NotAvailable("invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {what}.")
     return _at(ask, footprint_need(structure).middle(cell))
 
 
-def lock_base(ask: Ask) -> list[Order]:
+def lock_base(ask: RuleRequest) -> list[RuleOrder]:
     """Builds on the very place where a town hall would gather a resource best, so that nobody else can have it.
 
     Raises:
-        Impossible: as `build_at`.
+        NotAvailable: as `build_at`.
     """
     unit = _named(ask)
     ask.able()
@@ -84,11 +84,11 @@ def lock_base(ask: Ask) -> list[Order]:
     return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
 
-def build_auto(ask: Ask) -> list[Order]:
+def build_auto(ask: RuleRequest) -> list[RuleOrder]:
     """Builds where the host finds it best, with a worker of the side that goes back to the minerals afterwards.
 
     Raises:
-        Impossible: there is no place, or as `build_at`.
+        NotAvailable: there is no place, or as `build_at`.
     """
     ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
@@ -99,7 +99,7 @@ def build_auto(ask: Ask) -> list[Order]:
     else:
         cell = for_structure(land, ask.ledger, structure)
         if cell is None:
-            raise never(ask, f"there is no room for it at your bases{_lack(structure)}.")
+            raise not_available(ask, f"there is no room for it at your bases{_lack(structure)}.")
         orders = _at(ask, footprint_need(structure).middle(cell))
     return [*orders, *_back_to_work(ask, orders[-1])]
 
@@ -107,13 +107,13 @@ def build_auto(ask: Ask) -> list[Order]:
 # the order ------------------------------------------------------------------------------------------------------------
 
 
-def _checked(ask: Ask, middle: WorldPoint) -> list[Order]:
+def _checked(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
     """The orders to build at the middle of some cells, which somebody else than the host has chosen."""
     _check_site(ask, land_of(ask.snapshot), middle)
     return _at(ask, middle)
 
 
-def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
+def _at(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
     """The orders to build at the middle of some cells."""
     structure = _structure(ask)
     worker, queued = builder(ask, middle)
@@ -125,20 +125,20 @@ def _at(ask: Ask, middle: WorldPoint) -> list[Order]:
     return orders
 
 
-def _on_geyser(ask: Ask, geyser: Unit) -> list[Order]:
+def _on_geyser(ask: RuleRequest, geyser: Unit) -> list[RuleOrder]:
     worker, queued = builder(ask, place(geyser))
     orders = _go(ask, worker, geyser.tag, queued=queued)
     ask.ledger.promise(place(geyser), 3, 3)
     return orders
 
 
-def _go(ask: Ask, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[Order]:
+def _go(ask: RuleRequest, worker: Unit, target: WorldPoint | int, *, queued: bool) -> list[RuleOrder]:
     ask.charge(ask.facts(name(worker)))
     ask.ledger.take(worker.tag)
-    return [Order(ask.function, (worker.tag,), target, queued)]
+    return [RuleOrder(ask.function, (worker.tag,), target, queued)]
 
 
-def _back_to_work(ask: Ask, build: Order) -> list[Order]:
+def _back_to_work(ask: RuleRequest, build: RuleOrder) -> list[RuleOrder]:
     """Sends a worker that outlives its work back to the mineral field that is nearest to where it built."""
     worker = ask.snapshot.units[build.units[0]]
     land = land_of(ask.snapshot)
@@ -149,13 +149,13 @@ def _back_to_work(ask: Ask, build: Order) -> list[Order]:
     where = place(target) if target is not None else build.target
     assert isinstance(where, WorldPoint)  # a structure is built at a point or on a unit
     field = min(fields, key=lambda unit: (math.dist(place(unit), where), unit.tag))
-    return [Order(functions()["Harvest_Gather_screen"], build.units, field.tag, queued=True)]
+    return [RuleOrder(functions()["Harvest_Gather_screen"], build.units, field.tag, queued=True)]
 
 
 # the place ------------------------------------------------------------------------------------------------------------
 
 
-def _check_site(ask: Ask, land: Land, middle: WorldPoint) -> None:
+def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
     """Raises if the structure cannot stand there, with the nearest place where it can."""
     structure = _structure(ask)
     footprint = footprint_need(structure)
@@ -164,14 +164,14 @@ def _check_site(ask: Ask, land: Land, middle: WorldPoint) -> None:
     if land.ground.holds(*cell) and allowed[cell]:
         return
     other = best(allowed, near(land, [middle], corner=on_corner(structure)))
-    raise Impossible(
+    raise NotAvailable(
         "invalid_target",
         f"{structure} cannot stand there: {_why_not(ask, land, cell)}",
         None if other is None else footprint.middle(other),
     )
 
 
-def _why_not(ask: Ask, land: Land, cell: tuple[int, int]) -> str:
+def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
     """Why a structure cannot stand on a cell and those around it, as half a sentence."""
     site, footprint = sites()[_structure(ask)], footprint_need(_structure(ask))
     cells = [(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells]
@@ -207,29 +207,29 @@ def _lack(structure: str) -> str:
             return ""
 
 
-def _named(ask: Ask) -> Unit:
+def _named(ask: RuleRequest) -> Unit:
     """The unit that says where; it may be one that is only remembered."""
     unit = None if ask.tag is None else land_of(ask.snapshot).unit(ask.tag)
     if unit is None:
-        raise Impossible(
+        raise NotAvailable(
             "unknown_target", f"No unit {hex(ask.tag or 0)} is known; use a tag that stands in your lists."
         )
     return unit
 
 
-def _base_of(ask: Ask, unit: Unit) -> Base:
+def _base_of(ask: RuleRequest, unit: Unit) -> Base:
     """The place for a town hall that a unit lies at."""
     bases = land_of(ask.snapshot).bases
     found = min(bases, key=lambda base: (math.dist(base.place, place(unit)), base.place), default=None)
     if found is None or math.dist(found.place, place(unit)) > OF_BASE:
-        raise Impossible(
+        raise NotAvailable(
             "invalid_target",
             f"The {name(unit)} {hex(unit.tag)} is at no place for a town hall; name a mineral field or geyser there.",
         )
     return found
 
 
-def _free_geysers(ask: Ask) -> list[Unit]:
+def _free_geysers(ask: RuleRequest) -> list[Unit]:
     """Geysers on which no gas structure stands or is going to stand, by ascending tags."""
     land = land_of(ask.snapshot)
     standing = land.standing("geyser")
@@ -252,11 +252,11 @@ def _has_gas(unit: Unit) -> bool:
 # names ----------------------------------------------------------------------------------------------------------------
 
 
-def _structure(ask: Ask) -> str:
+def _structure(ask: RuleRequest) -> str:
     structure = ask.action.produces
     assert structure is not None, f"{ask.action.name} builds something"
     return structure
 
 
-def _is_gas(ask: Ask) -> bool:
+def _is_gas(ask: RuleRequest) -> bool:
     return sites()[_structure(ask)].ground == "geyser"

@@ -10,12 +10,12 @@ from khala_bridge.state.ground.land import built_by
 from khala_bridge.state.side import ability, bears_resources, is_doing, name, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.frames import WorldPoint
     from khala_bridge.state import Snapshot, Unit
 
 
-def builder(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
+def builder(ask: RuleRequest, where: WorldPoint) -> tuple[Unit, bool]:
     """The worker that builds at a place, and whether the order waits behind those that it has.
 
     Of a team the nearest one, and a second structure waits for the first. Of the side the nearest one among those that
@@ -23,13 +23,13 @@ def builder(ask: Ask, where: WorldPoint) -> tuple[Unit, bool]:
     builds, scouts or was ordered by an agent in this turn is left alone.
 
     Raises:
-        Impossible: there is none.
+        NotAvailable: there is none.
     """
     able = [ask.snapshot.units[unit.tag] for unit in ask.able()]
     return _of_team(ask, able, where) if ask.units else (_of_side(ask, able, where), False)
 
 
-def _of_team(ask: Ask, able: list[Unit], where: WorldPoint) -> tuple[Unit, bool]:
+def _of_team(ask: RuleRequest, able: list[Unit], where: WorldPoint) -> tuple[Unit, bool]:
     def rank(unit: Unit) -> tuple[bool, float, int]:
         return _has_more_to_do(ask, unit), math.dist(place(unit), where), unit.tag
 
@@ -37,12 +37,12 @@ def _of_team(ask: Ask, able: list[Unit], where: WorldPoint) -> tuple[Unit, bool]
     return best, _has_more_to_do(ask, best)
 
 
-def _has_more_to_do(ask: Ask, unit: Unit) -> bool:
+def _has_more_to_do(ask: RuleRequest, unit: Unit) -> bool:
     """Whether a worker builds already, or was told so in this turn."""
     return unit.tag in ask.ledger.busy or any(built_by(order.ability_id) for order in unit.orders)
 
 
-def _of_side(ask: Ask, able: list[Unit], where: WorldPoint) -> Unit:
+def _of_side(ask: RuleRequest, able: list[Unit], where: WorldPoint) -> Unit:
     return min(able, key=lambda unit: (use(ask.snapshot, unit), math.dist(place(unit), where), unit.tag))
 
 

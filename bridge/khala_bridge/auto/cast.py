@@ -5,90 +5,92 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.side import is_structure, name, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.frames import WorldPoint
     from khala_bridge.state import Unit
 
 
-def cast(ask: Ask) -> list[Order]:
+def cast(ask: RuleRequest) -> list[RuleOrder]:
     """Lets one unit that can now use an ability, at what the words name.
 
     If it has to go there, the nearest one; if the whole map is in reach, that with the most energy.
 
     Raises:
-        Impossible: no unit can.
+        NotAvailable: no unit can.
     """
     target, where = _target(ask)
     unit = caster(ask, where)
-    return [Order(ask.function, (unit.tag,), target)]
+    return [RuleOrder(ask.function, (unit.tag,), target)]
 
 
-def recall_near(ask: Ask) -> list[Order]:
+def recall_near(ask: RuleRequest) -> list[RuleOrder]:
     """Recalls the units around the one that is named.
 
     Raises:
-        Impossible: nobody can.
+        NotAvailable: nobody can.
     """
     _, where = _target(ask)
     if where is None:
-        raise Impossible("unknown_target", "Name the unit around which the others are recalled by its tag.")
+        raise NotAvailable("unknown_target", "Name the unit around which the others are recalled by its tag.")
     unit = caster(ask, where)
-    return [Order(ask.function, (unit.tag,), where)]
+    return [RuleOrder(ask.function, (unit.tag,), where)]
 
 
-def stop_building(ask: Ask) -> list[Order]:
+def stop_building(ask: RuleRequest) -> list[RuleOrder]:
     """Lets structures call off the newest of what they train or research, those of the team or the one that is named.
 
     Raises:
-        Impossible: they do nothing.
+        NotAvailable: they do nothing.
     """
     tags = ask.units or (() if ask.tag is None else (ask.tag,))
     units = [ask.snapshot.units[tag] for tag in tags if tag in ask.snapshot.units]
     busy = tuple(unit.tag for unit in units if is_structure(unit) and unit.orders)
     if not busy:
         named = f"the {name(units[0])} {hex(units[0].tag)} trains and researches" if units else "the team does"
-        raise never(ask, f"{named} nothing that could be called off.")
-    return [Order(ask.function, busy)]
+        raise not_available(ask, f"{named} nothing that could be called off.")
+    return [RuleOrder(ask.function, busy)]
 
 
-def cancel_building(ask: Ask) -> list[Order]:
+def cancel_building(ask: RuleRequest) -> list[RuleOrder]:
     """Calls off, or halts, the building of the structure that is named; what of it stands is what the game makes of it.
 
     Raises:
-        Impossible: it is no structure in the making, or the game does not take it.
+        NotAvailable: it is no structure in the making, or the game does not take it.
     """
     unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
     if unit is None or not unit.is_own or not is_structure(unit):
-        raise Impossible(
+        raise NotAvailable(
             "invalid_target", f"{hex(ask.tag or 0)} is no structure of yours; name one that is being built."
         )
     if unit.build_progress >= 1:
-        raise never(ask, f"the {name(unit)} {hex(unit.tag)} is finished; only what is being built can be called off.")
+        raise not_available(
+            ask, f"the {name(unit)} {hex(unit.tag)} is finished; only what is being built can be called off."
+        )
     if not ask.has(unit.tag):
-        raise never(ask, f"the game does not take it from the {name(unit)} {hex(unit.tag)} at this moment.")
-    return [Order(ask.function, (unit.tag,))]
+        raise not_available(ask, f"the game does not take it from the {name(unit)} {hex(unit.tag)} at this moment.")
+    return [RuleOrder(ask.function, (unit.tag,))]
 
 
 # who ------------------------------------------------------------------------------------------------------------------
 
 
-def caster(ask: Ask, where: WorldPoint | None) -> Unit:
+def caster(ask: RuleRequest, where: WorldPoint | None) -> Unit:
     """The unit of the action's types that can use its ability now, noted in the ledger.
 
     Raises:
-        Impossible: there is none; the text says what is missing.
+        NotAvailable: there is none; the text says what is missing.
     """
     unit = casters(ask, where)[0]
     note(ask, unit)
     return unit
 
 
-def note(ask: Ask, unit: Unit) -> None:
+def note(ask: RuleRequest, unit: Unit) -> None:
     """Notes in the ledger that a unit uses the action's ability: a structure goes on with its other work."""
     facts = ask.facts(name(unit))
     ask.ledger.energy[unit.tag] += int(facts.energy) if facts is not None else 0
@@ -96,7 +98,7 @@ def note(ask: Ask, unit: Unit) -> None:
         ask.ledger.take(unit.tag)
 
 
-def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
+def casters(ask: RuleRequest, where: WorldPoint | None) -> list[Unit]:
     """Every unit that can use the action's ability now, that which should first; never none."""
     able = ask.able()
     facts = ask.facts(able[0].type)
@@ -113,11 +115,11 @@ def casters(ask: Ask, where: WorldPoint | None) -> list[Unit]:
 # what at --------------------------------------------------------------------------------------------------------------
 
 
-def _target(ask: Ask) -> tuple[int | WorldPoint | None, WorldPoint | None]:
+def _target(ask: RuleRequest) -> tuple[int | WorldPoint | None, WorldPoint | None]:
     """What the words aim at, as the function takes it, and where that is."""
     if ask.tag is None:
         return ask.point, ask.point
     unit = land_of(ask.snapshot).unit(ask.tag)
     if unit is None:
-        raise Impossible("unknown_target", f"No unit {hex(ask.tag)} is known; use a tag that stands in your lists.")
+        raise NotAvailable("unknown_target", f"No unit {hex(ask.tag)} is known; use a tag that stands in your lists.")
     return (place(unit) if ask.action.aim == "place" else unit.tag), place(unit)

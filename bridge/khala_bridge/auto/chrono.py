@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_bridge.auto.cast import caster
-from khala_bridge.auto.rule import Order, never
+from khala_bridge.auto.rule import RuleOrder, not_available
 from khala_bridge.knowledge import abilities, knowledge
 from khala_bridge.rules import price_of
 from khala_bridge.state.side import ability, finished, is_structure, name, place
@@ -13,7 +13,7 @@ from khala_bridge.state.side import ability, finished, is_structure, name, place
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.state import Unit
 
@@ -23,38 +23,38 @@ WARP: Final = "TrainWarp_Zealot_screen"
 """What a WarpGate can always do that has nothing to wait for."""
 
 
-def chrono_economy(ask: Ask) -> list[Order]:
+def chrono_economy(ask: RuleRequest) -> list[RuleOrder]:
     """Boosts a structure that trains workers.
 
     Raises:
-        Impossible: none does, or no Nexus can.
+        NotAvailable: none does, or no Nexus can.
     """
     why = "no Nexus trains Probes that is not boosted yet; train Probes first."
     return _boost(ask, [unit for unit, facts in _at_work(ask) if _is_worker(facts)], why)
 
 
-def chrono_military(ask: Ask) -> list[Order]:
+def chrono_military(ask: RuleRequest) -> list[RuleOrder]:
     """Boosts a structure that trains anything else, or else a WarpGate that recharges.
 
     Raises:
-        Impossible: none does, or no Nexus can.
+        NotAvailable: none does, or no Nexus can.
     """
     why = "no structure trains an army unit that is not boosted yet; train one first."
     training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
     return _boost(ask, [*training, *_recharging(ask)], why)
 
 
-def chrono_research(ask: Ask) -> list[Order]:
+def chrono_research(ask: RuleRequest) -> list[RuleOrder]:
     """Boosts a structure that researches.
 
     Raises:
-        Impossible: none does, or no Nexus can.
+        NotAvailable: none does, or no Nexus can.
     """
     why = "no structure researches anything that is not boosted yet; research something first."
     return _boost(ask, [unit for unit, facts in _at_work(ask) if facts.researches is not None], why)
 
 
-def _at_work(ask: Ask) -> list[tuple[Unit, AbilityFacts]]:
+def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
     """Finished own structures with what they work on, those with the most of it left first."""
     busy = [unit for unit in finished(ask.snapshot.own) if is_structure(unit) and unit.orders]
     found = [(unit, abilities().get(unit.orders[0].ability_id)) for unit in busy]
@@ -67,7 +67,7 @@ def _is_worker(facts: AbilityFacts) -> bool:
     return made is not None and made.worker
 
 
-def _recharging(ask: Ask) -> list[Unit]:
+def _recharging(ask: RuleRequest) -> list[Unit]:
     """WarpGates from which the game takes no Zealot, though it would be paid for."""
     known = ask.snapshot.abilities
     zealot = abilities()[ability(WARP)]
@@ -77,12 +77,12 @@ def _recharging(ask: Ask) -> list[Unit]:
     return [gate for gate in gates if not ask.can(gate.tag, zealot.id)]
 
 
-def _boost(ask: Ask, targets: Sequence[Unit], nothing: str) -> list[Order]:
+def _boost(ask: RuleRequest, targets: Sequence[Unit], nothing: str) -> list[RuleOrder]:
     """Boosts the first of some structures that is not boosted yet."""
     aimed = ask.ledger.aimed
     left = [u for u in targets if BOOSTED not in u.buff_ids and (ask.function.name, u.tag) not in aimed]
     if not left:
-        raise never(ask, nothing)
+        raise not_available(ask, nothing)
     unit = caster(ask, place(left[0]))
     aimed.add((ask.function.name, left[0].tag))
-    return [Order(ask.function, (unit.tag,), left[0].tag)]
+    return [RuleOrder(ask.function, (unit.tag,), left[0].tag)]

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_bridge.auto.rule import never
+from khala_bridge.auto.rule import not_available
 from khala_bridge.auto.sites import BASE_REACH, best, footprint_need, good, legal, near, new_power, on_corner
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.side import finished, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.rules import Ledger
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Land
@@ -87,11 +87,11 @@ def workplace(land: Land, hall: WorldPoint) -> WorldPoint:
     return WorldPoint(x, y)
 
 
-def free_base(ask: Ask, land: Land, structure: str) -> WorldPoint:
+def free_base(ask: RuleRequest, land: Land, structure: str) -> WorldPoint:
     """The place for a town hall that is the shortest way from the own bases.
 
     Raises:
-        Impossible: every place that can be walked to is taken.
+        NotAvailable: every place that can be walked to is taken.
     """
     footprint = footprint_need(structure)
     allowed = legal(land, ask.ledger, structure)
@@ -105,7 +105,7 @@ def free_base(ask: Ask, land: Land, structure: str) -> WorldPoint:
 
     reached = [to for to in places if math.isfinite(way(to)[0])]
     if not reached:
-        raise never(ask, "every place for a town hall that can be walked to is taken.")
+        raise not_available(ask, "every place for a town hall that can be walked to is taken.")
     return min(reached, key=way)
 
 
@@ -116,11 +116,11 @@ def _is_held(land: Land, place_: WorldPoint) -> bool:
     return begun or any(math.dist(place(hall), place_) < OWN_GAS for hall in land.halls)
 
 
-def free_geyser(ask: Ask, geysers: list[Unit]) -> Unit:
+def free_geyser(ask: RuleRequest, geysers: list[Unit]) -> Unit:
     """The free geyser that is nearest to a finished town hall.
 
     Raises:
-        Impossible: no town hall has one.
+        NotAvailable: no town hall has one.
     """
     halls = finished(land_of(ask.snapshot).own_halls)
 
@@ -129,5 +129,5 @@ def free_geyser(ask: Ask, geysers: list[Unit]) -> Unit:
 
     found = min(geysers, key=away, default=None)
     if found is None or away(found)[0] > OWN_GAS:
-        raise never(ask, "no finished base of yours has a free geyser; build another base first.")
+        raise not_available(ask, "no finished base of yours has a free geyser; build another base first.")
     return found

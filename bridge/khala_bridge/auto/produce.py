@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.knowledge import abilities, stand_ins
 from khala_bridge.rules import AT_ONCE
 from khala_bridge.state.ground import Land, footprint_of, land_of
@@ -16,29 +16,29 @@ from khala_bridge.state.ground.footprints import ADDON
 from khala_bridge.state.side import is_structure
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.rules import UnitState
 
 
-def train(ask: Ask) -> list[Order]:
+def train(ask: RuleRequest) -> list[RuleOrder]:
     """Orders one unit, morph or add-on from the best of the producers.
 
     Raises:
-        Impossible: there is no producer, or none that can now.
+        NotAvailable: there is no producer, or none that can now.
     """
     best = min(_producers(ask), key=lambda unit: _rank(ask, unit))
     facts = ask.facts(best.type)
     ask.charge(facts)
     _note(ask, best, facts)
-    return [Order(ask.function, (best.tag,))]
+    return [RuleOrder(ask.function, (best.tag,))]
 
 
-def research(ask: Ask) -> list[Order]:
+def research(ask: RuleRequest) -> list[RuleOrder]:
     """Orders an upgrade where it is researched; of one with levels the next.
 
     Raises:
-        Impossible: it is known or under way already, or cannot be researched now.
+        NotAvailable: it is known or under way already, or cannot be researched now.
     """
     best = min(ask.able(), key=lambda unit: _rank(ask, unit))
     level = ask.facts(best.type)
@@ -46,24 +46,24 @@ def research(ask: Ask) -> list[Order]:
     if level is not None:
         ask.ledger.begun.add(level.id)
     ask.ledger.queued[best.tag] += 1
-    return [Order(ask.function, (best.tag,))]
+    return [RuleOrder(ask.function, (best.tag,))]
 
 
-def morph_warpgates(ask: Ask) -> list[Order]:
+def morph_warpgates(ask: RuleRequest) -> list[RuleOrder]:
     """Turns every Gateway that works on nothing into a WarpGate.
 
     Raises:
-        Impossible: there is none, or the upgrade is missing.
+        NotAvailable: there is none, or the upgrade is missing.
     """
     ready = tuple(unit.tag for unit in ask.able())
     ask.ledger.changing.update(ready)
-    return [Order(ask.function, ready)]
+    return [RuleOrder(ask.function, ready)]
 
 
 # which of them --------------------------------------------------------------------------------------------------------
 
 
-def _producers(ask: Ask) -> list[UnitState]:
+def _producers(ask: RuleRequest) -> list[UnitState]:
     """Those that can now; for an add-on those that have room for it, which is all that the game may mean by its no."""
     facts = abilities().get(ask.function.ability_id)
     if facts is None or facts.does != "build_addon":
@@ -71,7 +71,7 @@ def _producers(ask: Ask) -> list[UnitState]:
     land = land_of(ask.snapshot)
     try:
         able = ask.able()
-    except Impossible as impossible:
+    except NotAvailable as impossible:
         why = impossible.why
         if why is None or why.kind != "game" or _has_room(ask, land, ask.side.units[why.tag]):
             raise
@@ -82,11 +82,11 @@ def _producers(ask: Ask) -> list[UnitState]:
     return found
 
 
-def _no_room(ask: Ask, who: str) -> Impossible:
-    return never(ask, f"something stands where the add-on of your {who} would be; lift it off and land it.")
+def _no_room(ask: RuleRequest, who: str) -> NotAvailable:
+    return not_available(ask, f"something stands where the add-on of your {who} would be; lift it off and land it.")
 
 
-def _has_room(ask: Ask, land: Land, unit: UnitState) -> bool:
+def _has_room(ask: RuleRequest, land: Land, unit: UnitState) -> bool:
     footprint, place = footprint_of(unit.type), ask.snapshot.units[unit.tag].pos
     if footprint is None:
         return True
@@ -94,13 +94,13 @@ def _has_room(ask: Ask, land: Land, unit: UnitState) -> bool:
     return all(land.ground.holds(x + dx, y + dy) and bool(land.free[x + dx, y + dy]) for dx, dy in ADDON)
 
 
-def _rank(ask: Ask, unit: UnitState) -> tuple[int, int, int]:
+def _rank(ask: RuleRequest, unit: UnitState) -> tuple[int, int, int]:
     """The less, the sooner a new order of this producer is done."""
     load = unit.orders + ask.ledger.queued[unit.tag]
     return load // (2 if unit.addon in stand_ins("Reactor") else 1), load, unit.tag
 
 
-def _note(ask: Ask, unit: UnitState, facts: AbilityFacts | None) -> None:
+def _note(ask: RuleRequest, unit: UnitState, facts: AbilityFacts | None) -> None:
     if not is_structure(ask.snapshot.units[unit.tag]):
         ask.ledger.take(unit.tag)
     elif facts is not None and facts.does in AT_ONCE:

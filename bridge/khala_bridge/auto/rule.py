@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class RuleRequest:
     """An action, and what the words of the agent left to find out."""
 
     action: Action
@@ -58,7 +58,7 @@ class Ask:
         """Return the units that can do it now, of those that the words name or of the side; never none.
 
         Raises:
-            Impossible: no unit can.
+            NotAvailable: no unit can.
         """
         use = asked_by(self.action, of_side=not self.units)
         assert use is not None, f"{self.action.name} has a rule and no function"
@@ -68,7 +68,7 @@ class Ask:
         able = [unit for unit, why in judged if why is None]
         if not able:
             reasons = [why for _, why in judged if why is not None]
-            raise never(self, nearest(reasons) if reasons else nobody(types))
+            raise not_available(self, nearest(reasons) if reasons else nobody(types))
         return able
 
     def charge(self, facts: AbilityFacts | None) -> None:
@@ -91,7 +91,7 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class RuleOrder:
     """A function for some units."""
 
     function: Function
@@ -101,7 +101,7 @@ class Order:
     queued: bool = False
 
 
-class Impossible(Exception):
+class NotAvailable(Exception):
     """There is nothing that the rule could answer; the message is a sentence for the model."""
 
     def __init__(
@@ -115,10 +115,10 @@ class Impossible(Exception):
         super().__init__(message)
 
 
-Rule: TypeAlias = Callable[[Ask], list[Order]]
+Rule: TypeAlias = Callable[[RuleRequest], list[RuleOrder]]
 
 
-def never(ask: Ask, why: str | Unavailable) -> Impossible:
+def not_available(ask: RuleRequest, why: str | Unavailable) -> NotAvailable:
     """What stands in the way now, as an error to raise: `Build_Pylon is not possible now: <why>`."""
     said, judged = (why, None) if isinstance(why, str) else (of_side(why), why)
-    return Impossible("not_available", f"{ask.action.name} is not possible now: {said}", why=judged)
+    return NotAvailable("not_available", f"{ask.action.name} is not possible now: {said}", why=judged)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_bridge.auto.builders import use
-from khala_bridge.auto.rule import Order, never
+from khala_bridge.auto.rule import RuleOrder, not_available
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import SEEN_NOW
 from khala_bridge.state.side import ability, finished, is_doing, is_worker, of_types, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.state import Snapshot, Unit
     from khala_bridge.state.ground import Land
 
@@ -27,16 +27,16 @@ CELL: Final = 8
 """Side of the squares into which the rest of the map is cut, in cells."""
 
 
-def scout(ask: Ask) -> list[Order]:
+def scout(ask: RuleRequest) -> list[RuleOrder]:
     """Sends the nearest free unit of a kind to where the enemy may be and nobody looks yet.
 
     Raises:
-        Impossible: there is no such unit that is free.
+        NotAvailable: there is no such unit that is free.
     """
     units = [u for u in finished(of_types(ask.snapshot, ask.action.units)) if u.tag not in ask.ledger.busy]
     if not units:
         wanted = " or ".join(ask.action.units)
-        raise never(ask, f"you have no {wanted} without an order in this turn.")
+        raise not_available(ask, f"you have no {wanted} without an order in this turn.")
     home = next(map(place, land_of(ask.snapshot).own_halls), place(units[0]))
     places = unseen_places(ask.snapshot, home)
     goals = {unit.tag: goal for unit in ask.snapshot.own if (goal := _goal(unit)) is not None}
@@ -49,10 +49,10 @@ def scout(ask: Ask) -> list[Order]:
     return _look(ask, min(units, key=lambda u: (_needed(ask.snapshot, u), math.dist(place(u), to), u.tag)), to)
 
 
-def _look(ask: Ask, unit: Unit, to: WorldPoint) -> list[Order]:
+def _look(ask: RuleRequest, unit: Unit, to: WorldPoint) -> list[RuleOrder]:
     ask.ledger.take(unit.tag)
     ask.ledger.looks.append((to.x, to.y))
-    return [Order(ask.function, (unit.tag,), to)]
+    return [RuleOrder(ask.function, (unit.tag,), to)]
 
 
 def _goal(unit: Unit) -> WorldPoint | None:

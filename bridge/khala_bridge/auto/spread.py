@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_bridge.auto.cast import caster, casters, note
-from khala_bridge.auto.rule import Order, never
+from khala_bridge.auto.rule import RuleOrder, not_available
 from khala_bridge.auto.sites import best, near, promised
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
@@ -16,7 +16,7 @@ from khala_bridge.state.ground.land import SEEN_NOW
 from khala_bridge.state.side import finished, name, of_types, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Land
 
@@ -32,11 +32,11 @@ OWN_FIELD: Final = 10.0
 """A mineral field so near to a town hall is its own."""
 
 
-def mule(ask: Ask) -> list[Order]:
+def mule(ask: RuleRequest) -> list[RuleOrder]:
     """Drops a MULE on the richest mineral field of the finished bases.
 
     Raises:
-        Impossible: no Orbital Command can, or there are no minerals at the bases.
+        NotAvailable: no Orbital Command can, or there are no minerals at the bases.
     """
     land = land_of(ask.snapshot)
     halls = [place(hall) for hall in finished(land.own_halls)]
@@ -46,42 +46,42 @@ def mule(ask: Ask) -> list[Order]:
         if field.tag in ask.snapshot.units and any(math.dist(place(field), hall) <= OWN_FIELD for hall in halls)
     ]
     if not fields:
-        raise never(ask, "there is no mineral field in sight at a finished base of yours.")
+        raise not_available(ask, "there is no mineral field in sight at a finished base of yours.")
     aimed = ask.ledger.aimed
     left = [field for field in fields if (ask.function.name, field.tag) not in aimed] or fields
     field = min(left, key=lambda unit: (-unit.mineral_contents, unit.tag))
     aimed.add((ask.function.name, field.tag))
-    return [Order(ask.function, (caster(ask, place(field)).tag,), field.tag)]
+    return [RuleOrder(ask.function, (caster(ask, place(field)).tag,), field.tag)]
 
 
-def inject(ask: Ask) -> list[Order]:
+def inject(ask: RuleRequest) -> list[RuleOrder]:
     """Lets Queens inject every finished hatchery that needs it, each the nearest one.
 
     Raises:
-        Impossible: no Queen can, or no hatchery needs it.
+        NotAvailable: no Queen can, or no hatchery needs it.
     """
     queens = casters(ask, None)
     needy = [unit for unit in finished(of_types(ask.snapshot, HATCHERIES)) if INJECTED not in unit.buff_ids]
     needy = [unit for unit in needy if (ask.function.name, unit.tag) not in ask.ledger.aimed]
     if not needy:
-        raise never(ask, "every finished Hatchery has it already; try again in half a minute.")
+        raise not_available(ask, "every finished Hatchery has it already; try again in half a minute.")
     pairs = sorted((math.dist(place(q), place(h)), q.tag, h.tag) for q in queens for h in needy)
-    orders: dict[int, Order] = {}
+    orders: dict[int, RuleOrder] = {}
     injected: set[int] = set()
     for _, queen, hatchery in pairs:
         if queen not in orders and hatchery not in injected:
-            orders[queen] = Order(ask.function, (queen,), hatchery)
+            orders[queen] = RuleOrder(ask.function, (queen,), hatchery)
             injected.add(hatchery)
             note(ask, ask.snapshot.units[queen])
             ask.ledger.aimed.add((ask.function.name, hatchery))
     return list(orders.values())
 
 
-def creep_tumor(ask: Ask) -> list[Order]:
+def creep_tumor(ask: RuleRequest) -> list[RuleOrder]:
     """Plants a tumor with every tumor that can, or else with one Queen, where it brings the creep on most.
 
     Raises:
-        Impossible: nobody can, or there is no room on creep in sight.
+        NotAvailable: nobody can, or there is no room on creep in sight.
     """
     able = casters(ask, None)
     tumors = [unit for unit in able if name(unit) in TUMORS]
@@ -92,13 +92,13 @@ def creep_tumor(ask: Ask) -> list[Order]:
         if spot is not None:
             ask.ledger.promise(spot, 1, 1)
             note(ask, unit)
-            orders.append(Order(ask.function, (unit.tag,), spot))
+            orders.append(RuleOrder(ask.function, (unit.tag,), spot))
     if not orders:
-        raise never(ask, "there is no free creep in sight within reach.")
+        raise not_available(ask, "there is no free creep in sight within reach.")
     return orders
 
 
-def _edge(ask: Ask, land: Land, unit: Unit, reach: float) -> WorldPoint | None:
+def _edge(ask: RuleRequest, land: Land, unit: Unit, reach: float) -> WorldPoint | None:
     """The free place on creep within reach of a unit that is farthest from all tumors and hatcheries."""
     free = land.free & land.creep & (land.sight >= SEEN_NOW) & ~land.kept & ~promised(land, ask.ledger)
     away = near(land, [place(unit)], reach=reach)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from khala_bridge.auto.rule import Impossible, Order, never
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.auto.sites import best, near, promised
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
@@ -16,7 +16,7 @@ from khala_bridge.state.means import ledger_of
 from khala_bridge.state.side import finished, is_structure, kind, name, of_types, place
 
 if TYPE_CHECKING:
-    from khala_bridge.auto.rule import Ask
+    from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.rules import Ledger
     from khala_bridge.state import PowerSource, Snapshot, Unit
     from khala_bridge.state.ground import Land
@@ -52,54 +52,54 @@ def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
     )
 
 
-def warp_near(ask: Ask) -> list[Order]:
+def warp_near(ask: RuleRequest) -> list[RuleOrder]:
     """Warps a unit in as near to a Pylon or phasing WarpPrism as there is room.
 
     Raises:
-        Impossible: no gate is ready, the price is not there, or there is no room in that field.
+        NotAvailable: no gate is ready, the price is not there, or there is no room in that field.
     """
     land = land_of(ask.snapshot)
     source = next((s for s in land.power_sources if s.tag == ask.tag), None)
     if source is None:
         unit = None if ask.tag is None else land.unit(ask.tag)
         what = "unit" if unit is None else name(unit)
-        raise Impossible(
+        raise NotAvailable(
             "invalid_target",
             f"The {what} {hex(ask.tag or 0)} has no power field; name a finished Pylon or phasing WarpPrism of yours.",
         )
     gate = _gate(ask)
     cell = _room(ask.snapshot, ask.ledger, source)
     if cell is None:
-        raise Impossible(
+        raise NotAvailable(
             "invalid_target",
             f"There is no room in the power field of {hex(source.tag)}; name another Pylon, or move the units away.",
         )
     return _warp(ask, gate, cell)
 
 
-def warp_auto(ask: Ask) -> list[Order]:
+def warp_auto(ask: RuleRequest) -> list[RuleOrder]:
     """Warps a unit in at the field where it is soonest there and the fewest own units stand.
 
     Raises:
-        Impossible: no gate is ready, the price is not there, or no field has room.
+        NotAvailable: no gate is ready, the price is not there, or no field has room.
     """
     gate = _gate(ask)
     for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _crowded(ask, source)):
         cell = _room(ask.snapshot, ask.ledger, source)
         if cell is not None:
             return _warp(ask, gate, cell)
-    raise never(ask, "no power field has room for it; build a Pylon first.")
+    raise not_available(ask, "no power field has room for it; build a Pylon first.")
 
 
-def _warp(ask: Ask, gate: Unit, cell: tuple[int, int]) -> list[Order]:
+def _warp(ask: RuleRequest, gate: Unit, cell: tuple[int, int]) -> list[RuleOrder]:
     ask.charge(ask.facts(name(gate)))
     ask.ledger.take(gate.tag)
     point = WorldPoint(cell[0] + 0.5, cell[1] + 0.5)
     ask.ledger.promise(point, 1, 1)
-    return [Order(ask.function, (gate.tag,), point)]
+    return [RuleOrder(ask.function, (gate.tag,), point)]
 
 
-def _gate(ask: Ask) -> Unit:
+def _gate(ask: RuleRequest) -> Unit:
     """The gate that is ready; of several that with the least tag."""
     return ask.snapshot.units[ask.able()[0].tag]
 
@@ -107,7 +107,7 @@ def _gate(ask: Ask) -> Unit:
 # where ----------------------------------------------------------------------------------------------------------------
 
 
-def _crowded(ask: Ask, source: PowerSource) -> tuple[bool, int, int]:
+def _crowded(ask: RuleRequest, source: PowerSource) -> tuple[bool, int, int]:
     """The less, the better a field is for the next unit."""
     middle = (source.pos.x, source.pos.y)
     units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from khala_bridge.auto.builders import GAS_STRUCTURES
-from khala_bridge.auto.rule import Order
+from khala_bridge.auto.rule import RuleOrder
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.knowledge import abilities
 from khala_bridge.rules import price_of, use_of, why_not
@@ -45,7 +45,7 @@ GATHER: Final = "Harvest_Gather_screen"
 MORPH: Final = "Morph_WarpGate_quick"
 
 
-def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: frozenset[int]) -> list[Order]:
+def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: frozenset[int]) -> list[RuleOrder]:
     """The orders of the host's own that go with a joint action, deterministic.
 
     Args:
@@ -55,7 +55,7 @@ def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: fro
         ordered: tags of the units that agents have ordered in this turn.
     """
     taken = ordered | ledger.busy
-    orders: list[Order] = []
+    orders: list[RuleOrder] = []
     if auto.warpgates:
         orders += _warpgates(snapshot, ledger, taken)
     if auto.train_workers:
@@ -68,14 +68,14 @@ def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: fro
 # Gateways -------------------------------------------------------------------------------------------------------------
 
 
-def _warpgates(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[Order]:
+def _warpgates(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[RuleOrder]:
     gateways = [
         unit.tag
         for unit in side_of(snapshot).of_types(("Gateway",))
         if unit.tag not in taken and _can(MORPH, unit.tag, snapshot, ledger)
     ]
     ledger.changing.update(gateways)
-    return [Order(functions()[MORPH], tuple(gateways))] if gateways else []
+    return [RuleOrder(functions()[MORPH], tuple(gateways))] if gateways else []
 
 
 def _can(function: str, tag: int, snapshot: Snapshot, ledger: Ledger) -> bool:
@@ -86,7 +86,7 @@ def _can(function: str, tag: int, snapshot: Snapshot, ledger: Ledger) -> bool:
 # training -------------------------------------------------------------------------------------------------------------
 
 
-def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[Order]:
+def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[RuleOrder]:
     """One worker from each idle town hall, of Larvae as many as there are town halls."""
     posts = _posts(snapshot)
     making = [order for unit in snapshot.own for order in unit.orders if order.ability_id in _trainings()]
@@ -100,7 +100,7 @@ def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int])
         if left > 0 and free and _can(function.name, unit.tag, snapshot, ledger):
             ledger.pay(price_of(abilities()[function.ability_id]))
             ledger.queued[unit.tag] += 1
-            orders.append(Order(function, (unit.tag,)))
+            orders.append(RuleOrder(function, (unit.tag,)))
             left -= 1
     return orders
 
@@ -131,7 +131,7 @@ class _Post:
         return self.has / self.wants if self.wants else math.inf
 
 
-def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[Order]:
+def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[RuleOrder]:
     """Sends idle workers to work, and some from full places to those with room."""
     posts = _posts(snapshot)
     if not posts:
@@ -140,12 +140,12 @@ def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[Order]
     return [*_employed(posts, idle), *_moved(snapshot, posts, taken)]
 
 
-def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[Order]:
+def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[RuleOrder]:
     """Idle workers at the places that need them most, one after the other."""
     for worker in idle:
         post = _post_for(posts, worker)
         post.has += 1
-        yield Order(functions()[GATHER], (worker.tag,), post.target)
+        yield RuleOrder(functions()[GATHER], (worker.tag,), post.target)
 
 
 def _posts(snapshot: Snapshot) -> list[_Post]:
@@ -175,7 +175,7 @@ def _post_for(posts: list[_Post], worker: Unit) -> _Post:
     return min(posts, key=rank)
 
 
-def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[Order]:
+def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[RuleOrder]:
     """Workers of full places for emptier ones: to the gas of the same base, and from full bases to others."""
     free = [
         worker
@@ -191,7 +191,7 @@ def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[i
             if worker is not None:
                 free.remove(worker)
                 source.has, to.has = source.has - 1, to.has + 1
-                yield Order(functions()[GATHER], (worker.tag,), to.target)
+                yield RuleOrder(functions()[GATHER], (worker.tag,), to.target)
 
 
 def _gives(source: _Post, to: _Post) -> bool:

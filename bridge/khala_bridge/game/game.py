@@ -62,7 +62,7 @@ class GameConfig(Frozen):
 
 
 @dataclass(frozen=True, slots=True)
-class GameInfo:
+class GameIdentity:
     """What plays, for the run card."""
 
     version: str
@@ -86,7 +86,7 @@ class Game(Protocol):
     """One game with its players. Every method blocks; errors are `khala_bridge.errors.GameError`."""
 
     @property
-    def info(self) -> GameInfo:
+    def info(self) -> GameIdentity:
         """What plays."""
 
     def reset(self) -> tuple[Snapshot, ...]:
@@ -140,7 +140,7 @@ class GameThread:
             self._threads.shutdown(wait=False)
 
     @property
-    def info(self) -> GameInfo:
+    def info(self) -> GameIdentity:
         """What plays."""
         return self._playing.info
 
@@ -193,7 +193,7 @@ class OneSide:
         await self._thread.__aexit__(kind, error, trace)
 
     @property
-    def info(self) -> GameInfo:
+    def info(self) -> GameIdentity:
         """What plays."""
         return self._thread.info
 

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from absl import flags
 
-from khala_bridge.act.plan import Played, Step
+from khala_bridge.act.plan import PlanStep, Played
 from khala_bridge.catalogue.functions import check_against_pysc2
 from khala_bridge.compat import maps, sc2_env
 from khala_bridge.errors import GameError, GameMissing
-from khala_bridge.game.game import GameConfig, GameInfo, StepResult, check_install
+from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 
@@ -62,7 +62,7 @@ class PySC2Game:
         self._env = _start(config)
         with _explained("the game could not be asked for its version"):
             ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
-        self._info = GameInfo(
+        self._info = GameIdentity(
             version=ping.game_version,
             data_version=ping.data_version,
             map_file=config.map.file,
@@ -70,7 +70,7 @@ class PySC2Game:
         )
 
     @property
-    def info(self) -> GameInfo:
+    def info(self) -> GameIdentity:
         """What plays."""
         return self._info
 
@@ -172,7 +172,7 @@ class _Player:
         self._plan = plan
         self._fresh = True
         self.played = Played()
-        self.step: Step | None = None
+        self.step: PlanStep | None = None
         self._advance(None)
 
     def actions(self) -> list[GameAction]:
@@ -185,7 +185,7 @@ class _Player:
         if self.step is None:
             return
         if self.step.loops > loops and not snapshot.ended:
-            self.step = Step(self.step.actions, self.step.loops - loops)
+            self.step = PlanStep(self.step.actions, self.step.loops - loops)
         else:
             self._advance(snapshot)
 

@@ -12,7 +12,7 @@ there; here is what the game does not say of an enemy, and what an order would c
 
 from khala_bridge.knowledge.facts import VERSION, VERSIONS
 from khala_bridge.knowledge.load import RACES, abilities, ability_of, buffs, is_armed, knowledge, stand_ins, upgrades
-from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts, Weapon
+from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts, WeaponFacts
 from khala_bridge.knowledge.prompt import advice, short
 
 __all__ = [
@@ -21,9 +21,9 @@ __all__ = [
     "VERSIONS",
     "AbilityFacts",
     "BuffFacts",
-    "UnitType",
+    "UnitFacts",
     "UpgradeFacts",
-    "Weapon",
+    "WeaponFacts",
     "abilities",
     "ability_of",
     "advice",

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 from pydantic import TypeAdapter
 
 from khala_bridge import data
-from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts
+from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts
 from khala_protocol.messages import Frozen
 
 M = TypeVar("M", bound=Frozen)
@@ -24,9 +24,9 @@ VERSIONS: Final = (VERSION, "5.0.13")
 
 
 @functools.cache
-def unit_facts(version: str) -> dict[str, UnitType]:
+def unit_facts(version: str) -> dict[str, UnitFacts]:
     """Unit types by name."""
-    return _records(UnitType, {name: {"name": name, **raw} for name, raw in _entries(version, "units").items()})
+    return _records(UnitFacts, {name: {"name": name, **raw} for name, raw in _entries(version, "units").items()})
 
 
 @functools.cache

@@ -20,12 +20,12 @@ from khala_protocol.messages import Frozen
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitType, UpgradeFacts
+    from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts
 
 RACES: Final = ("protoss", "terran", "zerg")
 
 
-def knowledge(version: str = VERSION) -> dict[str, UnitType]:
+def knowledge(version: str = VERSION) -> dict[str, UnitFacts]:
     """Every known unit type by the name that PySC2 gives it, resources and obstacles too, in alphabetical order."""
     return _units(version)
 
@@ -128,7 +128,7 @@ def _filler(version: str) -> Filler:
 
 
 @functools.cache
-def _units(version: str) -> dict[str, UnitType]:
+def _units(version: str) -> dict[str, UnitFacts]:
     beaten_by = _beaten_by()
     return {name: _described(kind, beaten_by.get(name, ()), version) for name, kind in unit_facts(version).items()}
 
@@ -142,7 +142,7 @@ def _beaten_by() -> dict[str, tuple[str, ...]]:
     return {other: tuple(name for _, name in sorted(names)) for other, names in found.items()}
 
 
-def _described(kind: UnitType, beaten_by: tuple[str, ...], version: str) -> UnitType:
+def _described(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> UnitFacts:
     words, filler = unit_words()[kind.name], _filler(version)
     traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
     told = {
@@ -169,7 +169,7 @@ def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
     return {name: tuple(allowed) for name, allowed in found.items()}
 
 
-def _titled(kind: UnitType, version: str) -> Iterator[tuple[str, str]]:
+def _titled(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
     """The abilities of a type that have a title, with what is said about them."""
     for number in kind.ability_ids:
         if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:

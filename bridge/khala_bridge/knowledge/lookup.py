@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from khala_bridge.knowledge import prompt
 from khala_bridge.knowledge.facts import VERSION
 from khala_bridge.knowledge.load import abilities, knowledge, upgrades
-from khala_bridge.knowledge.model import AbilityFacts, UnitType, UpgradeFacts
+from khala_bridge.knowledge.model import AbilityFacts, UnitFacts, UpgradeFacts
 from khala_bridge.knowledge.words import listed, price
 from khala_bridge.knowledge.words import number as n
 from khala_protocol.errors import KhalaError
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INDENT = "    "
 
 
-Known: TypeAlias = UnitType | UpgradeFacts | AbilityFacts
+Known: TypeAlias = UnitFacts | UpgradeFacts | AbilityFacts
 
 
 class NotKnown(KhalaError):
@@ -53,7 +53,7 @@ def find(name: str, version: str = VERSION) -> list[Known]:
 
 def long(known: Known, version: str = VERSION) -> str:
     """All that is known of one thing."""
-    if isinstance(known, UnitType):
+    if isinstance(known, UnitFacts):
         lines = _unit(known, version)
     elif isinstance(known, UpgradeFacts):
         lines = _upgrade(known, version)
@@ -66,7 +66,7 @@ def _plain(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
-def _unit(kind: UnitType, version: str) -> list[str]:
+def _unit(kind: UnitFacts, version: str) -> list[str]:
     out = [f"{kind.name} ({'structure' if kind.structure else 'unit'}, {kind.race}, id {kind.id})"]
     out += _told(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
     out += [INDENT + prompt.body(kind) + f", sight {n(kind.sight)}"]
@@ -80,7 +80,7 @@ def _unit(kind: UnitType, version: str) -> list[str]:
     return [*out, f"{INDENT}Orders: {', '.join(f'{order.name} ({order.id})' for order in orders)}"] if orders else out
 
 
-def _upgrades(kind: UnitType, version: str) -> Iterator[str]:
+def _upgrades(kind: UnitFacts, version: str) -> Iterator[str]:
     """What makes a type better; levels that say the same share a line."""
     said: dict[str, list[str]] = {}
     for upgrade in upgrades(version).values():
@@ -90,7 +90,7 @@ def _upgrades(kind: UnitType, version: str) -> Iterator[str]:
         yield f"{', '.join(names)}: {about}"
 
 
-def _making(kind: UnitType) -> Iterator[str]:
+def _making(kind: UnitFacts) -> Iterator[str]:
     if kind.producers:
         needs = (*kind.requires, *((f"a {kind.addon} at the producer",) if kind.addon else ()))
         needed = f"; needs {listed(needs)}" if needs else ""
@@ -109,7 +109,7 @@ def _making(kind: UnitType) -> Iterator[str]:
     yield from (f"Needs {what}" for what, is_so in ground if is_so)
 
 
-def _related(kind: UnitType) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def _related(kind: UnitFacts) -> tuple[tuple[str, tuple[str, ...]], ...]:
     return (
         ("Counts also as", kind.counts_as),
         ("Allows", kind.allows),

@@ -16,7 +16,7 @@ Race: TypeAlias = Literal["protoss", "terran", "zerg", "neutral"]
 Target: TypeAlias = Literal["none", "point", "unit", "point_or_unit", "point_or_none"]
 
 
-class Weapon(Frozen):
+class WeaponFacts(Frozen):
     """One weapon of a unit type."""
 
     targets: Literal["ground", "air", "any"]
@@ -45,7 +45,7 @@ class Weapon(Frozen):
         return (self.damage + self.bonus.get(attribute, 0)) * self.attacks / self.period_s
 
 
-class UnitType(Frozen):
+class UnitFacts(Frozen):
     """What is known of one type."""
 
     name: str = ""
@@ -116,14 +116,14 @@ class UnitType(Frozen):
     makes_creep: bool = False
     counts_as: tuple[str, ...] = ()
     """Types that it stands in for where something requires them: a Hive for a Lair."""
-    weapons: tuple[Weapon, ...] = ()
+    weapons: tuple[WeaponFacts, ...] = ()
 
     @property
     def value(self) -> float:
         """Minerals and vespene that it costs."""
         return self.minerals + self.vespene
 
-    def hits(self, other: UnitType) -> bool:
+    def hits(self, other: UnitFacts) -> bool:
         """Whether any of its weapons can be aimed at the other type."""
         return any(weapon.targets == "any" or weapon.targets in other.planes for weapon in self.weapons)
 

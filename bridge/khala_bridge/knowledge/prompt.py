@@ -16,7 +16,7 @@ from khala_bridge.knowledge.words import number as n
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala_bridge.knowledge.model import UnitType, Weapon
+    from khala_bridge.knowledge.model import UnitFacts, WeaponFacts
 
 MOST: Final = 6
 """Types that are named as countering another one where it is not said which ones matter."""
@@ -47,7 +47,7 @@ def advice(name: str) -> tuple[str, ...]:
     return (*uses, *(f"{title}: {said}" for title, said in kind.abilities.items()))
 
 
-def body(kind: UnitType) -> str:
+def body(kind: UnitFacts) -> str:
     """`armored, mechanical, on the ground; health 80, shield 80, armor 1, speed 4.13`."""
     plane = "flying" if kind.flying else "on the ground"
     parts = [f"{', '.join((*kind.attributes, plane))}; health {n(kind.health)}"]
@@ -60,7 +60,7 @@ def body(kind: UnitType) -> str:
     return ", ".join(parts)
 
 
-def weapon(own: Weapon) -> str:
+def weapon(own: WeaponFacts) -> str:
     """`hits ground, range 6, damage 13 (+5 against armored) every 1.34 s, …`."""
     times = f" x {own.attacks}" if own.attacks > 1 else ""
     bonus = "".join(f" (+{n(more)} against {what})" for what, more in own.bonus.items())
@@ -77,7 +77,7 @@ def _tenths(value: float) -> str:
     return n(round(value, 1))
 
 
-def _matchups(kind: UnitType, among: frozenset[str] | None) -> Iterator[str]:
+def _matchups(kind: UnitFacts, among: frozenset[str] | None) -> Iterator[str]:
     """`good against Reaper, VoidRay; beaten by Immortal, Marauder`; nothing where nothing is known."""
     sides = (("good against", kind.counters), ("beaten by", kind.countered_by))
     chosen = ((what, _chosen(names, among)) for what, names in sides)

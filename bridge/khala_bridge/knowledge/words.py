@@ -26,7 +26,7 @@ from khala_bridge.knowledge.model import AbilityFacts
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from khala_bridge.knowledge.model import BuffFacts, UnitType, UpgradeFacts
+    from khala_bridge.knowledge.model import BuffFacts, UnitFacts, UpgradeFacts
 
 PLACEHOLDER: Final = re.compile(r"\{(-?)([\w.*]+)(%?)\}")
 
@@ -35,13 +35,13 @@ class Filler:
     """Fills in the facts of one version of the game."""
 
     def __init__(
-        self, units: Mapping[str, UnitType], abilities: Mapping[int, AbilityFacts], buffs: Mapping[str, BuffFacts]
+        self, units: Mapping[str, UnitFacts], abilities: Mapping[int, AbilityFacts], buffs: Mapping[str, BuffFacts]
     ) -> None:
         self._units = units
         self._abilities = abilities
         self._buffs = buffs
 
-    def fill(self, text: str, record: UnitType | AbilityFacts | UpgradeFacts) -> str:
+    def fill(self, text: str, record: UnitFacts | AbilityFacts | UpgradeFacts) -> str:
         """The text with every placeholder replaced.
 
         Raises:

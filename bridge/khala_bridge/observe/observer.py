@@ -21,7 +21,7 @@ from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.scene import Scene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Feedback, Page, render, sections_of
-from khala_bridge.state.teams import Roster
+from khala_bridge.state.teams import TeamRoster
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 class Observer:
     """The eyes of one side."""
 
-    def __init__(self, task: TaskConfig, roster: Callable[[Sequence[AgentConfig]], Roster] = Roster) -> None:
+    def __init__(self, task: TaskConfig, roster: Callable[[Sequence[AgentConfig]], TeamRoster] = TeamRoster) -> None:
         """Take a task, and what says which unit answers to which of its agents.
 
         Raises:
@@ -125,7 +125,7 @@ class Observer:
 class _Episode:
     """What is remembered during one episode."""
 
-    roster: Roster
+    roster: TeamRoster
     chronicle: Chronicle = field(default_factory=Chronicle)
     stages: Stages = field(default_factory=Stages)
     scene: Scene | None = None

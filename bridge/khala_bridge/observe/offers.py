@@ -15,7 +15,7 @@ from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
 from khala_bridge.rules import asked_by, brief, cases, distinct, facts_for, nearest, nobody, price_of, why_no_one
 from khala_bridge.state.means import ledger_of, side_of
-from khala_protocol.messages import Barred, Offer
+from khala_protocol.messages import ActionCost, UnavailableAction
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -32,8 +32,8 @@ class Choice(NamedTuple):
     """What a team may be told: a part of its view."""
 
     actions: tuple[ActionSpec, ...]
-    offers: tuple[Offer, ...]
-    barred: tuple[Barred, ...]
+    offers: tuple[ActionCost, ...]
+    barred: tuple[UnavailableAction, ...]
 
 
 class Possible:
@@ -92,7 +92,7 @@ class Possible:
         barred = tuple([_barred(name, brief(why)) for name, why in judged.items() if why is not None])
         return Choice(tuple([a.spec for a in valid]), tuple([offer for offer in offers if offer is not None]), barred)
 
-    def _offer(self, action: Action, unit_type: str) -> Offer | None:
+    def _offer(self, action: Action, unit_type: str) -> ActionCost | None:
         """What an action costs that a type of unit can do; None if it is free."""
         if not _is_paid(action.name, unit_type) or action.pysc2 is None:
             return None
@@ -101,7 +101,7 @@ class Possible:
         cost, made = price_of(facts), facts.produces
         times = self._ledger.times(cost)
         known = knowledge().get(made) if made else None
-        return Offer(
+        return ActionCost(
             action=action.name,
             minerals=round(cost.minerals),
             vespene=round(cost.vespene),
@@ -158,5 +158,5 @@ def _skills(names: tuple[str, ...]) -> dict[str, int]:
 
 
 @functools.lru_cache(4096)
-def _barred(action: str, reason: str) -> Barred:
-    return Barred(action=action, reason=reason)
+def _barred(action: str, reason: str) -> UnavailableAction:
+    return UnavailableAction(action=action, reason=reason)

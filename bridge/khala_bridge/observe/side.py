@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.chronicle import Chronicle
     from khala_bridge.observe.scene import Scene
-    from khala_bridge.state.teams import Roster
+    from khala_bridge.state.teams import TeamRoster
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Point, UnitView
 
@@ -117,7 +117,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     return tuple(dict.fromkeys(alert for alert in scene.snapshot.alerts if alert in WARNINGS))
 
 
-def others(scene: Scene, roster: Roster, task: TaskConfig, agent: str) -> tuple[TeamReport, ...]:
+def others(scene: Scene, roster: TeamRoster, task: TaskConfig, agent: str) -> tuple[TeamReport, ...]:
     """The teams of all other agents, in the order of the task."""
     teams = (team for other in task.agents if other.name != agent for team in roster.teams(other.name))
     return tuple(_report(t.agent, t.name, [scene.bodies[tag] for tag in t.tags]) for t in teams if t.tags)

@@ -9,9 +9,9 @@ Below are names, frames and what is known of types. Above is everything that see
 
 from khala_bridge.state.episode import EpisodeInfo, PictureSizes
 from khala_bridge.state.grid import Grid
-from khala_bridge.state.pictures import Pictures
+from khala_bridge.state.pictures import GamePictures
 from khala_bridge.state.read import read_info, read_snapshot, read_unit
-from khala_bridge.state.snapshot import ActionError, Effect, Player, PowerSource, Score, Snapshot
+from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
 from khala_bridge.state.unit import Alliance, Display, Order, Unit
 
 __all__ = [
@@ -20,13 +20,13 @@ __all__ = [
     "Display",
     "Effect",
     "EpisodeInfo",
+    "GamePictures",
     "Grid",
     "Order",
     "PictureSizes",
-    "Pictures",
-    "Player",
+    "PlayerScore",
+    "PlayerState",
     "PowerSource",
-    "Score",
     "Snapshot",
     "Unit",
     "read_info",

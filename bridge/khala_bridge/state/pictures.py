@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _DEPTHS = {1: "u1", 8: "u1", 16: "<u2", 32: "<i4"}
 
 
-class Pictures:
+class GamePictures:
     """What the game drew; every method returns None for what it did not draw."""
 
     __slots__ = ("_observation",)

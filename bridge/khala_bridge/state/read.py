@@ -23,8 +23,8 @@ from khala_bridge.knowledge import knowledge
 from khala_bridge.names import unit_name, upgrade_name
 from khala_bridge.state.episode import EpisodeInfo, PictureSizes
 from khala_bridge.state.grid import NO_GRID, Grid
-from khala_bridge.state.pictures import Pictures
-from khala_bridge.state.snapshot import ActionError, Effect, Player, PowerSource, Score, Snapshot
+from khala_bridge.state.pictures import GamePictures
+from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
 from khala_bridge.state.unit import Alliance, Display, Order, Unit
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import common_pb2, score_pb2
 
-    from khala_bridge.knowledge import UnitType
+    from khala_bridge.knowledge import UnitFacts
     from khala_protocol.messages import Outcome
 
 _OUTCOMES: dict[int, Outcome] = {sc_pb.Victory: "win", sc_pb.Defeat: "loss", sc_pb.Tie: "draw"}
@@ -106,7 +106,7 @@ def read_snapshot(
         camera=WorldPoint(camera.x, camera.y),
         creep=_grid(raw.map_state.creep),
         visibility=_grid(raw.map_state.visibility),
-        pictures=Pictures(observation),
+        pictures=GamePictures(observation),
         abilities=abilities,
         functions=functions,
         dead=dead.union(raw.event.dead_units),
@@ -133,7 +133,7 @@ class _Type(NamedTuple):
     """What every unit of a type has."""
 
     name: str
-    facts: UnitType | None
+    facts: UnitFacts | None
 
 
 @functools.lru_cache(4096)
@@ -185,8 +185,8 @@ def _order(order: raw_pb2.UnitOrder) -> Order:
 # --- the rest ---------------------------------------------------------------------------------------------------
 
 
-def _player(common: sc_pb.PlayerCommon) -> Player:
-    return Player(
+def _player(common: sc_pb.PlayerCommon) -> PlayerState:
+    return PlayerState(
         player_id=common.player_id,
         minerals=common.minerals,
         vespene=common.vespene,
@@ -199,9 +199,9 @@ def _player(common: sc_pb.PlayerCommon) -> Player:
     )
 
 
-def _score(score: score_pb2.Score) -> Score:
+def _score(score: score_pb2.Score) -> PlayerScore:
     details = score.score_details
-    return Score(
+    return PlayerScore(
         total=float(score.score),
         killed=_total(details.killed_minerals) + _total(details.killed_vespene),
         lost=_total(details.lost_minerals) + _total(details.lost_vespene),

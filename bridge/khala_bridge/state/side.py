@@ -16,7 +16,7 @@ from khala_bridge.names import buff_name, unit_name
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_bridge.knowledge import UnitType
+    from khala_bridge.knowledge import UnitFacts
     from khala_bridge.state import Snapshot, Unit
 
 NO_ARMY = frozenset({"Queen", "QueenBurrowed"})
@@ -27,13 +27,13 @@ UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "Rav
 """What is to become a unit, and does nothing until then."""
 
 
-def kind(unit: Unit) -> UnitType | None:
+def kind(unit: Unit) -> UnitFacts | None:
     """What is known of the type of a unit."""
     return _kind(unit.unit_type)
 
 
 @functools.lru_cache(2048)
-def _kind(unit_type: int) -> UnitType | None:
+def _kind(unit_type: int) -> UnitFacts | None:
     return knowledge().get(unit_name(unit_type))
 
 
@@ -84,7 +84,7 @@ def army(snapshot: Snapshot, *, home: bool = False) -> list[Unit]:
     return [unit for unit in finished(snapshot.own) if _fights(kind(unit)) and (home or name(unit) not in NO_ARMY)]
 
 
-def _fights(known: UnitType | None) -> bool:
+def _fights(known: UnitFacts | None) -> bool:
     return known is not None and not (known.structure or known.worker) and known.speed > 0 and known.supply > 0
 
 

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from khala_bridge.frames import WorldPoint
     from khala_bridge.state.episode import EpisodeInfo
     from khala_bridge.state.grid import Grid
-    from khala_bridge.state.pictures import Pictures
+    from khala_bridge.state.pictures import GamePictures
     from khala_bridge.state.unit import Alliance, Unit
     from khala_protocol.messages import Outcome
 
 
-class Player(NamedTuple):
+class PlayerState(NamedTuple):
     """What the player has."""
 
     player_id: int = 0
@@ -38,7 +38,7 @@ class Player(NamedTuple):
     """Units that the game counts as army."""
 
 
-class Score(NamedTuple):
+class PlayerScore(NamedTuple):
     """The game's own score of the player."""
 
     total: float = 0.0
@@ -92,8 +92,8 @@ class Snapshot:
     """Those of them that are there now: in sight, or cloaked at a known place."""
     own: tuple[Unit, ...]
     """The player's own units, in ascending order of tags."""
-    player: Player
-    score: Score
+    player: PlayerState
+    score: PlayerScore
     upgrades: tuple[str, ...]
     """Names of the upgrades that the player has, in ascending order of their numbers."""
     power_sources: tuple[PowerSource, ...]
@@ -108,7 +108,7 @@ class Snapshot:
     """1 where creep is."""
     visibility: Grid
     """2 where the player sees now, 1 where it once saw, 0 elsewhere."""
-    pictures: Pictures = field(repr=False, compare=False)
+    pictures: GamePictures = field(repr=False, compare=False)
     """The game's own pictures, decoded when they are asked for."""
     abilities: Mapping[int, frozenset[int]] | None = None
     """By tag of an own unit, the abilities that the game would take from it now, each as itself and in its general

@@ -41,7 +41,7 @@ from khala_bridge.names import unit_name
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from khala_bridge.state import Player, Unit
+    from khala_bridge.state import PlayerState, Unit
     from khala_bridge.task.config import AgentConfig, TeamConfig, TeamKind
 
 WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
@@ -71,7 +71,7 @@ class Team:
         return self.tags[0]
 
 
-class Roster:
+class TeamRoster:
     """Who has which unit in a running episode; one per side."""
 
     def __init__(self, agents: Iterable[AgentConfig]) -> None:
@@ -80,7 +80,7 @@ class Roster:
         self._grouped: set[int] = set()
         self._takers: dict[int, list[list[_Group]]] = {}  # by unit type; [] for a type that no team lists
 
-    def update(self, own: Sequence[Unit], player: Player) -> None:
+    def update(self, own: Sequence[Unit], player: PlayerState) -> None:
         """Drops the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
         units = {unit.tag: unit for unit in own}
         self._keep(units)
@@ -182,7 +182,7 @@ class _Arrival:
     unit: Unit
     units: Mapping[int, Unit]
     transports: Sequence[Unit]
-    player: Player
+    player: PlayerState
 
 
 def _lists(takers: Iterable[Sequence[_Group]], group: _Group) -> bool:

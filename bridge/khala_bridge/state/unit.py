@@ -13,7 +13,7 @@ from khala_bridge.names import buff_name, order_name
 
 if TYPE_CHECKING:
     from khala_bridge.frames import WorldPoint
-    from khala_bridge.knowledge import UnitType
+    from khala_bridge.knowledge import UnitFacts
 
 
 class Alliance(IntEnum):
@@ -63,7 +63,7 @@ class Unit(NamedTuple):
 
     name: str
     """Name of its type as PySC2 has it, `Stalker`."""
-    facts: UnitType | None
+    facts: UnitFacts | None
     """What is known of its type; None for a type that `khala_bridge.knowledge` does not have."""
     alliance: Alliance
     display_type: Display

@@ -102,7 +102,7 @@ class Window:
             self._in_flight -= size
 
 
-class Stopwatch:
+class DropGate:
     """The gate of puts that DROP: open for what fits into one batch, until one was slow, until one is quick again."""
 
     def __init__(self) -> None:

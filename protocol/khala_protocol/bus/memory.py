@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from khala_protocol.bus import Delivery, Liveness, Sample
+from khala_protocol.bus.inbox import Inbox
 from khala_protocol.bus.keyexpr import check_key, check_key_expr, matches
-from khala_protocol.bus.mailbox import Mailbox
 from khala_protocol.errors import BusClosed
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class MemoryBus:
     async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
         """See `khala_protocol.bus.Bus.subscribe`."""
         self._check_open()
-        mailbox: Mailbox[Sample] = Mailbox(depth, on_close=lambda: self._node.subscribers.remove(subscriber))
+        mailbox: Inbox[Sample] = Inbox(depth, on_close=lambda: self._node.subscribers.remove(subscriber))
         subscriber = _Subscriber(check_key_expr(key_expr), delivery, mailbox)
         self._node.subscribers.append(subscriber)
         self._hub.catch_up(self._node, subscriber)
@@ -71,7 +71,7 @@ class MemoryBus:
     async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
         """See `khala_protocol.bus.Bus.watch`."""
         self._check_open()
-        mailbox: Mailbox[Liveness] = Mailbox(depth, on_close=lambda: self._node.watchers.remove(watcher))
+        mailbox: Inbox[Liveness] = Inbox(depth, on_close=lambda: self._node.watchers.remove(watcher))
         watcher = _Watcher(check_key_expr(key_expr), mailbox)
         self._node.watchers.append(watcher)
         self._hub.report_tokens()
@@ -158,7 +158,7 @@ class _Hub:
 class _Subscriber:
     key_expr: str
     delivery: Delivery
-    mailbox: Mailbox[Sample]
+    mailbox: Inbox[Sample]
     taken: dict[_Publisher, int] = field(default_factory=dict)
     """How many samples of each STATE publisher had been put when the last one arrived here."""
 
@@ -177,7 +177,7 @@ class _Subscriber:
 @dataclass(eq=False)
 class _Watcher:
     key_expr: str
-    mailbox: Mailbox[Liveness]
+    mailbox: Inbox[Liveness]
     alive: set[str] = field(default_factory=set)
 
     def see(self, keys: dict[str, None], *, link_up: bool) -> None:

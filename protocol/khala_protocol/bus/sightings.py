@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from khala_protocol.bus import Liveness
 
 if TYPE_CHECKING:
-    from khala_protocol.bus.mailbox import Mailbox
+    from khala_protocol.bus.inbox import Inbox
 
 PATIENCE_S = 0.02
 
@@ -26,7 +26,7 @@ class Sightings:
         patience_s: how long the end of a token waits for the end of our link; 0 where there is no single link.
     """
 
-    def __init__(self, mailbox: Mailbox[Liveness], *, patience_s: float = PATIENCE_S, link_up: bool = True) -> None:
+    def __init__(self, mailbox: Inbox[Liveness], *, patience_s: float = PATIENCE_S, link_up: bool = True) -> None:
         self._mailbox = mailbox
         self._patience_s = patience_s
         self._link_up = link_up

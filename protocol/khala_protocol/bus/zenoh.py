@@ -35,9 +35,9 @@ from khala_protocol.bus import Delivery, Liveness, Sample
 from khala_protocol.bus.audience import Audience
 from khala_protocol.bus.config import BusConfig, check, settings
 from khala_protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
+from khala_protocol.bus.inbox import Doorbell, Inbox
 from khala_protocol.bus.keyexpr import check_key, check_key_expr
-from khala_protocol.bus.lane import Lane, Shut, Stopwatch, Window
-from khala_protocol.bus.mailbox import Doorbell, Mailbox
+from khala_protocol.bus.lane import DropGate, Lane, Shut, Window
 from khala_protocol.bus.sightings import PATIENCE_S, Sightings
 from khala_protocol.bus.threads import run_detached
 from khala_protocol.errors import BusClosed, BusError
@@ -123,9 +123,9 @@ class ZenohBus:
         self._question = ""
         self._threads = [ThreadPoolExecutor(1, f"khala-{name}") for name in ("speech", "bulk")]
         self._speech = Lane(self._threads[0], Window(self._ask) if self._is_client else Shut())
-        self._stopwatch = Stopwatch()
+        self._stopwatch = DropGate()
         self._doorbell = Doorbell()
-        self._mailboxes: set[Mailbox[Any]] = set()
+        self._mailboxes: set[Inbox[Any]] = set()
         self._sightings: set[Sightings] = set()
         self._links = {str(transport.zid) for transport in session.info.transports()}
         events = Callback(partial(self._hand_over, self._on_transport), indirect=False)
@@ -177,7 +177,7 @@ class ZenohBus:
         """See `khala_protocol.bus.Bus.subscribe`."""
         self._check_open()
         check_key_expr(key_expr)
-        mailbox: Mailbox[Sample] = Mailbox(
+        mailbox: Inbox[Sample] = Inbox(
             depth, on_close=lambda: self._forget(mailbox, *declared), doorbell=self._doorbell
         )
         take = Callback(partial(_take, mailbox), indirect=False)
@@ -206,7 +206,7 @@ class ZenohBus:
         """See `khala_protocol.bus.Bus.watch`."""
         self._check_open()
         check_key_expr(key_expr)
-        mailbox: Mailbox[Liveness] = Mailbox(depth, on_close=lambda: self._stop_watching(mailbox, sightings, watcher))
+        mailbox: Inbox[Liveness] = Inbox(depth, on_close=lambda: self._stop_watching(mailbox, sightings, watcher))
         # Only a client has one link, which is its own; a router or peer that loses one has lost the other side.
         patience_s = PATIENCE_S if self._is_client else 0.0
         sightings = Sightings(mailbox, patience_s=patience_s, link_up=bool(self._links) or not self._is_client)
@@ -235,7 +235,7 @@ class ZenohBus:
 
     def _bulk_lane(self) -> Lane:
         # One link is slow for all publishers of a client; of a router's links, each has its own.
-        return Lane(self._threads[1], self._stopwatch if self._is_client else Stopwatch())
+        return Lane(self._threads[1], self._stopwatch if self._is_client else DropGate())
 
     def _shut(self) -> None:
         for thread in self._threads:
@@ -246,11 +246,11 @@ class ZenohBus:
         if self._held.closed:
             raise BusClosed("the bus is closed")
 
-    def _forget(self, mailbox: Mailbox[Any], *declared: Any) -> None:
+    def _forget(self, mailbox: Inbox[Any], *declared: Any) -> None:
         self._mailboxes.discard(mailbox)
         self._held.take_back(*declared)
 
-    def _stop_watching(self, mailbox: Mailbox[Liveness], sightings: Sightings, watcher: Any) -> None:
+    def _stop_watching(self, mailbox: Inbox[Liveness], sightings: Sightings, watcher: Any) -> None:
         self._sightings.discard(sightings)
         self._forget(mailbox, watcher)
 
@@ -376,7 +376,7 @@ def _declare_state_publisher(session: zenoh.Session, key: str) -> AdvancedPublis
 
 
 def _declare_state_subscriber(
-    session: zenoh.Session, key_expr: str, take: Callback[zenoh.Sample], mailbox: Mailbox[Sample]
+    session: zenoh.Session, key_expr: str, take: Callback[zenoh.Sample], mailbox: Inbox[Sample]
 ) -> tuple[Any, ...]:
     subscriber = declare_advanced_subscriber(
         session,
@@ -392,12 +392,12 @@ def _declare_state_subscriber(
 # --- callbacks, on threads of Zenoh -----------------------------------------------------------------
 
 
-def _take(mailbox: Mailbox[Sample], sample: zenoh.Sample) -> None:
+def _take(mailbox: Inbox[Sample], sample: zenoh.Sample) -> None:
     if sample.kind == SampleKind.PUT:
         mailbox.offer_from_thread(Sample(str(sample.key_expr), sample.payload.to_bytes()))
 
 
-def _count(mailbox: Mailbox[Sample], miss: Miss) -> None:
+def _count(mailbox: Inbox[Sample], miss: Miss) -> None:
     mailbox.miss(miss.nb)
 
 

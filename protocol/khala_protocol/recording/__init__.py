@@ -11,7 +11,7 @@ This package knows bytes, keys and kinds of messages, and nothing of matches; wh
 chunk. Not safe for threads.
 """
 
-from khala_protocol.recording.reader import Recorded, Recording, Step, read, recover
+from khala_protocol.recording.reader import Recorded, RecordedStep, Recording, read, recover
 from khala_protocol.recording.recorder import Recorder
 
-__all__ = ["Recorded", "Recorder", "Recording", "Step", "read", "recover"]
+__all__ = ["Recorded", "RecordedStep", "Recorder", "Recording", "read", "recover"]

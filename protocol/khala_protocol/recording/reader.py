@@ -73,7 +73,7 @@ class Recorded:
 
 
 @dataclass(frozen=True)
-class Step:
+class RecordedStep:
     """One step of an episode: the samples from its first observation to the first one of the next step.
 
     A late reply stands in the step that it arrived in, not in the one that it answers.
@@ -169,7 +169,7 @@ class Recording:
         """All answers to one step, in order of arrival, late and repeated ones too."""
         return tuple(reply for reply in self.of(Reply) if (reply.episode, reply.step) == (episode, step))
 
-    def by_step(self) -> Iterator[Step]:
+    def by_step(self) -> Iterator[RecordedStep]:
         """The samples step by step; what was recorded before the first observation belongs to no step."""
         place: tuple[int, int] | None = None
         samples: list[Recorded] = []
@@ -178,12 +178,12 @@ class Recording:
                 begun = (sample.message.episode, sample.message.step)
                 if place is None or begun > place:
                     if place is not None:
-                        yield Step(*place, tuple(samples))
+                        yield RecordedStep(*place, tuple(samples))
                     place, samples = begun, []
             if place is not None:
                 samples.append(sample)
         if place is not None:
-            yield Step(*place, tuple(samples))
+            yield RecordedStep(*place, tuple(samples))
 
 
 def read(path: Path | str) -> Iterator[Recorded]:

@@ -1,6 +1,6 @@
 """The arguments of a call: text between parentheses ↔ tags, points and words; and a call ↔ its canonical text.
 
-Pure and total: every text gives a tuple or `Malformed`. It knows the *form* of an
+Pure and total: every text gives a tuple or `MalformedCall`. It knows the *form* of an
 argument (hexadecimal is a tag, two numbers are a point) and nothing of what an action wants; whether the
 form is the right one, and whether the point lies in its frame, is the business of who knows the catalogue.
 Above it: `khala_protocol.speech.reader`, which finds the calls.
@@ -30,7 +30,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from khala_protocol.speech.marks import QUOTES, Malformed
+from khala_protocol.speech.marks import QUOTES, MalformedCall
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -64,7 +64,7 @@ def read_arguments(text: str) -> tuple[str | Point, ...]:
     """Reads what stands between the parentheses of a call; see the table of the module.
 
     Raises:
-        Malformed: an argument other than the last is empty.
+        MalformedCall: an argument other than the last is empty.
     """
     plain = text.replace("\\", " ")
     if "=" in plain or ":" in plain:
@@ -73,7 +73,7 @@ def read_arguments(text: str) -> tuple[str | Point, ...]:
     while pieces and not pieces[-1]:
         pieces.pop()
     if not all(pieces):
-        raise Malformed("an argument between two commas is empty: fill it in or leave the comma out")
+        raise MalformedCall("an argument between two commas is empty: fill it in or leave the comma out")
     return tuple(_join_coordinates([_read_one(piece) for piece in pieces]))
 
 

@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from typing import NoReturn
 
-from khala_protocol.speech.marks import SHORT, Malformed
+from khala_protocol.speech.marks import SHORT, MalformedCall
 
 # Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
@@ -82,7 +82,7 @@ def close_parentheses(text: str, opening: Opening) -> tuple[int, int]:
     the parentheses are closed and nothing else follows (rule S22).
 
     Raises:
-        Malformed: the call is not closed before the next `<` or the end of the text, or what was meant is not clear.
+        MalformedCall: the call is not closed before the next `<` or the end of the text, or what was meant is not clear.
     """
     opened = ["("]
     for match in _BRACKET.finditer(text, opening.end):
@@ -97,7 +97,7 @@ def close_parentheses(text: str, opening: Opening) -> tuple[int, int]:
             opened.pop()
             if not opened:
                 return match.start(), _close_angle(text, match.end(), opening)
-    raise Malformed(f"the call is not closed: end it with )> as in <{opening.name[:SHORT]}(...)>")
+    raise MalformedCall(f"the call is not closed: end it with )> as in <{opening.name[:SHORT]}(...)>")
 
 
 def _mend(text: str, opening: Opening, wrong: re.Match[str]) -> tuple[int, int]:
@@ -105,7 +105,7 @@ def _mend(text: str, opening: Opening, wrong: re.Match[str]) -> tuple[int, int]:
     closing = _CLOSE.match(text, wrong.start())
     if closing is None or not opening.is_call_like or "\n" in text[opening.end : closing.end()]:
         name = opening.name[:SHORT]
-        raise Malformed(
+        raise MalformedCall(
             f"a bracket is not closed before {wrong.group()!r}: write <{name}(...)> and close every bracket"
         )
     return wrong.start(), closing.end()
@@ -129,11 +129,13 @@ def refuse_words(text: str, opening: Opening) -> NoReturn:
     """Says what is wrong with a name that neither `(` nor `>` follows.
 
     Raises:
-        Malformed: always.
+        MalformedCall: always.
     """
     more = _MORE_WORDS.match(text, opening.end)
     name = "_".join([opening.name, *(more.group().split() if more else [])])
-    raise Malformed(f"the name of a call is one word, its arguments stand in parentheses: write <{name[:SHORT]}(...)>")
+    raise MalformedCall(
+        f"the name of a call is one word, its arguments stand in parentheses: write <{name[:SHORT]}(...)>"
+    )
 
 
 def close_bare(text: str, at: int) -> int | None:
@@ -201,4 +203,4 @@ def _close_angle(text: str, at: int, opening: Opening) -> int:
         return closing.end()
     if opening.is_call_like and _LINE_ENDS.match(text, at):  # S22
         return at
-    raise Malformed(f"a '>' is missing behind the ')': write <{opening.name[:SHORT]}(...)>")
+    raise MalformedCall(f"a '>' is missing behind the ')': write <{opening.name[:SHORT]}(...)>")

@@ -39,7 +39,7 @@ from khala_protocol.speech import words
 from khala_protocol.speech.marks import QUOTES
 
 
-class Section(Enum):
+class ReplySection(Enum):
     """The part of a reply that a call stands in."""
 
     NONE = "none"
@@ -63,7 +63,7 @@ class Heading:
     """One heading; `end` is the offset behind it. A heading may open a section, speak for a team, or both."""
 
     end: int
-    section: Section | None = None
+    section: ReplySection | None = None
     names_team: bool = False
     team: str | None = None
     tone: Tone = Tone.DO
@@ -130,9 +130,9 @@ _NO_TEAM = re.compile(
 _SECTIONS = tuple(
     (section, re.compile(expression, re.IGNORECASE))
     for section, expression in (
-        (Section.ANALYSIS, words.ANALYSIS),
-        (Section.ACTIONS, words.ACTIONS),
-        (Section.COMMUNICATIONS, words.COMMUNICATIONS),
+        (ReplySection.ANALYSIS, words.ANALYSIS),
+        (ReplySection.ACTIONS, words.ACTIONS),
+        (ReplySection.COMMUNICATIONS, words.COMMUNICATIONS),
     )
 )
 
@@ -194,7 +194,7 @@ def _may_be_team(word: str, *, line_start: bool) -> bool:
     return (line_start or not word.isalpha()) and not _NO_TEAM.fullmatch(word)
 
 
-def _section(word: str | None) -> Section | None:
+def _section(word: str | None) -> ReplySection | None:
     if word is None:
         return None
     return next(section for section, expression in _SECTIONS if expression.fullmatch(word))

@@ -29,7 +29,7 @@ _ENTITIES = {"lt": "<", "gt": ">", "quot": '"', "#34": '"', "apos": "'", "#39": 
 _BACKSLASHED = re.compile(r"\\([\"'nt])")
 
 
-class Malformed(ValueError):
+class MalformedCall(ValueError):
     """Something that looks like a call and is none; the text is the sentence that the model is told."""
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from khala_protocol.speech.arguments import read_arguments
-from khala_protocol.speech.marks import Malformed
+from khala_protocol.speech.marks import MalformedCall
 
 if TYPE_CHECKING:
     from khala_protocol.messages import Point
@@ -81,7 +81,7 @@ def _call(found: object, end: int) -> ObjectCall | None:
         given = {key: value for key, value in given.items() if str(key).lower() not in TEAMS}
     try:
         args = read_arguments(call["inside"]) if call["inside"] else tuple(_values(given))
-    except Malformed:
+    except MalformedCall:
         return None
     return ObjectCall(call["name"], args, team if isinstance(team, str) else None, end)
 

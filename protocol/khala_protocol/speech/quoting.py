@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from khala_protocol.speech.marks import QUOTES, SHORT, Malformed
+from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall
 
 _Q = re.escape(QUOTES)
 _MESSAGE = r"<\s*+message_?to\s*+\("
@@ -88,12 +88,12 @@ class MessageReader:
         """Reads recipient and text behind `<MessageTo(`, or behind `MessageTo(` if it is naked.
 
         Raises:
-            Malformed: one of them is missing, or the message is not closed.
+            MalformedCall: one of them is missing, or the message is not closed.
         """
         to = _RECIPIENT.match(self._text, at)
         recipient = (to["quoted"] or to["plain"]).strip(" \t*_[]{}\\") if to else ""
         if to is None or not recipient:
-            raise Malformed(f"a message needs a recipient and a text: {_SAMPLE}")
+            raise MalformedCall(f"a message needs a recipient and a text: {_SAMPLE}")
         quote = _QUOTE.match(self._text, to.end())
         found = quote and self._quoted_end(quote, naked=naked)
         stop, end = found or self._line_end(to.end(), recipient, naked=naked)
@@ -101,7 +101,7 @@ class MessageReader:
         if quote and quote.group() not in _ENDS:
             stop = self._before_quotes(start, stop)
         if stop <= start or not self._text[start:stop].strip(QUOTES + " \t\n"):
-            raise Malformed(f"the message has no text: {_SAMPLE}")
+            raise MalformedCall(f"the message has no text: {_SAMPLE}")
         return Addressed(recipient, start, stop, end)
 
     def _before_quotes(self, start: int, stop: int) -> int:
@@ -129,7 +129,7 @@ class MessageReader:
                 if found := _NAKED_LINE_END.search(self._text, at, stop):
                     return found.start(), found.end()
                 self._not_closed_before = stop
-            raise Malformed(f"the message to {recipient[:SHORT]} is not closed: {_SAMPLE}")
+            raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: {_SAMPLE}")
         depth = 0
         for mark in _NESTING.finditer(self._text, at):
             if mark["open"] and depth < _DEEPEST:
@@ -140,7 +140,7 @@ class MessageReader:
                 return self._before_quotes(at, mark.start()), mark.end()
             else:
                 depth -= 1
-        raise Malformed(f"the message to {recipient[:SHORT]} is not closed: end it with ''')>")
+        raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: end it with ''')>")
 
 
 def _end_of(mark: str, *, naked: bool = False) -> re.Pattern[str]:

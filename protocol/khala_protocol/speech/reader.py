@@ -36,13 +36,13 @@ from khala_protocol.speech.headings import (
     JSON_KEY,
     SENTENCE_END,
     Heading,
-    Section,
+    ReplySection,
     Tone,
     heading_at,
     json_heading_at,
     tag_heading_at,
 )
-from khala_protocol.speech.marks import SHORT, Malformed, to_ascii, unescaped
+from khala_protocol.speech.marks import SHORT, MalformedCall, to_ascii, unescaped
 from khala_protocol.speech.objects import ObjectMessage, object_at
 from khala_protocol.speech.quoting import MessageReader
 from khala_protocol.speech.said import Gathering, ListenTo, MessageTo, Speech
@@ -98,7 +98,7 @@ class _Walk:
 
     def _start_over(self) -> None:
         self.gathering = Gathering()
-        self._section = Section.NONE
+        self._section = ReplySection.NONE
         self._aside_until = 0
         self._team: str | None = None
         self._team_above_section: str | None = None
@@ -142,7 +142,7 @@ class _Walk:
         if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
             return len(self._plain)
         at = self._headings(at, line_start=True)
-        if self._section is Section.ACTIONS and (words := in_words_at(self._plain, at)):
+        if self._section is ReplySection.ACTIONS and (words := in_words_at(self._plain, at)):
             reason = f"a call stands in angle brackets: write <{words['name'][:SHORT]}(...)>"
             self._fault(words.start(), words.end(), words["name"], reason)
             return words.end()
@@ -164,24 +164,24 @@ class _Walk:
         return at
 
     def _enter(self, heading: Heading, at: int) -> None:
-        if heading.section and heading.section is Section.ACTIONS and heading.tone is Tone.INSTEAD:
+        if heading.section and heading.section is ReplySection.ACTIONS and heading.tone is Tone.INSTEAD:
             self.gathering.withdraw_orders(heading.team)
-        if heading.explains and self._section is Section.ACTIONS and self.gathering.has_orders():
+        if heading.explains and self._section is ReplySection.ACTIONS and self.gathering.has_orders():
             line_end = self._plain.find("\n", heading.end)
             rest = self._plain[heading.end : line_end if line_end >= 0 else None]
             if rest.strip("*_#: \t"):
                 self._aside_until = heading.end + len(rest)
             else:
-                self._section = Section.ANALYSIS
+                self._section = ReplySection.ANALYSIS
         if heading.section:
             self.gathering.open_block(self._plain[at : heading.end])
             if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip('#*_> \t\n",{['):
                 self._team_above_section = self._team  # S14
-            elif (self._section, heading.section) != (Section.ANALYSIS, Section.ACTIONS):
+            elif (self._section, heading.section) != (ReplySection.ANALYSIS, ReplySection.ACTIONS):
                 self._team_above_section = None
             self._team = self._team if heading.numbered else self._team_above_section
-            if heading.tone is Tone.SPEAK_OF and heading.section is Section.ACTIONS:
-                self._section = Section.ANALYSIS
+            if heading.tone is Tone.SPEAK_OF and heading.section is ReplySection.ACTIONS:
+                self._section = ReplySection.ANALYSIS
             else:
                 self._section = heading.section
                 self.gathering.headed.add(heading.section)
@@ -198,7 +198,7 @@ class _Walk:
         if end is not None:
             return self._line(end.end())
         reason = "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>"
-        self._section = Section.ACTIONS  # never a mention, wherever it stands
+        self._section = ReplySection.ACTIONS  # never a mention, wherever it stands
         self._fault(begin.start(), begin.end(), "", reason)
         return len(self._text)
 
@@ -215,7 +215,7 @@ class _Walk:
         if found is None:
             return None
         if isinstance(found, ObjectMessage):
-            self._add(MessageTo(found.recipient, found.text, start, found.end), Section.COMMUNICATIONS, start)
+            self._add(MessageTo(found.recipient, found.text, start, found.end), ReplySection.COMMUNICATIONS, start)
             return found.end
         self._add_call(found.name, found.args, start, found.end, team=found.team)
         return found.end
@@ -236,7 +236,7 @@ class _Walk:
             else:
                 self._add_call(name, read_arguments(found["inside"]), start, found.end(), team=found["team"])
             return found.end()
-        except Malformed as error:
+        except MalformedCall as error:
             end = naked.end() if naked else found.end()
             self._fault(start, end, name, str(error))
             return end
@@ -250,7 +250,7 @@ class _Walk:
             return start + 1
         try:
             end = self._call(start, opening)
-        except Malformed as error:
+        except MalformedCall as error:
             if opening.is_call_like:
                 self._fault(start, segment_end(self._plain, start), opening.name, str(error))
             return opening.end
@@ -296,30 +296,32 @@ class _Walk:
 
     def _message(self, start: int, found: Addressed) -> int:
         text = unescaped(self._text[found.start : found.stop])
-        self._add(MessageTo(found.recipient, text, start, found.end), Section.COMMUNICATIONS, start)
+        self._add(MessageTo(found.recipient, text, start, found.end), ReplySection.COMMUNICATIONS, start)
         return found.end
 
     def _listen(self, start: int, end: int, name: str, inside: str) -> None:
         if name.lower() not in LISTEN_NAMES:
-            raise Malformed("a message needs a recipient and a text: write <MessageTo(Name, '''text''')>")
+            raise MalformedCall("a message needs a recipient and a text: write <MessageTo(Name, '''text''')>")
         channels = [channel for channel in read_arguments(inside) if isinstance(channel, str)]
         if not channels:
-            raise Malformed("a channel is missing: write <ListenTo(Name)>")
+            raise MalformedCall("a channel is missing: write <ListenTo(Name)>")
         for channel in channels:
-            self._add(ListenTo(channel.split("=")[-1].strip("\"' "), start, end), Section.COMMUNICATIONS, start)
+            self._add(ListenTo(channel.split("=")[-1].strip("\"' "), start, end), ReplySection.COMMUNICATIONS, start)
 
     def _add_call(
         self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
     ) -> None:
-        self._add(Call(name=name, args=args, team=team or self._team, start=start, end=end), Section.ACTIONS, start)
+        self._add(
+            Call(name=name, args=args, team=team or self._team, start=start, end=end), ReplySection.ACTIONS, start
+        )
 
     def _fault(self, start: int, end: int, name: str, reason: str) -> None:
         text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
         fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
-        kind = Section.COMMUNICATIONS if is_talk(name) else Section.ACTIONS
+        kind = ReplySection.COMMUNICATIONS if is_talk(name) else ReplySection.ACTIONS
         self.gathering.add(fault, kind, self._section_at(start))
 
-    def _add(self, item: Call | MessageTo | ListenTo, kind: Section, start: int) -> None:
+    def _add(self, item: Call | MessageTo | ListenTo, kind: ReplySection, start: int) -> None:
         before = self._plain[max(0, start - _LOOKED_BACK) : start]
         before = before[before.rfind("\n") + 1 :]
         taken_back = False
@@ -328,9 +330,9 @@ class _Walk:
             taken_back = bool(struck or _NEGATED.search(before))
         self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
 
-    def _section_at(self, start: int) -> Section:
+    def _section_at(self, start: int) -> ReplySection:
         """The section that something at this place stands in."""
-        return Section.ANALYSIS if start < self._aside_until else self._section
+        return ReplySection.ANALYSIS if start < self._aside_until else self._section
 
 
 _READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {

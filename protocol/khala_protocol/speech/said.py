@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from khala_protocol.messages import Call, Rejection
-from khala_protocol.speech.headings import Section
+from khala_protocol.speech.headings import ReplySection
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,23 +57,23 @@ Item: TypeAlias = Call | MessageTo | ListenTo | Rejection
 @dataclass(slots=True)
 class _Found:
     item: Item
-    kind: Section
+    kind: ReplySection
     """The section that it belongs under."""
-    section: Section
+    section: ReplySection
     """The section that it stands in."""
     block: int
     taken_back: bool
 
     @property
     def in_prose(self) -> bool:
-        return self.section in (Section.NONE, Section.ANALYSIS)
+        return self.section in (ReplySection.NONE, ReplySection.ANALYSIS)
 
 
 @dataclass(slots=True)
 class Gathering:
     """All that was found in a reply so far."""
 
-    headed: set[Section] = field(default_factory=set)
+    headed: set[ReplySection] = field(default_factory=set)
     """The sections that have a heading."""
     _found: list[_Found] = field(default_factory=list)
     _orders: dict[str | None, list[_Found]] = field(default_factory=dict)
@@ -89,7 +89,7 @@ class Gathering:
         """A section begins under this heading."""
         self._titles.append("".join(filter(str.isalnum, title)).casefold())
 
-    def add(self, item: Item, kind: Section, section: Section, *, taken_back: bool = False) -> None:
+    def add(self, item: Item, kind: ReplySection, section: ReplySection, *, taken_back: bool = False) -> None:
         """Something was found.
 
         Args:
@@ -100,9 +100,9 @@ class Gathering:
         """
         found = _Found(item, kind, section, len(self._titles) - 1, taken_back)
         self._found.append(found)
-        if isinstance(item, Call | Rejection) and kind is Section.ACTIONS:
+        if isinstance(item, Call | Rejection) and kind is ReplySection.ACTIONS:
             self._orders.setdefault(item.team, []).append(found)
-            self._gave_orders |= section is Section.ACTIONS
+            self._gave_orders |= section is ReplySection.ACTIONS
 
     def has_orders(self) -> bool:
         """Whether a section of actions gave any."""
@@ -133,11 +133,11 @@ class Gathering:
             mentions=tuple(mentioned),
         )
 
-    def _repeated(self) -> set[tuple[Section, int]]:
+    def _repeated(self) -> set[tuple[ReplySection, int]]:
         """Blocks that say under the same heading what an earlier one says (rule S27)."""
         if len(set(self._titles)) == len(self._titles):
             return set()
-        blocks: dict[tuple[Section, int], list[tuple[object, ...]]] = {}
+        blocks: dict[tuple[ReplySection, int], list[tuple[object, ...]]] = {}
         for found in self._found:
             if not (found.taken_back or found.in_prose):
                 blocks.setdefault((found.kind, found.block), []).append(_words(found.item))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Command:
+class UnitCommand:
     """What a player asked for: an ability id of either kind, for units by tag, at a unit, a point or nothing."""
 
     ability: int
@@ -51,7 +51,7 @@ class Command:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Plan:
+class OrderPlan:
     """A command as it was judged: its result, and what to do if that is a success.
 
     Args:
@@ -63,7 +63,7 @@ class Plan:
         parts: The specific abilities, by ascending id, and who is to use each at what.
     """
 
-    asked: Command
+    asked: UnitCommand
     result: Result
     ability: int = 0
     target: int = NO_TAG
@@ -116,7 +116,7 @@ def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
     return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
 
 
-def judge(world: World, player: int, command: Command) -> Plan:
+def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
     """How a command goes now, and what it comes to; nothing is done yet."""
     slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
     all_obey = "control_enemy" in world.players[player].cheats
@@ -140,10 +140,10 @@ def judge(world: World, player: int, command: Command) -> Plan:
             why = results[0]
     if not parts:
         return _refused(command, why)
-    return Plan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
+    return OrderPlan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
 
 
-def carry_out(world: World, plan: Plan) -> Outcome:
+def carry_out(world: World, plan: OrderPlan) -> Outcome:
     """Give a command to the units that can take it, as it was judged in the world as it is now."""
     if plan.result != error_pb2.Success:
         return Outcome(plan.result)
@@ -160,11 +160,11 @@ def carry_out(world: World, plan: Plan) -> Outcome:
     return Outcome(error_pb2.Success, plan.ability, tuple(taken))
 
 
-def _refused(command: Command, why: ActionResult) -> Plan:
-    return Plan(command, result_of(why))
+def _refused(command: UnitCommand, why: ActionResult) -> OrderPlan:
+    return OrderPlan(command, result_of(why))
 
 
-def _without_snapshot(world: World, player: int, command: Command) -> Command:
+def _without_snapshot(world: World, player: int, command: UnitCommand) -> UnitCommand:
     """A command at a snapshot as one at what it shows: a resource that still lies there, or else its place."""
     snapshot = world.memories[player].find(command.target) if command.target != NO_TAG else None
     if snapshot is None:
@@ -195,7 +195,7 @@ def _groups(
 
 
 def _judged(
-    world: World, player: int, slot: int, ability: Ability, command: Command, known: ActionResult | None
+    world: World, player: int, slot: int, ability: Ability, command: UnitCommand, known: ActionResult | None
 ) -> Cast | ActionResult:
     """What a unit is to do with its ability, or why it can't; ``known`` is what is known of the latter."""
     if not command.aim & ability.aim:
@@ -228,49 +228,49 @@ def _cant_attack(world: World, slot: int, target: int) -> ActionResult:
 # giving ---------------------------------------------------------------------------------------------------------------
 
 
-def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: Plan) -> list[int]:
+def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: OrderPlan) -> list[int]:
     give = GIVE.get(ability.effect)
     if give is None:
         return casting.order(world, casts, ability, queue=plan.asked.queue)
     return give(world, [cast.slot for cast in casts], plan)
 
 
-def _move(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     if plan.point is not None:
         return commands.move(world, slots, plan.point, queue=plan.asked.queue)
     return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
 
 
-def _patrol(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _patrol(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     x, y = plan.point or world.pos[world.slot_of(plan.target)].tolist()
     return commands.patrol(world, slots, (x, y), queue=plan.asked.queue)
 
 
-def _attack(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _attack(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     if plan.point is not None:
         return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
     return commands.attack_unit(world, slots, plan.target, queue=plan.asked.queue)
 
 
-def _scan_move(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _scan_move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     if plan.point is not None:
         return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
     return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
 
 
-def _stop(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _stop(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     return commands.stop(world, slots, queue=plan.asked.queue)
 
 
-def _hold(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _hold(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     return commands.hold(world, slots, queue=plan.asked.queue)
 
 
-def _smart(world: World, slots: list[int], plan: Plan) -> list[int]:
+def _smart(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
     return casting.smart(world, slots, point=plan.point, target=plan.target, queue=plan.asked.queue)
 
 
-GIVE: dict[str, Callable[[World, list[int], Plan], list[int]]] = {
+GIVE: dict[str, Callable[[World, list[int], OrderPlan], list[int]]] = {
     "smart": _smart,
     "stop": _stop,
     "move": _move,

@@ -18,7 +18,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import casting
 from khala_simulator.api import abilities, clicks, pixels
-from khala_simulator.api.abilities import Command, Outcome, Plan
+from khala_simulator.api.abilities import OrderPlan, Outcome, UnitCommand
 from khala_simulator.api.selection import at_point, panel_order
 from khala_simulator.tables.abilities import Aim
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2, ui_pb2
 
-    from khala_simulator.api.projection import View
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.projection import ImagePair
+    from khala_simulator.api.seat import PlayerSeat
 
     Result: TypeAlias = error_pb2.ActionResult.ValueType
 
@@ -41,12 +41,12 @@ class Judgement(NamedTuple):
     """The result code for an action as things stand, and what its first command comes to, None without one."""
 
     result: Result
-    plan: Plan | None = None
+    plan: OrderPlan | None = None
 
 
-def judge(seat: Seat, action: sc.Action) -> Judgement:
+def judge(seat: PlayerSeat, action: sc.Action) -> Judgement:
     """How an action goes as things stand; one that says nothing succeeds."""
-    plans = list[Plan]()
+    plans = list[OrderPlan]()
     for plan in _plans(seat, action):
         plans.append(plan)
         if plan.result != error_pb2.Success:
@@ -54,7 +54,7 @@ def judge(seat: Seat, action: sc.Action) -> Judgement:
     return Judgement(_beside_commands(seat, action), plans[0] if plans else None)
 
 
-def _beside_commands(seat: Seat, action: sc.Action) -> Result:
+def _beside_commands(seat: PlayerSeat, action: sc.Action) -> Result:
     if action.action_raw.HasField("camera_move") and not _finite(action.action_raw.camera_move.center_world_space):
         return error_pb2.MustTargetVisibleLocation
     if action.HasField("action_ui") and not clicks.is_possible(seat, action.action_ui):
@@ -62,7 +62,7 @@ def _beside_commands(seat: Seat, action: sc.Action) -> Result:
     return error_pb2.Success
 
 
-def perform(seat: Seat, action: sc.Action, loop: int, plan: Plan | None = None) -> None:
+def perform(seat: PlayerSeat, action: sc.Action, loop: int, plan: OrderPlan | None = None) -> None:
     """Have an action take effect, and note what the next observation is to report of it.
 
     Args:
@@ -93,13 +93,13 @@ def perform(seat: Seat, action: sc.Action, loop: int, plan: Plan | None = None) 
         _press(seat, action.action_ui, loop)
 
 
-def _spatial(seat: Seat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, View]:
+def _spatial(seat: PlayerSeat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, ImagePair]:
     """What was clicked, and on which images."""
     kind = "action_feature_layer" if action.HasField("action_feature_layer") else "action_render"
     return getattr(action, kind), seat.views.get(kind, seat.view)
 
 
-def _images(seat: Seat, action: sc.Action) -> Iterator[tuple[spatial_pb2.ActionSpatial, View]]:
+def _images(seat: PlayerSeat, action: sc.Action) -> Iterator[tuple[spatial_pb2.ActionSpatial, ImagePair]]:
     """The part of a report for each kind of images that its reader has, with these images."""
     return ((getattr(action, kind), view) for kind, view in seat.reported.items())
 
@@ -111,7 +111,7 @@ def _finite(point: common_pb2.Point) -> bool:
 # commands -------------------------------------------------------------------------------------------------------------
 
 
-def _plans(seat: Seat, action: sc.Action, first: Plan | None = None) -> Iterator[Plan]:
+def _plans(seat: PlayerSeat, action: sc.Action, first: OrderPlan | None = None) -> Iterator[OrderPlan]:
     """What the commands of an action come to, each judged when it is its turn; ``first`` is known already."""
     if action.action_raw.HasField("unit_command"):
         yield first or _judged(seat, _from_tags(seat, action.action_raw.unit_command))
@@ -121,16 +121,16 @@ def _plans(seat: Seat, action: sc.Action, first: Plan | None = None) -> Iterator
         yield first or _judged(seat, _from_click(seat, spatial.unit_command, view))
 
 
-def _judged(seat: Seat, command: Command) -> Plan:
+def _judged(seat: PlayerSeat, command: UnitCommand) -> OrderPlan:
     return abilities.judge(seat.world, seat.player, command)
 
 
-def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
+def _from_tags(seat: PlayerSeat, message: raw_pb2.ActionRawUnitCommand) -> UnitCommand:
     point = None
     if message.HasField("target_world_space_pos"):
         x, y = message.target_world_space_pos.x, message.target_world_space_pos.y
         point = (x + seat.origin[0], y + seat.origin[1])
-    return Command(
+    return UnitCommand(
         ability=message.ability_id,
         tags=tuple(message.unit_tags),
         target=message.target_unit_tag,
@@ -139,7 +139,7 @@ def _from_tags(seat: Seat, message: raw_pb2.ActionRawUnitCommand) -> Command:
     )
 
 
-def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view: View) -> Command:
+def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand, view: ImagePair) -> UnitCommand:
     """The command that a click on the screen or the minimap gives to the selected units."""
     target, point, clicked = 0, None, None
     if message.HasField("target_screen_coord"):
@@ -154,16 +154,16 @@ def _from_click(seat: Seat, message: spatial_pb2.ActionSpatialUnitCommand, view:
         pixel = message.target_minimap_coord
         point = view.minimap.to_world(float(pixel.x), float(pixel.y))
     tags = tuple(seat.selection.tags)
-    return Command(message.ability_id, tags, target, point, queue=message.queue_command, clicked=clicked)
+    return UnitCommand(message.ability_id, tags, target, point, queue=message.queue_command, clicked=clicked)
 
 
-def _takes_units(seat: Seat, requested: int) -> bool:
+def _takes_units(seat: PlayerSeat, requested: int) -> bool:
     """Whether a click can mean a unit: what the selected units have of a general ability may take points only."""
     meant = (abilities.meant(seat.world, slot, requested) for slot in seat.selection.slots(seat.world))
     return any(Aim.UNIT in ability.aim for ability in meant if ability is not None)
 
 
-def _give(seat: Seat, plan: Plan, loop: int, *, by_tags: bool) -> None:
+def _give(seat: PlayerSeat, plan: OrderPlan, loop: int, *, by_tags: bool) -> None:
     command, outcome = plan.asked, abilities.carry_out(seat.world, plan)
     if outcome.result != error_pb2.Success:
         tag = command.tags[0] if command.tags else 0
@@ -177,7 +177,7 @@ def _give(seat: Seat, plan: Plan, loop: int, *, by_tags: bool) -> None:
     _report_command(seat, command, outcome, tags, loop)
 
 
-def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[int], loop: int) -> None:
+def _report_command(seat: PlayerSeat, command: UnitCommand, outcome: Outcome, tags: list[int], loop: int) -> None:
     action = seat.report(loop)
     if seat.options.raw:
         raw = action.action_raw.unit_command
@@ -200,7 +200,7 @@ def _report_command(seat: Seat, command: Command, outcome: Outcome, tags: list[i
             pixels.write_target(spatial.unit_command, view, seat.camera, point, minimap=effect in ON_MINIMAP)
 
 
-def _press(seat: Seat, ui: ui_pb2.ActionUI, loop: int) -> None:
+def _press(seat: PlayerSeat, ui: ui_pb2.ActionUI, loop: int) -> None:
     if not clicks.press(seat, ui):
         return
     if ui.HasField("toggle_autocast"):
@@ -209,7 +209,7 @@ def _press(seat: Seat, ui: ui_pb2.ActionUI, loop: int) -> None:
         seat.report(loop).action_ui.CopyFrom(ui)
 
 
-def _report_autocast(seat: Seat, ability: int, tags: Iterable[int], loop: int) -> None:
+def _report_autocast(seat: PlayerSeat, ability: int, tags: Iterable[int], loop: int) -> None:
     """A switch of autocast, in the words of the raw interface and in those of the panel."""
     action = seat.report(loop)
     action.action_ui.toggle_autocast.ability_id = ability
@@ -221,7 +221,7 @@ def _report_autocast(seat: Seat, ability: int, tags: Iterable[int], loop: int) -
 # camera and clicks ----------------------------------------------------------------------------------------------------
 
 
-def _move_camera(seat: Seat, point: tuple[float, float], loop: int) -> None:
+def _move_camera(seat: PlayerSeat, point: tuple[float, float], loop: int) -> None:
     seat.move_camera(*point)
     x, y = seat.camera
     action = seat.report(loop)

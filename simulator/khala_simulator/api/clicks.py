@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from khala_simulator.api.projection import Screen
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.world.world import World
 
 Point = spatial_pb2.ActionSpatialUnitSelectionPoint
@@ -32,7 +32,7 @@ Panel = ui_pb2.ActionMultiPanel
 IdleWorker = ui_pb2.ActionSelectIdleWorker
 
 
-def select(seat: Seat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bool:
+def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bool:
     """A click or a rectangle on the screen that the player looks at."""
     if spatial.HasField("unit_selection_point"):
         return _select_point(seat, spatial.unit_selection_point, screen)
@@ -41,7 +41,7 @@ def select(seat: Seat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bo
     return False
 
 
-def press(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
+def press(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
     """A hotkey or a click on a panel; panels that are not there do nothing."""
     kind = ui.WhichOneof("action")
     sight, types = seat.look(), seat.types
@@ -71,7 +71,7 @@ def press(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
     return done
 
 
-def is_possible(seat: Seat, ui: ui_pb2.ActionUI) -> bool:
+def is_possible(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
     """Whether a panel or a control group that an action names is there at all."""
     kind = ui.WhichOneof("action")
     if kind == "control_group":
@@ -107,20 +107,20 @@ def _autocasters(world: World, player: int, requested: int, tags: Iterable[int])
     return chosen
 
 
-def _cargo(seat: Seat) -> list[int]:
+def _cargo(seat: PlayerSeat) -> list[int]:
     """Tags of what is inside the selected transport, in the order of the panel."""
     slots = seat.selection.slots(seat.world)
     return [seat.world.tag_of(s) for s in seat.world.passengers(slots[0])] if len(slots) == 1 else []
 
 
-def _queued(seat: Seat) -> int:
+def _queued(seat: PlayerSeat) -> int:
     """How many jobs the selected structure has in its queue."""
     slots = seat.selection.slots(seat.world)
     own = len(slots) == 1 and seat.world.owner[slots[0]] == seat.player
     return len(seat.world.jobs.get(slots[0], ())) if own else 0
 
 
-def _unload(seat: Seat, index: int) -> bool:
+def _unload(seat: PlayerSeat, index: int) -> bool:
     """Have the selected transport set down one of its passengers."""
     cargo = _cargo(seat)
     if not 0 <= index < len(cargo):
@@ -133,7 +133,7 @@ def _unload(seat: Seat, index: int) -> bool:
     return bool(casting.use(seat.world, [carrier], unload, target=cargo[index]))
 
 
-def _choose(seat: Seat, tags: Iterable[int], *, add: bool = False) -> bool:
+def _choose(seat: PlayerSeat, tags: Iterable[int], *, add: bool = False) -> bool:
     """Selects own units in the order of the panel; none of them leaves the selection as it is."""
     chosen = [int(tag) for tag in tags]
     if not chosen:
@@ -143,12 +143,12 @@ def _choose(seat: Seat, tags: Iterable[int], *, add: bool = False) -> bool:
     return True
 
 
-def _is_own(seat: Seat, tag: int) -> bool:
+def _is_own(seat: PlayerSeat, tag: int) -> bool:
     slot = seat.world.slot_of(tag)
     return slot >= 0 and bool(seat.world.owner[slot] == seat.player)
 
 
-def _select_point(seat: Seat, click: Point, screen: Screen) -> bool:
+def _select_point(seat: PlayerSeat, click: Point, screen: Screen) -> bool:
     pixel = click.selection_screen_coord
     sight, types = seat.look(), seat.types
     world_point = screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
@@ -168,7 +168,7 @@ def _select_point(seat: Seat, click: Point, screen: Screen) -> bool:
     return _choose(seat, [tag], add=click.type == Point.Toggle)
 
 
-def _select_rectangles(seat: Seat, drag: spatial_pb2.ActionSpatialUnitSelectionRect, screen: Screen) -> bool:
+def _select_rectangles(seat: PlayerSeat, drag: spatial_pb2.ActionSpatialUnitSelectionRect, screen: Screen) -> bool:
     sight, types = seat.look(), seat.types
     rows = [np.zeros(0, np.intp)]
     for rectangle in drag.selection_screen_coord:
@@ -179,7 +179,7 @@ def _select_rectangles(seat: Seat, drag: spatial_pb2.ActionSpatialUnitSelectionR
     return _choose(seat, sight.tag[np.unique(np.concatenate(rows))], add=drag.selection_add)
 
 
-def _select_idle_worker(seat: Seat, how: IdleWorker.Type.ValueType) -> bool:
+def _select_idle_worker(seat: PlayerSeat, how: IdleWorker.Type.ValueType) -> bool:
     sight = seat.look()
     idle: list[int] = sight.tag[picking.idle_workers(seat.world, sight, seat.types)].tolist()
     if how in {IdleWorker.All, IdleWorker.AddAll}:
@@ -188,7 +188,7 @@ def _select_idle_worker(seat: Seat, how: IdleWorker.Type.ValueType) -> bool:
     return _choose(seat, (fresh or idle)[:1], add=how == IdleWorker.Add)
 
 
-def _use_group(seat: Seat, message: Group) -> bool:
+def _use_group(seat: PlayerSeat, message: Group) -> bool:
     index, action = message.control_group_index, message.action
     if index >= GROUPS:
         return False
@@ -205,7 +205,7 @@ def _use_group(seat: Seat, message: Group) -> bool:
     return True
 
 
-def _use_panel(seat: Seat, message: Panel) -> bool:
+def _use_panel(seat: PlayerSeat, message: Panel) -> bool:
     world, tags = seat.world, seat.selection.tags
     tag = tags[message.unit_index]
     row = world.type[world.slot_of(tag)]

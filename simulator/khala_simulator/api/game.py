@@ -18,7 +18,7 @@ from s2clientprotocol import common_pb2, debug_pb2, error_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api import actions, debug
-from khala_simulator.api.seat import Seat
+from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import OBSERVER
 from khala_simulator.api.types import types_of
 from khala_simulator.tables.catalog import load_catalog
@@ -28,7 +28,7 @@ from khala_simulator.world.players import PlayerSetup
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_simulator.api.abilities import Plan
+    from khala_simulator.api.abilities import OrderPlan
     from khala_simulator.maps.game_map import GameMap
     from khala_simulator.world.world import World
 
@@ -52,7 +52,7 @@ class Setup:
 
 
 @dataclasses.dataclass(frozen=True)
-class Entry:
+class LogEntry:
     """One thing that was done to the game, when the world left `loop`."""
 
     loop: int
@@ -63,16 +63,16 @@ class Entry:
 class _Judged(NamedTuple):
     """An action that was judged when it came: at which loop, after how many entries, and what it comes to."""
 
-    entry: Entry
+    entry: LogEntry
     loop: int
     done: int
-    plan: Plan | None
+    plan: OrderPlan | None
 
 
-class Game:
+class HostedGame:
     """A running game. With a log it is a replay, and ends at `end_loop`."""
 
-    def __init__(self, setup: Setup, version: str, log: Iterable[Entry] = (), end_loop: int | None = None) -> None:
+    def __init__(self, setup: Setup, version: str, log: Iterable[LogEntry] = (), end_loop: int | None = None) -> None:
         self.setup = setup
         self.end_loop = end_loop
         self.catalog = load_catalog(version)
@@ -83,11 +83,11 @@ class Game:
             self.world.fog = False
             self.world.visibility[:] = _VISIBLE
         self.world.visibility[OBSERVER] = _VISIBLE
-        self.seats: dict[int, Seat] = {}
-        self.log: list[Entry] = list(log)
+        self.seats: dict[int, PlayerSeat] = {}
+        self.log: list[LogEntry] = list(log)
         self.not_before = 0  # what clients do takes effect at this loop at the earliest
         self.delay = 0  # loops from when a client acts until that takes effect
-        self.unsent: list[Entry] | None = None  # what was done here since somebody last told the other processes
+        self.unsent: list[LogEntry] | None = None  # what was done here since somebody last told the other processes
         self._done = 0  # entries of the log that have taken effect
         self._judged: _Judged | None = None  # the first action since something took effect
 
@@ -96,11 +96,11 @@ class Game:
         """Whether the game has a result, or its replay is at the end."""
         return self.world.ended or self.world.loop == self.end_loop
 
-    def sit(self, player: int, options: sc.InterfaceOptions) -> Seat:
+    def sit(self, player: int, options: sc.InterfaceOptions) -> PlayerSeat:
         """Gives a player an interface."""
-        seat = self.seats[player] = Seat(self.world, self.types, player, options)
+        seat = self.seats[player] = PlayerSeat(self.world, self.types, player, options)
         if self.end_loop is None and self.world.players[player].start is not None:
-            self.note(Entry(_CENTRED_LOOP, player, _centre(seat)))
+            self.note(LogEntry(_CENTRED_LOOP, player, _centre(seat)))
         return seat
 
     def act(self, player: int, action: sc.Action) -> error_pb2.ActionResult.ValueType:
@@ -120,14 +120,14 @@ class Game:
         copy.CopyFrom(command)
         self._do(player, copy)
 
-    def _do(self, player: int, act: sc.Action | debug_pb2.DebugCommand) -> Entry:
-        entry = Entry(max(self.world.loop + self.delay, self.not_before), player, act)
+    def _do(self, player: int, act: sc.Action | debug_pb2.DebugCommand) -> LogEntry:
+        entry = LogEntry(max(self.world.loop + self.delay, self.not_before), player, act)
         self.note(entry)
         if self.unsent is not None:
             self.unsent.append(entry)
         return entry
 
-    def note(self, entry: Entry) -> None:
+    def note(self, entry: LogEntry) -> None:
         """Puts an entry into the log: by its loop, then by its player, then as it came."""
         bisect.insort(self.log, entry, lo=self._done, key=lambda e: (e.loop, e.player))
 
@@ -150,7 +150,7 @@ class Game:
         return self.world.loop
 
     @property
-    def past(self) -> tuple[Entry, ...]:
+    def past(self) -> tuple[LogEntry, ...]:
         """The part of the log that has taken effect."""
         return tuple(self.log[: self._done])
 
@@ -171,7 +171,7 @@ class Game:
                 actions.perform(seat, entry.act, self.world.loop, self._plan_of(entry))
                 self._spread_chat(entry.player, entry.act)
 
-    def _plan_of(self, entry: Entry) -> Plan | None:
+    def _plan_of(self, entry: LogEntry) -> OrderPlan | None:
         """What an action was judged to come to, if nothing has taken effect since then."""
         judged = self._judged
         if judged is None or judged.entry is not entry:
@@ -187,7 +187,7 @@ class Game:
                 seat.hands.chat.append(sc.ChatReceived(player_id=sender, message=chat.message))
 
 
-def _centre(seat: Seat) -> sc.Action:
+def _centre(seat: PlayerSeat) -> sc.Action:
     """The camera's move to where it already is, with which a melee game begins."""
     action = sc.Action()
     point = action.action_raw.camera_move.center_world_space

@@ -20,8 +20,8 @@ from khala_simulator.api.viewer import Viewer
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.api.game import Game
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.game import HostedGame
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.api.wire import Part
     from khala_simulator.world.world import World
 
@@ -36,7 +36,7 @@ RACES = {"terran": 1, "zerg": 2, "protoss": 3}
 class GameInfo:
     """The game info of one seat."""
 
-    def __init__(self, game: Game, seat: Seat) -> None:
+    def __init__(self, game: HostedGame, seat: PlayerSeat) -> None:
         self._world, self._seat = game.world, seat
         self._fixed = _message(game, seat).SerializeToString()
         self._map = _start_raw(seat).SerializeToString()
@@ -53,7 +53,7 @@ class GameInfo:
         return [self._fixed, *wire.embed(_START_RAW, [self._map, self._paths])]
 
 
-def _message(game: Game, seat: Seat) -> sc.ResponseGameInfo:
+def _message(game: HostedGame, seat: PlayerSeat) -> sc.ResponseGameInfo:
     game_map = game.setup.game_map
     info = sc.ResponseGameInfo(
         map_name=game_map.name,
@@ -75,7 +75,7 @@ def _message(game: Game, seat: Seat) -> sc.ResponseGameInfo:
     return info
 
 
-def _start_raw(seat: Seat) -> raw_pb2.StartRaw:
+def _start_raw(seat: PlayerSeat) -> raw_pb2.StartRaw:
     """The part of the map that never changes; the placement grid is of the bare terrain, as in the game."""
     terrain, start = seat.world.map.terrain, raw_pb2.StartRaw()
     start.map_size.x, start.map_size.y = _crop(seat, terrain.build).shape[::-1]
@@ -89,7 +89,7 @@ def _start_raw(seat: Seat) -> raw_pb2.StartRaw:
     return start
 
 
-def _start_locations(seat: Seat) -> list[tuple[float, float]]:
+def _start_locations(seat: PlayerSeat) -> list[tuple[float, float]]:
     """Where others may have started: every start location of the map but the player's own."""
     scenario = seat.world.map.scenario
     fixed = [spec.start for spec in scenario.players.values() if spec.start is not None]
@@ -97,14 +97,14 @@ def _start_locations(seat: Seat) -> list[tuple[float, float]]:
     return [place for place in dict.fromkeys((*fixed, *scenario.start_locations)) if place != own]
 
 
-def _crop(seat: Seat, grid: NDArray[np.generic]) -> NDArray[np.generic]:
+def _crop(seat: PlayerSeat, grid: NDArray[np.generic]) -> NDArray[np.generic]:
     if not seat.options.raw_crop_to_playable_area:
         return grid
     x0, y0, x1, y1 = seat.world.map.terrain.playable
     return grid[y0:y1, x0:x1]
 
 
-def _known_structures(seat: Seat) -> tuple[Structure, ...]:
+def _known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
     """The structures and resources that the player sees or remembers: of others' he is told no obstacle."""
     sight = seat.look()
     stays = seat.types.structure[sight.row] | (sight.alliance == Alliance.NEUTRAL.value)

@@ -17,7 +17,7 @@ from s2clientprotocol import spatial_pb2
 
 from khala_simulator.api import wire
 from khala_simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
-from khala_simulator.api.raster import Layer, draw_discs, sample
+from khala_simulator.api.raster import RasterLayer, draw_discs, sample
 from khala_simulator.api.sight import Cloak, Display
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from s2clientprotocol import sc2api_pb2
 
-    from khala_simulator.api.projection import View
+    from khala_simulator.api.projection import ImagePair
     from khala_simulator.api.raster import Discs
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.types import Types
@@ -77,7 +77,7 @@ class Frame:
 class FeatureLayers:
     """The feature layers that one client asked for; keeps what stays the same from frame to frame."""
 
-    def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, view: View) -> None:
+    def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, view: ImagePair) -> None:
         self.screen, self.minimap = screen, minimap = view.screen, view.minimap
         hidden = frozenset() if setup.allow_cheating_layers else CHEATING
         shown = {name: bits for name, bits in MINIMAP_BITS.items() if name not in hidden}
@@ -131,7 +131,7 @@ class FeatureLayers:
         spots = Spots(places, np.full(len(places), BLIP_RADIUS))
         return self._spots(layer, spots, np.ones(len(places), np.int32), frame)
 
-    def _spots(self, layer: Layer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
+    def _spots(self, layer: RasterLayer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
         """Discs of the world with a value each."""
         screen = self.screen
         x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
@@ -178,7 +178,7 @@ class _Image:
 
     def __init__(self, message: type[Message], bits: dict[str, int], columns: int, rows: int) -> None:
         fields = message.DESCRIPTOR.fields_by_name
-        self.layers = {name: Layer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
+        self.layers = {name: RasterLayer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
         self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
         self._camera: tuple[float, float] | None = None
         self._walk: Bools | None = None

@@ -26,8 +26,8 @@ from khala_simulator.api.sight import Alliance
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.api.game import Game
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.game import HostedGame
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.wire import Part
 
@@ -38,7 +38,7 @@ _ALARM_PAUSE_LOOPS = 160
 """Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
 
 
-def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
+def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) -> list[Part]:
     """The parts of a `ResponseObservation`; takes along what is to be told only once."""
     world = game.world
     sight = seat.look(through_fog=disable_fog)
@@ -74,7 +74,7 @@ def observe(game: Game, seat: Seat, *, disable_fog: bool = False) -> list[Part]:
     return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *images])]
 
 
-def _told(seat: Seat, sight: Sight) -> None:
+def _told(seat: PlayerSeat, sight: Sight) -> None:
     seat.hands.forget()
     seat.deaths_told = len(seat.world.deaths)
     seat.mishaps_told = len(seat.world.mishaps)
@@ -83,7 +83,7 @@ def _told(seat: Seat, sight: Sight) -> None:
     seat.observed_loop = seat.world.loop
 
 
-def _mishaps(seat: Seat) -> list[sc.ActionError]:
+def _mishaps(seat: PlayerSeat) -> list[sc.ActionError]:
     """Orders of the player's that could not be carried out in the end, since the last observation."""
     return [
         sc.ActionError(unit_tag=m.tag, ability_id=m.ability, result=result_of(m.refusal))
@@ -92,7 +92,7 @@ def _mishaps(seat: Seat) -> list[sc.ActionError]:
     ]
 
 
-def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
+def _write_abilities(observation: sc.Observation, seat: PlayerSeat) -> None:
     """What the selection can be told to do now; a foreign unit can be told nothing."""
     world = seat.world
     own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
@@ -101,7 +101,7 @@ def _write_abilities(observation: sc.Observation, seat: Seat) -> None:
         observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
 
 
-def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
+def _attacked(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
     """Rows of own units damaged since the last observation, if it is time for another alarm."""
     world = seat.world
     if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
@@ -113,7 +113,7 @@ def _attacked(seat: Seat, sight: Sight) -> NDArray[np.intp]:
     return rows
 
 
-def _alerts(seat: Seat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Alert.ValueType]:
+def _alerts(seat: PlayerSeat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Alert.ValueType]:
     structures = seat.types.structure[sight.row[attacked]]
     told = seat.world.alerts[seat.alerts_told :]
     alerts = [sc.Alert.Value(alert.name) for alert in told if alert.player == seat.player]
@@ -121,7 +121,7 @@ def _alerts(seat: Seat, sight: Sight, attacked: NDArray[np.intp]) -> list[sc.Ale
     return [*alerts, sc.UnitUnderAttack] if (~structures).any() else alerts
 
 
-def _write_raw(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight, selected: NDArray[np.bool_]) -> None:
+def _write_raw(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, sight: Sight, selected: NDArray[np.bool_]) -> None:
     world, terrain = seat.world, seat.world.map.terrain
     x, y = seat.camera
     camera = raw.player.camera

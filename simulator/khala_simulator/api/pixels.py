@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from s2clientprotocol import common_pb2, spatial_pb2
 
-    from khala_simulator.api.projection import Screen, View
+    from khala_simulator.api.projection import ImagePair, Screen
 
     Point = tuple[float, float]
 
 
 def write_target(
     message: spatial_pb2.ActionSpatialUnitCommand,
-    view: View,
+    view: ImagePair,
     camera: Point,
     point: tuple[float, float],
     *,
@@ -35,13 +35,13 @@ def write_target(
     message.target_screen_coord.y = min(max(row, 0), view.screen.rows - 1)
 
 
-def write_camera(message: spatial_pb2.ActionSpatialCameraMove, view: View, camera: Point) -> None:
+def write_camera(message: spatial_pb2.ActionSpatialCameraMove, view: ImagePair, camera: Point) -> None:
     """The click on the minimap that moves the camera here."""
     _write_on_minimap(message.center_minimap, view, camera)
 
 
 def write_selection(
-    message: spatial_pb2.ActionSpatial, view: View, clicked: spatial_pb2.ActionSpatial, on: View
+    message: spatial_pb2.ActionSpatial, view: ImagePair, clicked: spatial_pb2.ActionSpatial, on: ImagePair
 ) -> None:
     """A click or a rectangle on the screen of one view, in the pixels of another one."""
     message.CopyFrom(clicked)
@@ -54,7 +54,7 @@ def write_selection(
         _translate(rectangle.p1, on.screen, view.screen)
 
 
-def _write_on_minimap(pixel: common_pb2.PointI, view: View, point: Point) -> None:
+def _write_on_minimap(pixel: common_pb2.PointI, view: ImagePair, point: Point) -> None:
     column, row = (math.floor(v) for v in view.minimap.to_pixels(*point))
     pixel.x = min(max(column, 0), view.minimap.columns - 1)
     pixel.y = min(max(row, 0), view.minimap.rows - 1)

@@ -92,17 +92,17 @@ class Minimap:
 
 
 @dataclasses.dataclass(frozen=True)
-class View:
+class ImagePair:
     """The two images of one kind that a client looks at and clicks on."""
 
     screen: Screen
     minimap: Minimap
 
 
-def view_of(setup: sc.SpatialCameraSetup, area: Rect, width: float = DEFAULT_WIDTH) -> View:
+def view_of(setup: sc.SpatialCameraSetup, area: Rect, width: float = DEFAULT_WIDTH) -> ImagePair:
     """The images that a client asked for, the minimap of this part of the map; `width` where it named none."""
     screen, minimap = setup.resolution, setup.minimap_resolution
-    return View(Screen(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
+    return ImagePair(Screen(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
 
 
 def size_problem(options: sc.InterfaceOptions) -> str | None:

@@ -19,11 +19,11 @@ from khala_simulator.tables.layers import Layer
 from khala_simulator.world.world import NOBODY
 
 if TYPE_CHECKING:
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.world.world import World
 
 
-def answer(seat: Seat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
+def answer(seat: PlayerSeat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
     """One answer to each question, in their order."""
     return query_pb2.ResponseQuery(
         pathing=[query_pb2.ResponseQueryPathing(distance=_distance(seat, question)) for question in request.pathing],
@@ -35,7 +35,7 @@ def answer(seat: Seat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQue
     )
 
 
-def _abilities(seat: Seat, tag: int, *, ignore_cost: bool) -> query_pb2.ResponseQueryAvailableAbilities:
+def _abilities(seat: PlayerSeat, tag: int, *, ignore_cost: bool) -> query_pb2.ResponseQueryAvailableAbilities:
     answer = query_pb2.ResponseQueryAvailableAbilities(unit_tag=tag)
     slot = seat.world.slot_of(tag)
     if slot != NOBODY:
@@ -50,7 +50,7 @@ def _abilities(seat: Seat, tag: int, *, ignore_cost: bool) -> query_pb2.Response
 # ways -----------------------------------------------------------------------------------------------------------------
 
 
-def _distance(seat: Seat, question: query_pb2.RequestQueryPathing) -> float:
+def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> float:
     """Length of the way on the ground, 0 where there is none; a flying unit's is the straight line."""
     world, (ox, oy) = seat.world, seat.origin
     end = (question.end_pos.x + ox, question.end_pos.y + oy)
@@ -77,7 +77,7 @@ def _on_map(world: World, x: float, y: float) -> bool:
 # places ---------------------------------------------------------------------------------------------------------------
 
 
-def _place(seat: Seat, question: query_pb2.RequestQueryBuildingPlacement) -> error_pb2.ActionResult.ValueType:
+def _place(seat: PlayerSeat, question: query_pb2.RequestQueryBuildingPlacement) -> error_pb2.ActionResult.ValueType:
     """Whether what an ability builds, lands or warps in may stand at a point; who would do it is not looked at."""
     world = seat.world
     ability = world.catalog.ability_of_id.get(question.ability_id)

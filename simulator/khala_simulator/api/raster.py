@@ -102,7 +102,7 @@ def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
     return image
 
 
-class Layer:
+class RasterLayer:
     """One image of a fixed size: turns it into an `ImageData` field, ready to be joined.
 
     24 bits per pixel are red, green and blue of an image [y, x, 3].

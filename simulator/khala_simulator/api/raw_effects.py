@@ -15,11 +15,11 @@ from khala_simulator.api.sight import API_NEUTRAL, alliance_of
 if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
 
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.api.sight import Sight
 
 
-def write_radar(raw: raw_pb2.ObservationRaw, seat: Seat) -> None:
+def write_radar(raw: raw_pb2.ObservationRaw, seat: PlayerSeat) -> None:
     """Adds the radars that the player knows of to the raw data."""
     for radar in seen_radars(seat.world, seat.player):
         ring = raw.radar.add(radius=radar.radius)
@@ -27,7 +27,7 @@ def write_radar(raw: raw_pb2.ObservationRaw, seat: Seat) -> None:
         ring.pos.x, ring.pos.y, ring.pos.z = x - seat.origin[0], y - seat.origin[1], seat.ground_z(x, y)
 
 
-def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool) -> None:
+def write_effects(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, *, through_fog: bool) -> None:
     """Adds the effects that the player perceives to the raw data."""
     for area in seen_area_effects(seat.world, seat.player, through_fog=through_fog):
         side = int(alliance_of(np.array([area.owner]), seat.player)[0])
@@ -37,7 +37,7 @@ def write_effects(raw: raw_pb2.ObservationRaw, seat: Seat, *, through_fog: bool)
             effect.pos.add(x=x - seat.origin[0], y=y - seat.origin[1])
 
 
-def write_power(raw: raw_pb2.ObservationRaw, seat: Seat, sight: Sight) -> None:
+def write_power(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, sight: Sight) -> None:
     """Adds the player's sources of power to the raw data."""
     sources = power(sight, seat.types)
     if sources is None:

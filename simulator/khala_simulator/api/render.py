@@ -13,14 +13,14 @@ from s2clientprotocol import spatial_pb2
 
 from khala_simulator.api.painting.overview import OverviewPainter
 from khala_simulator.api.painting.scene import ScenePainter
-from khala_simulator.api.raster import Layer
+from khala_simulator.api.raster import RasterLayer
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from khala_simulator.api.layers import Frame
-    from khala_simulator.api.projection import View
+    from khala_simulator.api.projection import ImagePair
     from khala_simulator.api.types import Types
     from khala_simulator.api.wire import Part
 
@@ -32,12 +32,12 @@ _FIELDS = spatial_pb2.ObservationRender.DESCRIPTOR.fields_by_name
 class Renders:
     """Paints what one client asked to see; keeps what stays the same from frame to frame."""
 
-    def __init__(self, view: View, types: Types) -> None:
+    def __init__(self, view: ImagePair, types: Types) -> None:
         screen, minimap = view.screen, view.minimap
         self._scene = ScenePainter(screen, types)
         self._overview = OverviewPainter(minimap, screen, types)
-        self._screen_part = Layer(_FIELDS["map"].number, BITS_PER_PIXEL, screen.columns, screen.rows)
-        self._minimap_part = Layer(_FIELDS["minimap"].number, BITS_PER_PIXEL, minimap.columns, minimap.rows)
+        self._screen_part = RasterLayer(_FIELDS["map"].number, BITS_PER_PIXEL, screen.columns, screen.rows)
+        self._minimap_part = RasterLayer(_FIELDS["minimap"].number, BITS_PER_PIXEL, minimap.columns, minimap.rows)
 
     def encode(self, frame: Frame) -> list[Part]:
         """The parts of an `ObservationRender`."""

@@ -12,7 +12,7 @@ import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.layers import FeatureLayers
-from khala_simulator.api.projection import DEFAULT_WIDTH, Minimap, Rect, Screen, View, view_of
+from khala_simulator.api.projection import DEFAULT_WIDTH, ImagePair, Minimap, Rect, Screen, view_of
 from khala_simulator.api.selection import Selection
 from khala_simulator.api.sight import Sight, look
 
@@ -42,7 +42,7 @@ class Hands:
         self.echoes, self.errors, self.chat = [], [], []
 
 
-class Seat:
+class PlayerSeat:
     """A player's interface to the world."""
 
     def __init__(self, world: World, types: Types, player: int, options: sc.InterfaceOptions) -> None:
@@ -52,7 +52,7 @@ class Seat:
         crop = options.raw_crop_to_playable_area
         self.origin: tuple[float, float] = (self.playable.x0, self.playable.y0) if crop else (0.0, 0.0)
         whole = Rect(0, 0, width, height)
-        self.views: dict[str, View] = {}  # by the field of an Action with clicks on them
+        self.views: dict[str, ImagePair] = {}  # by the field of an Action with clicks on them
         self.layers: FeatureLayers | None = None
         self.renders: Renders | None = None
         if options.HasField("feature_layer"):
@@ -66,7 +66,7 @@ class Seat:
             self.views["action_render"] = view
             self.renders = _renders(view, types)
         self.reported = self.views  # in whose pixels clicks are reported: a viewer's, when one watches this seat
-        self.view: View = next(iter(self.views.values()), View(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
+        self.view: ImagePair = next(iter(self.views.values()), ImagePair(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
         self.unread = False  # nobody asks for what is to be told
         camera = world.players[player].camera or world.map.camera
@@ -143,7 +143,7 @@ class Seat:
         return action
 
 
-def _renders(view: View, types: Types) -> Renders:
+def _renders(view: ImagePair, types: Types) -> Renders:
     from khala_simulator.api.render import Renders  # noqa: PLC0415  # with it comes OpenCV, which few games need
 
     return Renders(view, types)

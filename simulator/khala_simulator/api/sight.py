@@ -18,7 +18,7 @@ from khala_simulator.economy import building_sites
 from khala_simulator.numeric import geometry
 from khala_simulator.systems.vision import detected
 from khala_simulator.world.orders import OrderKind
-from khala_simulator.world.snapshots import INDEX_SHIFT, Snapshot
+from khala_simulator.world.snapshots import INDEX_SHIFT, RememberedUnit
 from khala_simulator.world.world import NOBODY
 
 if TYPE_CHECKING:
@@ -130,16 +130,16 @@ def look(
     return sight
 
 
-def _placeholders(world: World, player: int) -> list[Snapshot]:
+def _placeholders(world: World, player: int) -> list[RememberedUnit]:
     """What the player's builders are under way to build, as if it stood there; the tags are made up."""
     return [
-        Snapshot(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
+        RememberedUnit(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
         for i, (unit, point) in enumerate(building_sites.planned(world, player))
     ]
 
 
 def _with_snapshots(
-    sight: Sight, world: World, types: Types, player: int, shown: list[Snapshot], display: Display
+    sight: Sight, world: World, types: Types, player: int, shown: list[RememberedUnit], display: Display
 ) -> Sight:
     """The sight with a row for each snapshot before the units; its slot is the empty one."""
     row = np.array([s.row for s in shown])

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from khala_simulator.api.seat import Seat
+from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import OBSERVER
 
 if TYPE_CHECKING:
     from s2clientprotocol import sc2api_pb2 as sc
 
-    from khala_simulator.api.game import Game
+    from khala_simulator.api.game import HostedGame
 
 
-class Viewer(Seat):
+class Viewer(PlayerSeat):
     """An interface without hands."""
 
-    def __init__(self, game: Game, player: int, options: sc.InterfaceOptions) -> None:
+    def __init__(self, game: HostedGame, player: int, options: sc.InterfaceOptions) -> None:
         super().__init__(game.world, game.types, player, options)
         self._seats = game.seats
         self._own = self.hands

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.world.players import NEUTRAL
-from khala_simulator.world.snapshots import INDEX_SHIFT, TAG_BASE, Snapshot
+from khala_simulator.world.snapshots import INDEX_SHIFT, TAG_BASE, RememberedUnit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.tables.catalog import Catalog
-    from khala_simulator.world.snapshots import Memory
+    from khala_simulator.world.snapshots import FogMemory
     from khala_simulator.world.world import World
 
 VISIBLE: Final = 2
@@ -40,14 +40,14 @@ def remember(world: World, player: int) -> None:
     memory.shown = [s for s in hidden if s.unit in memory.of_unit]
 
 
-def _note(world: World, memory: Memory, slot: int) -> None:
+def _note(world: World, memory: FogMemory, slot: int) -> None:
     tag = int(world.tag[slot])
     known = memory.of_unit.get(tag)
     if known is None:
         memory.made += 1
     index = memory.made if known is None else (known.tag - TAG_BASE) >> INDEX_SHIFT
     (x, y), (hx, hy) = world.pos[slot].tolist(), world.heading[slot].tolist()
-    memory.of_unit[tag] = Snapshot(
+    memory.of_unit[tag] = RememberedUnit(
         tag=TAG_BASE | index << INDEX_SHIFT,
         unit=tag,
         row=int(world.type[slot]),
@@ -58,7 +58,7 @@ def _note(world: World, memory: Memory, slot: int) -> None:
     )
 
 
-def _place_is_seen(world: World, player: int, snapshot: Snapshot) -> bool:
+def _place_is_seen(world: World, player: int, snapshot: RememberedUnit) -> bool:
     x, y = (int(v) for v in snapshot.pos)
     height, width = world.visibility[player].shape
     return 0 <= x < width and 0 <= y < height and bool(world.visibility[player, y, x] == VISIBLE)

@@ -19,7 +19,7 @@ from khala_simulator.world.players import NEUTRAL
 
 if TYPE_CHECKING:
     from khala_simulator.tables.abilities import Ability
-    from khala_simulator.tables.records import Footprint, UnitType
+    from khala_simulator.tables.records import UnitFootprint, UnitType
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
@@ -29,7 +29,7 @@ VISIBLE: Final = 2  # in sight, 1 is explored; most structures may be placed whe
 ON_GEYSER: Final = 0.5  # how far from a geyser's middle a gas structure may be asked for
 
 
-def footprint_of(world: World, unit: UnitType) -> Footprint | None:
+def footprint_of(world: World, unit: UnitType) -> UnitFootprint | None:
     """The cells that a structure needs; for an add-on those of its own only."""
     name = unit.footprint if "AddOn" in unit.placement else unit.placement or unit.footprint
     found = world.catalog.footprints.get(name)
@@ -61,7 +61,7 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionRe
     )
 
 
-def _of_ground(world: World, player: int, footprint: Footprint, cells: Ints) -> ActionResult | None:
+def _of_ground(world: World, player: int, footprint: UnitFootprint, cells: Ints) -> ActionResult | None:
     terrain = world.map.terrain
     width, height = terrain.size
     x, y = cells[:, 0], cells[:, 1]
@@ -102,7 +102,7 @@ def taken(world: World) -> Bools:
     return grid
 
 
-def _of_resources(world: World, footprint: Footprint, cells: Ints) -> ActionResult | None:
+def _of_resources(world: World, footprint: UnitFootprint, cells: Ints) -> ActionResult | None:
     if "NearResources" not in footprint.forbids:
         return None
     wanted = {(x, y) for x, y in cells.tolist()}
@@ -118,7 +118,7 @@ def _of_resources(world: World, footprint: Footprint, cells: Ints) -> ActionResu
     return None
 
 
-def _of_creep(world: World, footprint: Footprint, cells: Ints) -> ActionResult | None:
+def _of_creep(world: World, footprint: UnitFootprint, cells: Ints) -> ActionResult | None:
     on_creep = world.creep[cells[:, 1], cells[:, 0]]
     if "Creep" in footprint.requires and not on_creep.all():
         return ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE

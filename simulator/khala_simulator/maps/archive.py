@@ -24,7 +24,7 @@ import numpy as np
 from khala_simulator.maps import terrain_file
 from khala_simulator.maps.game_map import GameMap, MapError, find_map, game_map, load_map
 from khala_simulator.maps.scenario import Scenario
-from khala_simulator.maps.terrain_file import Ground, TerrainError
+from khala_simulator.maps.terrain_file import TerrainError, TerrainGrids
 from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _terrain_of(data: bytes) -> tuple[Terrain, bytes]:
             paint = _find(archive, name)
             if paint is not None:
                 painted |= terrain_file.read_paint(paint, info.size)
-        ground = Ground(
+        ground = TerrainGrids(
             vertices=terrain_file.read_heights(_member(archive, "t3SyncHeightMap"), info.size),
             cliff=terrain_file.read_cliffs(_member(archive, "t3SyncCliffLevel"), info.size),
             on_cliff_tile=terrain_file.read_flags(_member(archive, "t3CellFlags"), info.size),

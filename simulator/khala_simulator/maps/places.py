@@ -144,7 +144,7 @@ def _axis(value: Any) -> Any:
 Axis = Annotated[tuple[float, ...], BeforeValidator(_axis), Field(min_length=1)]
 
 
-class Grid(Model):
+class PlaceGrid(Model):
     """Every x with every y; offsets from a place, if they are ``around`` one."""
 
     x: Axis
@@ -159,7 +159,7 @@ class RandomPlace(Model):
     away_from: dict[UnitName, float] = {}
 
 
-class Column(Model):
+class ZigZag(Model):
     """One above and one below the other in turn, around a place."""
 
     column: Place
@@ -170,9 +170,9 @@ Spot = Annotated[
     Annotated[PointName, Tag("name")]
     | Annotated[Point, Tag("point")]
     | Annotated[tuple[Posed, ...], Tag("points")]
-    | Annotated[Grid, Tag("x")]
+    | Annotated[PlaceGrid, Tag("x")]
     | Annotated[RandomPlace, Tag("random_in")]
-    | Annotated[Column, Tag("column")],
+    | Annotated[ZigZag, Tag("column")],
     Discriminator(
         kind_of_place,
         custom_error_type="spot",

@@ -244,7 +244,7 @@ class OrderSpec(Model):
         return self
 
 
-class Order(Model):
+class OrderUnits(Model):
     """Command units."""
 
     order: OrderSpec
@@ -274,7 +274,7 @@ class AddScore(Model):
     score: dict[Owner, float]
 
 
-class Purse(Model):
+class StartingResources(Model):
     """Resources."""
 
     minerals: float = 0.0
@@ -284,10 +284,10 @@ class Purse(Model):
 class Give(Model):
     """Give resources to players."""
 
-    give: dict[Owner, Purse]
+    give: dict[Owner, StartingResources]
 
 
-class Result(Model):
+class EndGame(Model):
     """End the game with a result for each player."""
 
     result: dict[Owner, Outcome]
@@ -298,12 +298,12 @@ Action = Annotated[
     | Annotated[Spawn, Tag("spawn")]
     | Annotated[Regroup, Tag("regroup")]
     | Annotated[Remove, Tag("remove")]
-    | Annotated[Order, Tag("order")]
+    | Annotated[OrderUnits, Tag("order")]
     | Annotated[Select, Tag("select")]
     | Annotated[Draw, Tag("draw")]
     | Annotated[AddScore, Tag("score")]
     | Annotated[Give, Tag("give")]
-    | Annotated[Result, Tag("result")],
+    | Annotated[EndGame, Tag("result")],
     Discriminator(
         only_key,
         custom_error_type="do",

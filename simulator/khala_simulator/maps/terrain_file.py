@@ -48,7 +48,7 @@ class MapInfo:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TerrainGrids:
     """The grids of the files: (h, w), but ``vertices`` (h + 1, w + 1)."""
 
     vertices: NDArray[np.float32]  # z at the cells' corners
@@ -113,7 +113,7 @@ def _numbers(data: bytes, magic: bytes, at: int, dtype: str, shape: tuple[int, .
     return np.frombuffer(data, kind, count, at).reshape(shape)
 
 
-def terrain_of(info: MapInfo, ground: Ground) -> Terrain:
+def terrain_of(info: MapInfo, ground: TerrainGrids) -> Terrain:
     """The terrain that the files describe."""
     width, height = info.size
     x0, y0, x1, y1 = info.playable

@@ -24,7 +24,7 @@ from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.levels import Level
-    from khala_simulator.opponent.plans import Plan
+    from khala_simulator.opponent.plans import ArmyPlan
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
@@ -36,14 +36,14 @@ NEAREST_SITE, FARTHEST_SITE = 5.0, 16.0  # from the town hall
 RETREAT_SHARE: Final = 0.25  # of a wave: with so few left it waits for the next one
 
 
-class Side:
+class OpponentSide:
     """One look at what a player has."""
 
     def __init__(self, world: World, player: int) -> None:
         self.world, self.player = world, player
         self.owner = world.players[player]
         self.level: Level = level_of(self.owner.difficulty)
-        self.plan: Plan = PLANS[self.owner.race]
+        self.plan: ArmyPlan = PLANS[self.owner.race]
         self.slots: list[int] = world.units_of(player).tolist()
         self.names: dict[int, str] = {slot: world.unit_type(slot).name for slot in self.slots}
         self.halls = [s for s in self.slots if harvesting.is_drop_off(world, s)]
@@ -77,7 +77,7 @@ class Side:
 
 def think(world: World, player: int) -> None:
     """Do what a computer player does when it looks at what it has."""
-    side = Side(world, player)
+    side = OpponentSide(world, player)
     if not side.slots:
         return
     if side.halls:
@@ -92,7 +92,7 @@ def think(world: World, player: int) -> None:
 # economy --------------------------------------------------------------------------------------------------------------
 
 
-def _mine(side: Side) -> None:
+def _mine(side: OpponentSide) -> None:
     world = side.world
     gas = [s for s in side.named(side.plan.gas) if world.build_progress[s] >= 1.0 and world.contents[s] > 0]
     staff = harvesting.assigned(world)
@@ -109,7 +109,7 @@ def _mine(side: Side) -> None:
             commands.gather(world, [worker], world.tag_of(field))
 
 
-def _free_worker(side: Side, point: list[float]) -> int:
+def _free_worker(side: OpponentSide, point: list[float]) -> int:
     """The nearest worker on its way to minerals, or NOBODY."""
     world = side.world
     fields = harvesting.kinds(world.catalog)[1]
@@ -121,7 +121,7 @@ def _free_worker(side: Side, point: list[float]) -> int:
     return min(free, key=lambda w: (away[w], w), default=NOBODY)
 
 
-def _keep_supply_ahead(side: Side) -> bool:
+def _keep_supply_ahead(side: OpponentSide) -> bool:
     """Make more supply when it runs out; True while that has to come first."""
     world, plan = side.world, side.plan
     cap = supply.cap(world, side.player)
@@ -135,7 +135,7 @@ def _keep_supply_ahead(side: Side) -> bool:
     return not _raise(side, plan.supply)
 
 
-def _train_workers(side: Side) -> None:
+def _train_workers(side: OpponentSide) -> None:
     wanted = side.level.workers + GAS_WORKERS * len(side.named(side.plan.gas))
     if side.planned(side.plan.worker) >= wanted:
         return
@@ -143,7 +143,7 @@ def _train_workers(side: Side) -> None:
     _train(side, [s for s in makers if s not in side.world.jobs], side.plan.worker)
 
 
-def _train(side: Side, makers: list[int], name: str) -> bool:
+def _train(side: OpponentSide, makers: list[int], name: str) -> bool:
     """Have the first of some units that can train a unit."""
     ability = side.ability_for(name)
     if ability is None:
@@ -155,7 +155,7 @@ def _train(side: Side, makers: list[int], name: str) -> bool:
 # structures -----------------------------------------------------------------------------------------------------------
 
 
-def _build(side: Side) -> None:
+def _build(side: OpponentSide) -> None:
     """Raise the next structure of the plan that is missing."""
     plan, level = side.plan, side.level
     producers = 1 if side.owner.race == "zerg" else level.producers
@@ -168,7 +168,7 @@ def _build(side: Side) -> None:
             return
 
 
-def _raise(side: Side, name: str) -> bool:
+def _raise(side: OpponentSide, name: str) -> bool:
     """Send a worker to build a structure near the town hall."""
     world, ability = side.world, side.ability_for(name)
     if ability is None or not side.halls:
@@ -188,7 +188,7 @@ def _raise(side: Side, name: str) -> bool:
     return bool(taken)
 
 
-def _geyser(side: Side) -> int:
+def _geyser(side: OpponentSide) -> int:
     """A free geyser of the base, or NOBODY."""
     world, hall = side.world, side.halls[0]
     free = [s for s in world.live.tolist() if building_sites.is_free_geyser(world, s)]
@@ -234,7 +234,7 @@ def _spiral() -> list[tuple[int, int]]:
 # army -----------------------------------------------------------------------------------------------------------------
 
 
-def _train_army(side: Side) -> None:
+def _train_army(side: OpponentSide) -> None:
     world = side.world
     for maker in side.named(*side.plan.makers):
         if maker in world.jobs or len(side.workers) < side.level.workers // 2:
@@ -244,7 +244,7 @@ def _train_army(side: Side) -> None:
                 break
 
 
-def _fight(side: Side) -> None:
+def _fight(side: OpponentSide) -> None:
     """Attack with a wave when it is large enough; come home when hardly anybody is left."""
     world, owner = side.world, side.owner
     army = side.army()
@@ -260,7 +260,7 @@ def _fight(side: Side) -> None:
         commands.attack_move(world, idle, goal)
 
 
-def _goal(side: Side) -> Point | None:
+def _goal(side: OpponentSide) -> Point | None:
     """The enemy structure nearest to home, or where an enemy started."""
     world = side.world
     live = world.live

@@ -7,7 +7,7 @@ from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ArmyPlan:
     """Names of unit types: what gives supply, gathers gas, makes units, comes before better units, and fights.
 
     ``army`` is in the order of preference; what is not allowed or affordable yet is passed over.
@@ -23,7 +23,7 @@ class Plan:
 
 
 PLANS: Final = {
-    "protoss": Plan(
+    "protoss": ArmyPlan(
         worker="Probe",
         supply="Pylon",
         gas="Assimilator",
@@ -32,7 +32,7 @@ PLANS: Final = {
         army=("Stalker", "Zealot"),
         makers=("Gateway", "WarpGate"),
     ),
-    "terran": Plan(
+    "terran": ArmyPlan(
         worker="SCV",
         supply="SupplyDepot",
         gas="Refinery",
@@ -41,7 +41,7 @@ PLANS: Final = {
         army=("Marine",),
         makers=("Barracks",),
     ),
-    "zerg": Plan(
+    "zerg": ArmyPlan(
         worker="Drone",
         supply="Overlord",
         gas="Extractor",

@@ -14,18 +14,18 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from khala_simulator.api.game import Game
+    from khala_simulator.api.game import HostedGame
 
 LOOPS_PER_SECOND = 22.4
 _POLL_S = 0.002
 
 
-class Clock:
+class RealtimeClock:
     """Keeps one game at 22.4 loops per second."""
 
     def __init__(
         self,
-        game: Game,
+        game: HostedGame,
         now: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
@@ -59,7 +59,7 @@ class Clock:
         await self._sleep(max(ahead_s, _POLL_S))
 
 
-class SharedClock(Clock):
+class SharedClock(RealtimeClock):
     """Tells the time of a game that is advanced together with other processes."""
 
     def catch_up(self) -> None:

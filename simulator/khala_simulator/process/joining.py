@@ -13,12 +13,12 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.api.game import Game, Setup
+from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.game_info import GameInfo
 from khala_simulator.api.projection import size_problem
 from khala_simulator.api.viewer import Viewer
-from khala_simulator.process.clock import Clock, SharedClock
-from khala_simulator.process.lan import Door, NobodyCameError, Peers, Refused, knock
+from khala_simulator.process.clock import RealtimeClock, SharedClock
+from khala_simulator.process.lan import Door, JoinRefused, NobodyCameError, Peers, knock
 from khala_simulator.process.lockstep import Lockstep
 from khala_simulator.process.process import Failure, Party, Playing, Process
 from khala_simulator.process.replay import Replay, ReplayError
@@ -71,7 +71,7 @@ def restart_game(process: Process, _: sc.RequestRestartGame) -> sc.ResponseResta
 def begin(process: Process, party: Party) -> Playing:
     """A game at its first loop, with everybody in their seats."""
     try:
-        game = Game(party.setup, process.tables)
+        game = HostedGame(party.setup, process.tables)
     except CatalogError as error:
         raise _failure(_JoinError.CannotOpenMap, f"{party.setup.path}: {error}") from error
     for player, options in party.interfaces.items():
@@ -82,7 +82,7 @@ def begin(process: Process, party: Party) -> Playing:
             other.unread = other is not seat
     else:
         seat = Viewer(game, party.watched, party.options)
-    clock = Clock(game) if party.setup.realtime else None
+    clock = RealtimeClock(game) if party.setup.realtime else None
     return Playing(game, seat, GameInfo(game, seat), clock=clock, party=party)
 
 
@@ -166,7 +166,7 @@ async def _host(process: Process, table: Seating, me: int, port: int) -> Playing
         try:
             return table.take(_read_join(message, build))
         except Failure as failure:
-            raise Refused(_REFUSED + failure.body.SerializeToString()) from failure
+            raise JoinRefused(_REFUSED + failure.body.SerializeToString()) from failure
 
     door = Door(admit, table.release)
     try:

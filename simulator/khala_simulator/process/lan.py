@@ -20,7 +20,7 @@ from khala_simulator.process.lockstep import Commit, LockstepError, decode
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_simulator.process.clock import Clock
+    from khala_simulator.process.clock import RealtimeClock
     from khala_simulator.process.lockstep import Leave, Lockstep
 
 HOST = "127.0.0.1"
@@ -36,7 +36,7 @@ class NobodyCameError(Exception):
     """The other processes of the game did not show up."""
 
 
-class Refused(Exception):
+class JoinRefused(Exception):
     """A guest cannot be taken; `answer` tells it why."""
 
     def __init__(self, answer: bytes) -> None:
@@ -147,8 +147,8 @@ async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]
 class Door:
     """Where the host takes in guests, until everybody is there.
 
-    `admit` is given what a guest said and returns its member number, or raises `Refused`; `release` is given the number
-    of a guest that went away again.
+    `admit` is given what a guest said and returns its member number, or raises `JoinRefused`; `release` is given the
+    number of a guest that went away again.
     """
 
     def __init__(self, admit: Callable[[bytes], int], release: Callable[[int], None]) -> None:
@@ -203,7 +203,7 @@ class Door:
         elif message is not None:
             try:
                 self.guests[self._admit(message)] = link
-            except Refused as refused:
+            except JoinRefused as refused:
                 link.send(refused.answer)
                 link.close()
         self._changed.set()
@@ -230,11 +230,11 @@ class Peers:
                 self._news.clear()
                 await self._news.wait()
 
-    def keep_time(self, clock: Clock) -> None:
+    def keep_time(self, clock: RealtimeClock) -> None:
         """Advances the game by the clock from now on, until it is over or left."""
         self._keeper = asyncio.create_task(self._keep_time(clock))
 
-    async def _keep_time(self, clock: Clock) -> None:
+    async def _keep_time(self, clock: RealtimeClock) -> None:
         while not self._lockstep.game.over:
             due = clock.due
             self._tell(self._lockstep.commit(due))

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 from google.protobuf.message import DecodeError
 from s2clientprotocol import debug_pb2
 
-from khala_simulator.api.game import Entry
+from khala_simulator.api.game import LogEntry
 from khala_simulator.process.replay import pack, unpack
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_simulator.api.game import Game
+    from khala_simulator.api.game import HostedGame
 
 CHECK_LOOPS = 448
 """Loops between two comparisons of the worlds: 20 s, as a digest takes as long as a loop."""
@@ -40,7 +40,7 @@ class Commit:
 
     member: int
     through: int
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[LogEntry, ...] = ()
     digests: dict[int, str] = dataclasses.field(default_factory=dict)  # of its world, by loop
 
     def encode(self) -> bytes:
@@ -83,7 +83,7 @@ def decode(data: bytes, members: frozenset[int]) -> Commit | Leave:
 class Lockstep:
     """One process's account of how far the world may go."""
 
-    def __init__(self, game: Game, me: int, members: Iterable[int]) -> None:
+    def __init__(self, game: HostedGame, me: int, members: Iterable[int]) -> None:
         self.game, self.me = game, me
         self._through = dict.fromkeys(members, 0)
         self._digests: dict[int, str] = {}  # of the own world, by loop
@@ -154,7 +154,7 @@ class Lockstep:
 
     def _drop(self, member: int, loop: int) -> None:
         if self._through.pop(member, None) is not None and member <= len(self.game.setup.players):
-            self.game.note(Entry(loop, member, _surrender()))
+            self.game.note(LogEntry(loop, member, _surrender()))
 
     def _check(self) -> None:
         waiting, self._unchecked = self._unchecked, []

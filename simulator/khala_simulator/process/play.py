@@ -20,7 +20,7 @@ from khala_simulator.process.lan import CHUNK_LOOPS
 from khala_simulator.process.status import UsageError
 
 if TYPE_CHECKING:
-    from khala_simulator.api.game import Game
+    from khala_simulator.api.game import HostedGame
     from khala_simulator.api.wire import Part
     from khala_simulator.process.process import Playing, Process
 
@@ -55,7 +55,7 @@ async def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
     return sc.ResponseStep(simulation_loop=table.game.world.loop)
 
 
-async def _advance(game: Game, count: int) -> None:
+async def _advance(game: HostedGame, count: int) -> None:
     target = game.world.loop + count
     while True:
         game.step(min(target - game.world.loop, CHUNK_LOOPS))

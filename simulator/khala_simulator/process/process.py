@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from google.protobuf.message import Message
     from s2clientprotocol import sc2api_pb2 as sc
 
-    from khala_simulator.api.game import Game, Setup
+    from khala_simulator.api.game import HostedGame, Setup
     from khala_simulator.api.game_info import GameInfo
-    from khala_simulator.api.seat import Seat
-    from khala_simulator.process.clock import Clock
+    from khala_simulator.api.seat import PlayerSeat
+    from khala_simulator.process.clock import RealtimeClock
     from khala_simulator.process.lan import Peers
 
 _PATCH_OF_BUILD = {75689: "4.10.0", 92440: "5.0.13"}
@@ -49,11 +49,11 @@ class Party:
 class Playing:
     """A game with the seat of the client that is connected to this process."""
 
-    game: Game
-    seat: Seat
+    game: HostedGame
+    seat: PlayerSeat
     info: GameInfo
     replay: bool = False
-    clock: Clock | None = None  # of a game in real time
+    clock: RealtimeClock | None = None  # of a game in real time
     party: Party | None = None  # with which the game began, if it is no replay
     peers: Peers | None = None  # the other processes of the game
     episode: int = 0  # restarts of the same game before this one

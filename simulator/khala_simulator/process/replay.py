@@ -19,7 +19,7 @@ from google.protobuf.message import DecodeError, Message
 from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.api.game import Entry, Game, Setup
+from khala_simulator.api.game import HostedGame, LogEntry, Setup
 from khala_simulator.maps.map_file import read_map
 from khala_simulator.process import mpq
 from khala_simulator.process.clock import LOOPS_PER_SECOND
@@ -49,7 +49,7 @@ class Replay:
     loops: int
     results: dict[int, int]
     races: dict[int, str]
-    log: tuple[Entry, ...]
+    log: tuple[LogEntry, ...]
 
     def file(self, version: dict[str, str]) -> bytes:
         """The file; `version` is what it says of the game in the words of the game's own files."""
@@ -119,7 +119,7 @@ def _hex(message: Message) -> str:
     return message.SerializeToString(deterministic=True).hex()
 
 
-def pack(log: Iterable[Entry]) -> bytes:
+def pack(log: Iterable[LogEntry]) -> bytes:
     """Entries of a log as bytes."""
     parts = []
     for entry in log:
@@ -128,7 +128,7 @@ def pack(log: Iterable[Entry]) -> bytes:
     return b"".join(parts)
 
 
-def unpack(log: bytes) -> Iterator[Entry]:
+def unpack(log: bytes) -> Iterator[LogEntry]:
     """The entries in bytes that `pack` made.
 
     Raises:
@@ -138,11 +138,11 @@ def unpack(log: bytes) -> Iterator[Entry]:
     while at < len(log):
         loop, player, kind, size = _ENTRY.unpack_from(log, at)
         at += _ENTRY.size
-        yield Entry(loop, player, _KINDS[kind].FromString(log[at : at + size]))
+        yield LogEntry(loop, player, _KINDS[kind].FromString(log[at : at + size]))
         at += size
 
 
-def record(game: Game) -> Replay:
+def record(game: HostedGame) -> Replay:
     """The replay of a game up to now."""
     players = range(1, len(game.setup.players) + 1)
     return Replay(
@@ -155,9 +155,9 @@ def record(game: Game) -> Replay:
     )
 
 
-def rerun(replay: Replay, version: str) -> Game:
+def rerun(replay: Replay, version: str) -> HostedGame:
     """A game that plays a replay, with the players in their seats."""
-    game = Game(replay.setup, version, log=replay.log, end_loop=replay.loops)
+    game = HostedGame(replay.setup, version, log=replay.log, end_loop=replay.loops)
     for number, recorded in replay.interfaces.items():
         game.sit(number, recorded)
     game.step(0)  # it may have ended before its first loop

@@ -14,7 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.api.game_info import RACES, GameInfo
 from khala_simulator.api.projection import size_problem
 from khala_simulator.api.viewer import Viewer
-from khala_simulator.process.clock import LOOPS_PER_SECOND, Clock
+from khala_simulator.process.clock import LOOPS_PER_SECOND, RealtimeClock
 from khala_simulator.process.process import Failure, Playing
 from khala_simulator.process.replay import Replay, ReplayError, rerun
 
@@ -55,7 +55,7 @@ def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.Respons
     seat = Viewer(game, player, options)
     seat.sees_all = request.disable_fog and not replay.setup.disable_fog
     process.setup = None
-    clock = Clock(game) if request.realtime else None
+    clock = RealtimeClock(game) if request.realtime else None
     process.play(Playing(game, seat, GameInfo(game, seat), replay=True, clock=clock))
     return sc.ResponseStartReplay()
 

@@ -14,9 +14,20 @@ import numpy as np
 from khala_simulator.abilities import casting, commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.economy import melee_start
-from khala_simulator.maps.places import Column, Grid, RandomPlace, kind_of_place
+from khala_simulator.maps.places import PlaceGrid, RandomPlace, ZigZag, kind_of_place
 from khala_simulator.maps.scenario import MELEE_MINERALS
-from khala_simulator.maps.script import AddScore, Create, Draw, Give, Order, Regroup, Remove, Result, Select, Spawn
+from khala_simulator.maps.script import (
+    AddScore,
+    Create,
+    Draw,
+    EndGame,
+    Give,
+    OrderUnits,
+    Regroup,
+    Remove,
+    Select,
+    Spawn,
+)
 from khala_simulator.movement.placement import free_places
 from khala_simulator.world.players import NEUTRAL, GameResult
 
@@ -108,10 +119,10 @@ def _spots(world: World, unit: UnitType, at: Any, count: int) -> Iterator[tuple[
     if isinstance(at, RandomPlace):
         for _ in range(count):
             yield free_places(world, unit, random_place(world, unit, at), 1)[0]
-    elif isinstance(at, Grid):
+    elif isinstance(at, PlaceGrid):
         x0, y0 = (0.0, 0.0) if at.around is None else point_of(world, at.around)
         yield from ((x0 + x, y0 + y) for y in at.y for x in at.x)
-    elif isinstance(at, Column):
+    elif isinstance(at, ZigZag):
         x0, y0 = point_of(world, at.column)
         yield from ((x0, y0 + at.step * (i // 2) * (1 if i % 2 == 0 else -1)) for i in range(1, count + 1))
     elif isinstance(at, str) or not isinstance(at[0], tuple):
@@ -294,10 +305,10 @@ _ACTIONS: Final[dict[type, Callable[[World, Any], object]]] = {
     Create: lambda world, action: create(world, action.create),
     Spawn: lambda world, action: _spawn(world, action.spawn),
     Regroup: lambda world, action: _regroup(world, action.regroup),
-    Order: lambda world, action: _order(world, action.order),
+    OrderUnits: lambda world, action: _order(world, action.order),
     Select: lambda world, action: _select(world, action.select),
     Draw: lambda world, action: _draw(world, action.draw),
     AddScore: lambda world, action: _score(world, action.score),
     Give: lambda world, action: _give(world, action.give),
-    Result: lambda world, action: world.end({p: OUTCOMES[outcome] for p, outcome in action.result.items()}),
+    EndGame: lambda world, action: world.end({p: OUTCOMES[outcome] for p, outcome in action.result.items()}),
 }

@@ -48,7 +48,7 @@ def _drop_ended(world: World) -> None:
     world.sweeps = [s for s in world.sweeps if s.shot.source != NOBODY and s.ahead < len(_line(world, s.shot).points)]
 
 
-def _line(world: World, shot: Shot) -> records.Sweep:
+def _line(world: World, shot: Shot) -> records.SweepRecord:
     line = world.catalog.weapons[shot.weapon].hits[shot.hit].sweep
     assert line is not None, "only hits with a sweep are begun"
     return line
@@ -76,12 +76,12 @@ def _draw(world: World, sweep: Sweep) -> None:
             _touch(world, sweep, slot, line, sweep.begun + _delay(line, first + int(np.argmax(reached[i]))))
 
 
-def _delay(line: records.Sweep, point: int) -> float:
+def _delay(line: records.SweepRecord, point: int) -> float:
     """Loops from the damage point until a point of the line touches."""
     return line.points[point][0] - line.lag_loops
 
 
-def _places(world: World, shot: Shot, line: records.Sweep, first: int, end: int) -> Floats:
+def _places(world: World, shot: Shot, line: records.SweepRecord, first: int, end: int) -> Floats:
     """(k, 2) where the points from ``first`` up to ``end`` are, those past the weapon's reach left out."""
     fx, fy = shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1]
     distance = math.sqrt(fx * fx + fy * fy)
@@ -96,7 +96,7 @@ def _places(world: World, shot: Shot, line: records.Sweep, first: int, end: int)
     return np.array(origin) + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
 
 
-def _touch(world: World, sweep: Sweep, slot: int, line: records.Sweep, moment: float) -> None:
+def _touch(world: World, sweep: Sweep, slot: int, line: records.SweepRecord, moment: float) -> None:
     """Hit a unit now, or when the lag has passed."""
     shot = sweep.shot._replace(target=slot)
     if line.lag_loops <= 0.0:

@@ -20,11 +20,11 @@ from khala_simulator.tables.records import (
     Affects,
     Area,
     Change,
-    Footprint,
     Hit,
-    Production,
+    ProductionRecord,
     Search,
-    Sweep,
+    SweepRecord,
+    UnitFootprint,
     UnitType,
     Upgrade,
     Weapon,
@@ -37,9 +37,9 @@ __all__ = [
     "Buff",
     "Catalog",
     "CatalogError",
-    "Footprint",
     "Hit",
-    "Production",
+    "ProductionRecord",
+    "UnitFootprint",
     "UnitType",
     "Upgrade",
     "Weapon",
@@ -68,7 +68,7 @@ class Catalog:
     units: tuple[UnitType, ...]
     weapons: tuple[Weapon, ...]
     upgrades: tuple[Upgrade, ...]
-    footprints: dict[str, Footprint]
+    footprints: dict[str, UnitFootprint]
     row_of_id: dict[int, int]
     row_of_name: dict[str, int]
     abilities: tuple[Ability, ...]
@@ -210,9 +210,9 @@ def _affects(raw: dict[str, Any]) -> Affects:
     return Affects(**_own(Affects, raw), excluding=raw.get("except", ""))
 
 
-def _sweep(raw: dict[str, Any]) -> Sweep:
+def _sweep(raw: dict[str, Any]) -> SweepRecord:
     points = tuple(map(tuple, raw["points"]))
-    return Sweep(affects=_affects(raw), **{**_own(Sweep, raw), "points": points})
+    return SweepRecord(affects=_affects(raw), **{**_own(SweepRecord, raw), "points": points})
 
 
 def _hit(raw: dict[str, Any]) -> Hit:
@@ -246,10 +246,10 @@ def _weapon(row: int, raw: dict[str, Any]) -> Weapon:
     )
 
 
-def _production(raw: dict[str, Any]) -> Production:
+def _production(raw: dict[str, Any]) -> ProductionRecord:
     cost = tuple(raw.get("cost", (0, 0)))
     rest = {k: v for k, v in raw.items() if k not in ("from", "cost")}
-    return Production(producer=raw["from"], cost=cost, **{"ability": 0, **rest})
+    return ProductionRecord(producer=raw["from"], cost=cost, **{"ability": 0, **rest})
 
 
 def _unit(row: int, raw: dict[str, Any], weapon_of_id: dict[str, Weapon]) -> UnitType:
@@ -282,7 +282,7 @@ def _upgrade(raw: dict[str, Any]) -> Upgrade:
     )
 
 
-def _footprint(raw: dict[str, Any]) -> Footprint:
+def _footprint(raw: dict[str, Any]) -> UnitFootprint:
     x0, y0, x1, y1 = raw["area"]
     marked: dict[str, list[tuple[int, int]]] = {"x": [], "o": []}
     for line, text in enumerate(raw["rows"]):
@@ -290,7 +290,7 @@ def _footprint(raw: dict[str, Any]) -> Footprint:
             if mark in marked:
                 marked[mark].append((x0 + column, y1 - 1 - line))
     check = raw.get("check", {}).get("x", {})
-    return Footprint(
+    return UnitFootprint(
         id=raw["id"],
         area=(x0, y0, x1, y1),
         cells=tuple(marked["x"]),

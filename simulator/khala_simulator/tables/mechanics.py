@@ -15,7 +15,7 @@ import yaml
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class Constant:
     """One constant as the data file tells it."""
 
     name: str
@@ -86,11 +86,11 @@ class Mechanics:
     swoop_speed_n: float
 
 
-def entries() -> tuple[Entry, ...]:
+def entries() -> tuple[Constant, ...]:
     """All constants of the data file, in its order; some are choices of a rule and have no number."""
     text = (resources.files("khala_simulator.data") / "mechanics.yaml").read_text(encoding="utf-8")
     raw: dict[str, dict[str, Any]] = yaml.safe_load(text)
-    return tuple(Entry(name=name, **fields) for name, fields in raw.items())
+    return tuple(Constant(name=name, **fields) for name, fields in raw.items())
 
 
 def _load() -> Mechanics:

@@ -33,7 +33,7 @@ class Affects:
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
+class SweepRecord:
     """A line of small circles drawn one after the other, as the Colossus' beams and the Lurker's spines do.
 
     Each point is ``(delay_loops, across, along)``: the offset from the ``origin`` ("target" or "source") is in the
@@ -87,7 +87,7 @@ class Hit:
     beam_tick_n: float | None = None
     area: tuple[Area, ...] = ()
     area_affects: Affects = Affects()
-    sweep: Sweep | None = None
+    sweep: SweepRecord | None = None
     search: Search | None = None
     bounce: bool = False
 
@@ -153,7 +153,7 @@ class Weapon:
 
 
 @dataclass(frozen=True, slots=True)
-class Production:
+class ProductionRecord:
     """One way in which a unit type comes about, with what is charged for it."""
 
     producer: str
@@ -227,7 +227,7 @@ class UnitType:
     require_attached: bool = False
     unit_alias: int = 0
     tech_alias: tuple[int, ...] = ()
-    made_by: tuple[Production, ...] = ()
+    made_by: tuple[ProductionRecord, ...] = ()
     priority: int = 0
     defensive: bool = False
     passive: bool = False
@@ -311,7 +311,7 @@ class Upgrade:
 
 
 @dataclass(frozen=True, slots=True)
-class Footprint:
+class UnitFootprint:
     """The cells that a structure blocks, relative to its centre.
 
     ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre, ``around`` of those where no

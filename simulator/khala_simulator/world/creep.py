@@ -72,7 +72,7 @@ def _spread(row: dict[str, object], birth: set[tuple[int, int]], grown: set[tupl
 
 
 @dataclass(slots=True)
-class Source:
+class CreepSource:
     """One place from which creep spreads, or recedes when ``fades``.
 
     ``tag`` is the unit's, ``cell`` the one of its middle, ``extent`` how many of its cells it covers, ``due`` the loop
@@ -94,7 +94,7 @@ class Creep:
         self.spreads = spreads(version)
         self.covered: Bools = terrain.creep
         self.anywhere = bool(terrain.creep.any())
-        self.sources: list[Source] = []
+        self.sources: list[CreepSource] = []
         self.waiting: dict[int, tuple[float, float, int]] = {}  # tag -> where and since when a source by choice stands
         self.withering: Ints = np.zeros(0, dtype=np.int64)  # slots of structures that need creep
         self.looked_at = -1  # the population that the sources were last compared with
@@ -106,12 +106,12 @@ class Creep:
     def add(self, tag: int, unit: str, cell: tuple[int, int], loop: int, *, grown: bool) -> None:
         """Let creep spread from a new source, or from one that has all its creep already."""
         spread = self.spreads[unit]
-        source = Source(tag, unit, cell, 0, loop + spread.period_loops)
+        source = CreepSource(tag, unit, cell, 0, loop + spread.period_loops)
         self.sources.append(source)
         self.reach(source, len(spread.cells) if grown else spread.birth)
         self.due = min(self.due, source.due)
 
-    def reach(self, source: Source, extent: int) -> None:
+    def reach(self, source: CreepSource, extent: int) -> None:
         """Let a source cover exactly the first ``extent`` of its cells."""
         cells = self.spreads[source.unit].cells
         extent = min(max(extent, 0), len(cells))

@@ -40,7 +40,7 @@ class Spent:
 
 
 @dataclass(slots=True)
-class Score:
+class ScoreCounters:
     """Counters behind the API's score details. Values are in resources, as ``score_make`` and ``score_kill`` say."""
 
     killed_value_units: float = 0.0
@@ -90,7 +90,7 @@ class Player:
     cheats: list[str] = field(default_factory=list)  # debug states that are on
     result: GameResult = GameResult.UNDECIDED
     surrendered: bool = False
-    score: Score = field(default_factory=Score)
+    score: ScoreCounters = field(default_factory=ScoreCounters)
     attacking: bool = False  # a computer player's army is on its way
     start: tuple[float, float] | None = None  # where his town hall was put at the start of a melee game
     camera: tuple[float, float] | None = None  # where he looks at the start, if not where the map says

@@ -15,7 +15,7 @@ INDEX_SHIFT: Final = 18
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class RememberedUnit:
     """A unit as it was last seen; ``tag`` is the snapshot's own, ``unit`` that of the unit itself."""
 
     tag: int
@@ -27,14 +27,14 @@ class Snapshot:
     build_progress: float
 
 
-class Memory:
+class FogMemory:
     """The snapshots of one player, by the tag of the unit, and which of them the fog covers now."""
 
     def __init__(self) -> None:
-        self.of_unit: dict[int, Snapshot] = {}
-        self.shown: list[Snapshot] = []
+        self.of_unit: dict[int, RememberedUnit] = {}
+        self.shown: list[RememberedUnit] = []
         self.made = 0
 
-    def find(self, tag: int) -> Snapshot | None:
+    def find(self, tag: int) -> RememberedUnit | None:
         """The shown snapshot with this tag of its own, or None."""
         return next((snapshot for snapshot in self.shown if snapshot.tag == tag), None)

@@ -28,7 +28,7 @@ from khala_simulator.world.orders import ATTACK, Order, OrderKind
 from khala_simulator.world.players import NEUTRAL, GameResult, Player, PlayerSetup
 from khala_simulator.world.script_memory import ScriptMemory
 from khala_simulator.world.shots import Missiles, PendingHits, Sweep
-from khala_simulator.world.snapshots import Memory
+from khala_simulator.world.snapshots import FogMemory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,7 +72,7 @@ class Mishap:
 
 
 @dataclass(frozen=True, slots=True)
-class Alert:
+class PlayerAlert:
     """Something that a player is told of: at which loop, whom, and the API's name of it."""
 
     loop: int
@@ -115,7 +115,7 @@ class World(UnitColumns, WorldCaches):
         self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
         self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
         self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
-        self.memories = [Memory() for _ in self.players]  # what each player remembers of what the fog covers
+        self.memories = [FogMemory() for _ in self.players]  # what each player remembers of what the fog covers
         self.missiles = Missiles()
         self.pending = PendingHits()
         self.sweeps: list[Sweep] = []
@@ -125,7 +125,7 @@ class World(UnitColumns, WorldCaches):
         self.autocast: dict[int, tuple[int, ...]] = {}  # slot -> abilities that it uses by itself
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
-        self.alerts: list[Alert] = []
+        self.alerts: list[PlayerAlert] = []
         self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
         self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
@@ -207,7 +207,7 @@ class World(UnitColumns, WorldCaches):
 
     def alert(self, player: int, name: str) -> None:
         """Tell a player something, by the API's name of the alert."""
-        self.alerts.append(Alert(self.loop, player, name))
+        self.alerts.append(PlayerAlert(self.loop, player, name))
 
     def passengers(self, carrier: int) -> list[int]:
         """Slots of the units inside a carrier, ascending."""

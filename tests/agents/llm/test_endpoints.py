@@ -15,13 +15,13 @@ from pydantic import SecretStr
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import (
     Completion,
+    EndpointUnavailable,
     LLMError,
     MalformedCompletion,
     OutOfMoney,
-    Refused,
     Request,
+    RequestRefused,
     TryTimeout,
-    Unavailable,
     Unreachable,
 )
 from khala_agents.llm.openai_compatible import OpenAICompatible
@@ -67,12 +67,12 @@ async def test_a_completion_comes_with_its_usage_and_price() -> None:
 
 
 FAULTS = [
-    ("429", Unavailable, "http 429"),
+    ("429", EndpointUnavailable, "http 429"),
     ("quota", OutOfMoney, "http 429"),
-    ("500", Unavailable, "http 500"),
-    ("503", Unavailable, "http 503"),
-    ("529", Unavailable, "http 529"),
-    ("400", Refused, "http 400"),
+    ("500", EndpointUnavailable, "http 500"),
+    ("503", EndpointUnavailable, "http 503"),
+    ("529", EndpointUnavailable, "http 529"),
+    ("400", RequestRefused, "http 400"),
     ("garbage", MalformedCompletion, "malformed"),
     ("half", Unreachable, "connection"),
     ("reset", Unreachable, "connection"),
@@ -98,7 +98,7 @@ async def test_nonsense_is_a_completion_like_any_other() -> None:
 @pytest.mark.parametrize(("status", "asked_s"), [("429", 7.5), ("503", 7.5), ("500", None)])
 async def test_retry_after_reaches_the_error(status: str, asked_s: float | None) -> None:
     async with Endpoint(Behaviour(faults=Faults({status: 1.0}), retry_after_s=7.5)) as endpoint:
-        with pytest.raises(Unavailable) as caught:
+        with pytest.raises(EndpointUnavailable) as caught:
             await ask(client(endpoint.base_url))
     assert caught.value.retry_after_s == asked_s
 
@@ -113,7 +113,7 @@ async def test_nobody_at_the_address_is_unreachable() -> None:
 
 async def test_an_unknown_model_is_refused_with_the_words_of_the_endpoint() -> None:
     async with Endpoint() as endpoint:
-        with pytest.raises(Refused, match=r"http 404: there is no model 'gpt', there are silent, random-legal"):
+        with pytest.raises(RequestRefused, match=r"http 404: there is no model 'gpt', there are silent, random-legal"):
             await ask(client(endpoint.base_url, model="gpt"))
 
 
@@ -314,7 +314,7 @@ BAD_ANSWERS = [
     (b"<html>", MalformedCompletion, "answered with no chat completion: '<html>'"),
     ({"choices": []}, MalformedCompletion, "answered with no chat completion"),
     ({"choices": [{"message": {"content": 3}}]}, MalformedCompletion, "answered with no chat completion"),
-    ({"error": {"code": 503, "message": "no capacity"}}, Unavailable, "answered http 503: no capacity"),
+    ({"error": {"code": 503, "message": "no capacity"}}, EndpointUnavailable, "answered http 503: no capacity"),
     ({"error": {"code": 402, "message": "no credits"}}, OutOfMoney, "answered http 402: no credits"),
 ]
 
@@ -379,9 +379,9 @@ async def test_anthropic_is_spoken_to_in_its_own_words() -> None:
 
 
 ANTHROPIC_FAULTS = [
-    (529, {"type": "error", "error": {"type": "overloaded_error", "message": "Overloaded"}}, Unavailable),
+    (529, {"type": "error", "error": {"type": "overloaded_error", "message": "Overloaded"}}, EndpointUnavailable),
     (429, {"type": "error", "error": {"type": "enforced_spend_limit_reached", "message": "Spent"}}, OutOfMoney),
-    (400, {"type": "error", "error": {"type": "invalid_request_error", "message": "max_tokens"}}, Refused),
+    (400, {"type": "error", "error": {"type": "invalid_request_error", "message": "max_tokens"}}, RequestRefused),
     (200, {"type": "message"}, MalformedCompletion),
 ]
 

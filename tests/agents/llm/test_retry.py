@@ -10,14 +10,14 @@ import pytest
 
 from khala_agents.llm.client import (
     Completion,
+    EndpointUnavailable,
     LLMError,
     MalformedCompletion,
     OutOfMoney,
-    Refused,
     Request,
+    RequestRefused,
     TryTimeout,
     Unauthorized,
-    Unavailable,
     Unreachable,
 )
 from khala_agents.llm.http import error_for, retry_after_s
@@ -42,22 +42,22 @@ async def run(model: Any, rule: RetryRule = EXACT, deadline: float | None = None
 
 # status → what it is, tried again; the list of `khala_agents.llm.retry` and `khala_agents.llm.http`, as a table
 STATUSES = [
-    (300, Refused, False),
-    (400, Refused, False),
+    (300, RequestRefused, False),
+    (400, RequestRefused, False),
     (401, Unauthorized, False),
     (402, OutOfMoney, False),
     (403, Unauthorized, False),
-    (404, Refused, False),
-    (408, Unavailable, True),
-    (409, Unavailable, True),
-    (413, Refused, False),
-    (422, Refused, False),
-    (429, Unavailable, True),
-    (500, Unavailable, True),
-    (502, Unavailable, True),
-    (503, Unavailable, True),
-    (504, Unavailable, True),
-    (529, Unavailable, True),
+    (404, RequestRefused, False),
+    (408, EndpointUnavailable, True),
+    (409, EndpointUnavailable, True),
+    (413, RequestRefused, False),
+    (422, RequestRefused, False),
+    (429, EndpointUnavailable, True),
+    (500, EndpointUnavailable, True),
+    (502, EndpointUnavailable, True),
+    (503, EndpointUnavailable, True),
+    (504, EndpointUnavailable, True),
+    (529, EndpointUnavailable, True),
 ]
 
 
@@ -131,7 +131,7 @@ RETRY_AFTER = [(0.0, 1.0), (0.5, 1.0), (5.0, 5.0)]
 
 @pytest.mark.parametrize(("asked_s", "waited_s"), RETRY_AFTER)
 async def test_retry_after_is_a_minimum(listed_model: Callable[..., Any], asked_s: float, waited_s: float) -> None:
-    model = listed_model(Unavailable("busy", status="http 429", retry_after_s=asked_s), "good")
+    model = listed_model(EndpointUnavailable("busy", status="http 429", retry_after_s=asked_s), "good")
     await run(model)
     assert model.times_s == [0, waited_s]
 
@@ -144,9 +144,9 @@ DEADLINES = [(100.0, None, 31.0), (7.5, None, 7.0), (7.0, None, 3.0), (1.0, None
 async def test_no_wait_is_begun_that_would_end_after_the_deadline(
     listed_model: Callable[..., Any], deadline: float, retry_after: float | None, raised_at: float
 ) -> None:
-    busy = Unavailable("busy", status="http 503", retry_after_s=retry_after)
+    busy = EndpointUnavailable("busy", status="http 503", retry_after_s=retry_after)
     model = listed_model(*[busy] * 9)
-    with pytest.raises(Unavailable):
+    with pytest.raises(EndpointUnavailable):
         await run(model, RetryRule(tries=7, jitter_s=0, cap_s=8), deadline=deadline)
     assert asyncio.get_running_loop().time() == raised_at
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_agents.scripted.players import PLAYERS, focus_fire, in_reach, random_legal, silent
-from khala_agents.scripted.reading import Action, Situation, Unit, read
+from khala_agents.scripted.reading import Situation, TextAction, TextUnit, read
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -31,19 +31,19 @@ def test_an_observation_is_read_as_it_stands() -> None:
     situation = read(OBSERVATION)
     assert list(situation.teams) == ["Zealot-1", "Stalker-1", "Stalker-2"]
     zealots, stalkers, others = situation.teams.values()
-    assert zealots.own == [Unit("0x100040001", "Zealot", 12, 12, 150, 150, float("inf"))]
+    assert zealots.own == [TextUnit("0x100040001", "Zealot", 12, 12, 150, 150, float("inf"))]
     assert [unit.tag for unit in zealots.allies] == ["0x100080001"]
     assert zealots.enemies == [
-        Unit("0x100140001", "Zealot", 13.5, 12, 112, 150, 1.5),
-        Unit("0x100180001", "Stalker", 16, 12, 41, 160, 4.12),
-        Unit("0x1001c0001", "Stalker", 23, 12, 3, 160, 11),
+        TextUnit("0x100140001", "Zealot", 13.5, 12, 112, 150, 1.5),
+        TextUnit("0x100180001", "Stalker", 16, 12, 41, 160, 4.12),
+        TextUnit("0x1001c0001", "Stalker", 23, 12, 3, 160, 11),
     ]
     assert [(unit.x, unit.y) for unit in stalkers.own] == [(12, 12), (27.5, -1)]
     assert [(unit.weapon_s, unit.order) for unit in stalkers.own] == [(0, ""), (0.62, "Attack")]
     assert (stalkers.minimap, others.minimap) == ((18, 32), (40, 40))
     assert (stalkers.bounds, others.bounds) == ((3.5, 24, 0, 24), (0, 24, 0, 24))
-    assert zealots.actions == [Action("Attack_Unit", ("tag",))]
-    assert others.actions == [Action("Attack_Unit", ("tag",)), Action("Move_Screen", ("screen",))]
+    assert zealots.actions == [TextAction("Attack_Unit", ("tag",))]
+    assert others.actions == [TextAction("Attack_Unit", ("tag",)), TextAction("Move_Screen", ("screen",))]
     assert situation.max_actions == 2
     assert situation.correspondents == ["Scout", "Commander"]
 

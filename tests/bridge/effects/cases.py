@@ -15,7 +15,7 @@ from khala_bridge.names import order_name
 from khala_bridge.state import Alliance
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 from khala_simulator.abilities.casting import is_modelled
-from khala_simulator.api.abilities import Command, judge
+from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.tables.catalog import load_catalog
 
 from .preparations import BY_RULE, prepare_for
@@ -207,7 +207,7 @@ def _geysers(stage: Stage) -> Iterator[WorldPoint]:
 def _may(action: Action, stage: Stage, *, target: int = 0, point: WorldPoint | None = None) -> bool:
     if action.pysc2 is None:
         return True
-    command = Command(action.pysc2.ability_id, (stage.caster,), target=target, point=point)
+    command = UnitCommand(action.pysc2.ability_id, (stage.caster,), target=target, point=point)
     return judge(stage.world, 1, command).result == SUCCESS
 
 

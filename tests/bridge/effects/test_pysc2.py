@@ -8,7 +8,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2
 
 from khala_bridge.act import Actor
-from khala_bridge.act.plan import Played, Step
+from khala_bridge.act.plan import PlanStep, Played
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.act.screen import ScreenExecutor
 from khala_bridge.compat import actions as pysc2
@@ -154,7 +154,7 @@ def test_a_team_is_recalled_by_its_control_group(game: PySC2Game) -> None:
 
 
 def _select_others() -> Plan:
-    yield Step((pysc2.FUNCTIONS.select_army("select"),), 1)
+    yield PlanStep((pysc2.FUNCTIONS.select_army("select"),), 1)
     return Played()
 
 

@@ -10,7 +10,7 @@ from s2clientprotocol import spatial_pb2
 
 from khala_bridge.frames import Camera
 from khala_bridge.observe.image import features, own
-from khala_bridge.observe.image.layers import LAYERS, Layer, coloured, explain
+from khala_bridge.observe.image.layers import LAYERS, FeatureLayer, coloured, explain
 from khala_bridge.observe.image.moment import Moment
 from khala_bridge.observe.image.palette import LIVERIES
 from khala_bridge.task.images import DRAWN_LAYERS, GAME_LAYERS, MINIMAP_LAYERS
@@ -94,7 +94,7 @@ def test_units_on_one_point_are_counted(snapshot: Snap, unit: Unit) -> None:
 
 
 @pytest.mark.parametrize("layer", [layer for layer in LAYERS.values() if layer.colours], ids=lambda layer: layer.name)
-def test_values_have_the_colours_of_the_legend(layer: Layer) -> None:
+def test_values_have_the_colours_of_the_legend(layer: FeatureLayer) -> None:
     cells = np.array([[value for value, _, _ in layer.colours]], np.uint8)
     assert coloured(layer, cells)[0].tolist() == [list(colour) for _, _, colour in layer.colours]
 

@@ -10,7 +10,7 @@ import pytest
 from khala_bridge.frames import Camera
 from khala_bridge.observe.image import minimap
 from khala_bridge.observe.image.canvas import margin_of
-from khala_bridge.observe.image.minimap import Site
+from khala_bridge.observe.image.minimap import TeamMark
 from khala_bridge.observe.image.moment import Moment
 from khala_bridge.observe.image.palette import LIVERIES
 from khala_protocol.messages import Frames
@@ -32,7 +32,7 @@ SIZE = 512
 
 def draw(
     snapshot: Snapshot,
-    teams: tuple[Site, ...] = (),
+    teams: tuple[TeamMark, ...] = (),
     own: frozenset[int] = frozenset(),
     alerts: tuple[tuple[float, float], ...] = (),
 ) -> NDArray[np.uint8]:
@@ -72,7 +72,7 @@ def test_ones_own_teams_are_told_from_the_rest_of_the_side(snapshot: Snap, unit:
 
 def test_a_frame_shows_what_a_team_sees(snapshot: Snap) -> None:
     shown = snapshot([], size=(64, 64))
-    image = draw(shown, teams=(Site("A", Camera(32, 32)),))
+    image = draw(shown, teams=(TeamMark("A", Camera(32, 32)),))
     changed = (image == 255).all(axis=2)
     columns, rows = np.flatnonzero(changed.sum(axis=0) > 100), np.flatnonzero(changed.sum(axis=1) > 100)
     left, top = pixel_of(20, 20)
@@ -91,7 +91,7 @@ def test_alerts_are_ringed(snapshot: Snap) -> None:
 
 def test_teams_beyond_six_get_no_frame_but_all_get_a_name(snapshot: Snap) -> None:
     shown = snapshot([], size=(64, 64))
-    few, many = (tuple(Site(f"T{k}", Camera(4 + 6 * k, 10 + 4 * k)) for k in range(n)) for n in (6, 10))
+    few, many = (tuple(TeamMark(f"T{k}", Camera(4 + 6 * k, 10 + 4 * k)) for k in range(n)) for n in (6, 10))
     lines = [int(((draw(shown, teams=teams) == 255).all(axis=2).sum(axis=0) > 60).sum()) for teams in (few, many)]
     assert lines[0] == lines[1]
 

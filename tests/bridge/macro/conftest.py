@@ -9,7 +9,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.knowledge import knowledge
@@ -22,7 +22,7 @@ from khala_simulator.process.client import Client, command, interface
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala_bridge.auto import Order
+    from khala_bridge.auto import RuleOrder
     from khala_bridge.frames import WorldPoint
 
 RACES = {"protoss": common_pb2.Protoss, "terran": common_pb2.Terran, "zerg": common_pb2.Zerg}
@@ -100,19 +100,19 @@ class Game:
 
     # --- rules ------------------------------------------------------------------------------------------------
 
-    def say(self, action: str, **given: Any) -> list[Order]:
+    def say(self, action: str, **given: Any) -> list[RuleOrder]:
         """What the rule of an action answers; given are `units`, `tag` and `point`, as far as the words name them."""
         found = catalogue()[action]
         assert found.rule is not None
-        return RULES[found.rule](Ask(found, self.snapshot, self.ledger, **given))
+        return RULES[found.rule](RuleRequest(found, self.snapshot, self.ledger, **given))
 
-    def refusal(self, action: str, **given: Any) -> Impossible:
+    def refusal(self, action: str, **given: Any) -> NotAvailable:
         """What the rule of an action says that finds nothing."""
-        with pytest.raises(Impossible) as raised:
+        with pytest.raises(NotAvailable) as raised:
             self.say(action, **given)
         return raised.value
 
-    def do(self, orders: Sequence[Order]) -> list[str]:
+    def do(self, orders: Sequence[RuleOrder]) -> list[str]:
         """Carries orders out; what the game says of each."""
         actions = [
             command(

@@ -16,7 +16,7 @@ from khala_bridge.state.side import army
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_bridge.auto import Order
+    from khala_bridge.auto import RuleOrder
     from tests.bridge.macro.conftest import Game
 
 
@@ -29,7 +29,7 @@ def game(make_game: Callable[..., Game]) -> Game:
     return game
 
 
-def goal(orders: list[Order]) -> WorldPoint:
+def goal(orders: list[RuleOrder]) -> WorldPoint:
     (order,) = orders
     assert isinstance(order.target, WorldPoint)
     return order.target

@@ -19,7 +19,7 @@ from khala_bridge.state.ground import footprint_of, land_of, sites
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_bridge.auto import Order
+    from khala_bridge.auto import RuleOrder
     from khala_bridge.state import Unit
     from tests.bridge.macro.conftest import Game
 
@@ -30,7 +30,7 @@ FREE = (debug_pb2.all_resources, debug_pb2.tech_tree, debug_pb2.food)
 ON_GROUND = [name for name, site in sites().items() if site.ground != "geyser" and not site.clear]
 
 
-def built(orders: list[Order]) -> WorldPoint | int:
+def built(orders: list[RuleOrder]) -> WorldPoint | int:
     """Where the structure is going to stand."""
     (target,) = (order.target for order in orders if order.function.name.startswith("Build"))
     assert target is not None

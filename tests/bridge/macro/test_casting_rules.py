@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import debug_pb2
 
-from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.catalogue.action import Action
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
@@ -162,16 +162,16 @@ def test_a_structure_in_the_making_is_called_off(protoss: Game) -> None:
     while len(protoss.own("Pylon")) < 2:
         protoss.play(8)
     pylon = min(protoss.own("Pylon"), key=lambda unit: unit.build_progress).tag
-    orders = rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=pylon))
+    orders = rule(RuleRequest(call_off, protoss.snapshot, protoss.ledger, tag=pylon))
     assert protoss.do(orders) == ["Success"]
     protoss.play(2)
     assert len(protoss.own("Pylon")) == 1
     forge, probe = protoss.own("Forge")[0].tag, protoss.own("Probe")[0].tag
-    with pytest.raises(Impossible) as finished:
-        rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=forge))
+    with pytest.raises(NotAvailable) as finished:
+        rule(RuleRequest(call_off, protoss.snapshot, protoss.ledger, tag=forge))
     assert finished.value.message == (
         f"Call_Off is not possible now: the Forge {hex(forge)} is finished; only what is being built can be called off."
     )
-    with pytest.raises(Impossible) as none:
-        rule(Ask(call_off, protoss.snapshot, protoss.ledger, tag=probe))
+    with pytest.raises(NotAvailable) as none:
+        rule(RuleRequest(call_off, protoss.snapshot, protoss.ledger, tag=probe))
     assert none.value.message == f"{hex(probe)} is no structure of yours; name one that is being built."

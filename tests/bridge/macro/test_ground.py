@@ -11,7 +11,7 @@ from s2clientprotocol import debug_pb2
 
 from khala_bridge.frames import WorldPoint
 from khala_bridge.knowledge import knowledge
-from khala_bridge.state.ground import Ground, footprint_of, land_of, sites
+from khala_bridge.state.ground import MapGround, footprint_of, land_of, sites
 from khala_bridge.state.ground.land import built_by
 from khala_bridge.state.ground.resources import base_places
 from khala_bridge.state.ground.terrain import SEED_REACH
@@ -39,7 +39,7 @@ GROUND_OF = {  # what the game's catalogue calls it, and what it is called in si
 @pytest.mark.parametrize("name", ["Simple64", "Flat64"])
 def test_the_ground_is_that_of_the_map(make_game: Callable[..., Game], name: str) -> None:
     terrain = load_map(find_map(name)).terrain
-    ground = Ground.of(make_game(name).info)
+    ground = MapGround.of(make_game(name).info)
     assert (ground.buildable == terrain.build.T).all()
     assert not (ground.walkable & ~terrain.walk.T).any()
     assert (terrain.walk.T & ~ground.walkable).sum() <= 40  # under rocks and the like that stand off building ground
@@ -47,12 +47,12 @@ def test_the_ground_is_that_of_the_map(make_game: Callable[..., Game], name: str
 
 
 def test_the_ground_of_a_map_is_one_object(make_game: Callable[..., Game]) -> None:
-    assert Ground.of(make_game(seed=1).info) is not Ground.of(make_game("Flat64").info)
-    assert Ground.of(make_game(seed=1).info) is Ground.of(make_game(seed=1).info)
+    assert MapGround.of(make_game(seed=1).info) is not MapGround.of(make_game("Flat64").info)
+    assert MapGround.of(make_game(seed=1).info) is MapGround.of(make_game(seed=1).info)
 
 
 def test_on_level_ground_a_way_is_a_ninth_shorter_than_the_line_at_most(make_game: Callable[..., Game]) -> None:
-    ground = Ground.of(make_game("Flat64").info)
+    ground = MapGround.of(make_game("Flat64").info)
     far = ground.ways_from(WorldPoint(12.5, 12.5))
     x, y = np.nonzero(np.isfinite(far) & (far > 0))
     line = np.hypot(x - 12, y - 12)

@@ -8,7 +8,7 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.auto.workers import automatic
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import WorldPoint
@@ -55,8 +55,8 @@ def test_no_rule_fails(name: str) -> None:
             if rich:
                 ledger.minerals = ledger.vespene = ledger.supply = 9999.0
             try:
-                orders = rule(Ask(action, snapshot, ledger, units, chance.choice(everybody), point))
-            except Impossible as impossible:
+                orders = rule(RuleRequest(action, snapshot, ledger, units, chance.choice(everybody), point))
+            except NotAvailable as impossible:
                 said.add(impossible.message)
                 continue
             answered += 1

@@ -10,7 +10,7 @@ import pytest
 from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.auto import RULES, Ask, Impossible
+from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.state import Snapshot, read_snapshot
 from khala_bridge.state.means import ledger_of
@@ -58,8 +58,8 @@ def answers(snapshot: Snapshot, race: str) -> list[str]:
     for action in SIDES[race]:
         assert action.rule is not None
         try:
-            said.append(repr(RULES[action.rule](Ask(action, snapshot, ledger_of(snapshot)))))
-        except Impossible as impossible:
+            said.append(repr(RULES[action.rule](RuleRequest(action, snapshot, ledger_of(snapshot)))))
+        except NotAvailable as impossible:
             said.append(impossible.message)
     return said
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import debug_pb2
 
-from khala_bridge.auto import Impossible
+from khala_bridge.auto import NotAvailable
 from khala_bridge.frames import WorldPoint
 
 if TYPE_CHECKING:
@@ -249,7 +249,7 @@ def test_a_refused_call_takes_nothing_from_the_turn(make_game: Callable[..., Gam
         ("Warp_Zealot", {}),
     ]
     for action, given in tries:
-        assert isinstance(game.refusal(action, **given), Impossible)
+        assert isinstance(game.refusal(action, **given), NotAvailable)
     assert repr(game.ledger) == before
 
 

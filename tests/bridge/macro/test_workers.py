@@ -19,13 +19,13 @@ from khala_simulator.process.client import command
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_bridge.auto import Order
+    from khala_bridge.auto import RuleOrder
     from tests.bridge.macro.conftest import Game
 
 RICH = (debug_pb2.all_resources, debug_pb2.food)
 
 
-def auto(game: Game, *ordered: int, **on: bool) -> list[Order]:
+def auto(game: Game, *ordered: int, **on: bool) -> list[RuleOrder]:
     return automatic(AutoConfig(**on), game.snapshot, game.ledger, frozenset(ordered))
 
 
@@ -37,7 +37,7 @@ def idle(game: Game) -> list[int]:
     return tags
 
 
-def target(game: Game, order: Order) -> str:
+def target(game: Game, order: RuleOrder) -> str:
     assert isinstance(order.target, int)
     return unit_name(game.snapshot.units[order.target].unit_type)
 

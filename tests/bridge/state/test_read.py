@@ -16,9 +16,9 @@ from khala_bridge.state import (
     EpisodeInfo,
     Order,
     PictureSizes,
-    Player,
+    PlayerScore,
+    PlayerState,
     PowerSource,
-    Score,
     Unit,
     read_info,
     read_snapshot,
@@ -155,13 +155,13 @@ def test_what_is_remembered_is_known_and_not_in_sight() -> None:
 
 
 def test_a_snapshot_has_the_account_of_the_player() -> None:
-    names = Player._fields
+    names = PlayerState._fields
     response = sc_pb.ResponseObservation()
     for number, name in enumerate(names, 1):
         setattr(response.observation.player_common, name, number)
     response.observation.game_loop = 224
     seen = read_snapshot(response, EpisodeInfo())
-    assert seen.player == Player(*range(1, len(names) + 1))
+    assert seen.player == PlayerState(*range(1, len(names) + 1))
     assert seen.game_loop == 224
 
 
@@ -192,7 +192,7 @@ def test_the_score_counts_minerals_and_vespene_of_every_kind() -> None:
         setattr(score.score_details.killed_minerals, kind, 10**number)
         setattr(score.score_details.killed_vespene, kind, 2 * 10**number)
         setattr(score.score_details.lost_minerals, kind, 4 * 10**number)
-    assert read_snapshot(response, EpisodeInfo()).score == Score(total=1234, killed=33333, lost=44444)
+    assert read_snapshot(response, EpisodeInfo()).score == PlayerScore(total=1234, killed=33333, lost=44444)
 
 
 def test_who_died_and_what_was_refused_adds_up_until_an_agent_is_asked() -> None:

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_bridge.knowledge import Weapon, knowledge
+from khala_bridge.knowledge import WeaponFacts, knowledge
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_bridge.knowledge import UnitType
+    from khala_bridge.knowledge import UnitFacts
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType as Row
     from khala_simulator.tables.records import Weapon as WeaponRow
@@ -133,7 +133,7 @@ def test_units_that_are_trained_built_or_warped_in_have_a_producer(
     assert {names[product] for product in products if not knowledge(version)[names[product]].producers} == set()
 
 
-def _told(weapon: Weapon) -> tuple[Any, ...]:
+def _told(weapon: WeaponFacts) -> tuple[Any, ...]:
     return (weapon.targets, weapon.range, weapon.min_range, weapon.damage, weapon.attacks, weapon.bonus)
 
 
@@ -168,7 +168,7 @@ def test_weapons_that_the_api_hides_are_told_as_they_work(name: str, weapons: li
     assert [_told(weapon) for weapon in knowledge()[name].weapons] == weapons
 
 
-def _value(kind: UnitType) -> float:
+def _value(kind: UnitFacts) -> float:
     return kind.minerals + kind.vespene
 
 

@@ -13,9 +13,9 @@ import pytest
 from khala_protocol.bus import Liveness
 from khala_protocol.bus.audience import Audience
 from khala_protocol.bus.config import BATCH_BYTES
+from khala_protocol.bus.inbox import Inbox
 from khala_protocol.bus.keyexpr import matches
-from khala_protocol.bus.lane import WINDOW_BYTES, Lane, Shut, Stopwatch, Window
-from khala_protocol.bus.mailbox import Mailbox
+from khala_protocol.bus.lane import WINDOW_BYTES, DropGate, Lane, Shut, Window
 from khala_protocol.bus.sightings import Sightings
 from khala_protocol.bus.testing import take
 from khala_protocol.bus.threads import run_detached
@@ -49,7 +49,7 @@ def test_a_key_expression_matches_parts(key_expr: str, key: str, *, expected: bo
 
 
 async def test_nothing_is_lost_between_threads_and_the_loop() -> None:
-    mailbox: Mailbox[tuple[int, int]] = Mailbox(100_000)
+    mailbox: Inbox[tuple[int, int]] = Inbox(100_000)
 
     def offer(thread: int) -> None:
         for number in range(2_000):
@@ -66,7 +66,7 @@ async def test_nothing_is_lost_between_threads_and_the_loop() -> None:
 
 
 async def test_a_mailbox_that_nobody_empties_keeps_no_more_than_its_depth() -> None:
-    mailbox: Mailbox[int] = Mailbox(3)
+    mailbox: Inbox[int] = Inbox(3)
     for number in range(10):
         mailbox.offer_from_thread(number)
     await mailbox.close()
@@ -75,7 +75,7 @@ async def test_a_mailbox_that_nobody_empties_keeps_no_more_than_its_depth() -> N
 
 
 async def test_two_who_wait_on_a_mailbox_get_one_item_each() -> None:
-    mailbox: Mailbox[int] = Mailbox(10)
+    mailbox: Inbox[int] = Inbox(10)
     waiting = [asyncio.ensure_future(anext(mailbox)) for _ in range(2)]
     await asyncio.wait(waiting, timeout=0)
     mailbox.offer(1)
@@ -85,7 +85,7 @@ async def test_two_who_wait_on_a_mailbox_get_one_item_each() -> None:
 
 async def test_a_closed_mailbox_takes_nothing() -> None:
     closed: list[bool] = []
-    mailbox: Mailbox[int] = Mailbox(10, on_close=lambda: closed.append(True))
+    mailbox: Inbox[int] = Inbox(10, on_close=lambda: closed.append(True))
     await mailbox.close()
     await mailbox.close()
     mailbox.offer(1)
@@ -95,8 +95,8 @@ async def test_a_closed_mailbox_takes_nothing() -> None:
 
 
 def test_a_mailbox_outlives_its_loop() -> None:
-    async def make() -> Mailbox[int]:
-        return Mailbox(10)
+    async def make() -> Inbox[int]:
+        return Inbox(10)
 
     asyncio.run(make()).offer_from_thread(1)  # as a callback of Zenoh would, after the end
 
@@ -162,13 +162,13 @@ async def test_what_is_larger_than_the_window_never_runs_on_the_loop() -> None:
     peer, thread = Peer(), Inline()
     await Lane(thread, Window(peer.questions.append)).put(peer.put, bytes(WINDOW_BYTES))
     await Lane(thread, Shut()).put(peer.put, b"")
-    await Lane(thread, Stopwatch()).put(peer.put, bytes(BATCH_BYTES))
+    await Lane(thread, DropGate()).put(peer.put, bytes(BATCH_BYTES))
     assert thread.given == 3
 
 
 async def test_a_put_that_was_slow_sends_the_next_to_the_thread_until_one_is_quick() -> None:
     peer, thread = Peer(), Inline()
-    gate = Stopwatch()
+    gate = DropGate()
     lane = Lane(thread, gate)
     await lane.put(peer.put, b"1")
     assert thread.given == 0
@@ -189,7 +189,7 @@ async def test_a_put_on_the_loop_does_not_overtake_one_that_waits_on_the_thread(
         taken.append(payload[:1])
 
     with ThreadPoolExecutor(1) as thread:
-        lane = Lane(thread, Stopwatch())
+        lane = Lane(thread, DropGate())
         first = asyncio.ensure_future(lane.put(put, b"1" * BATCH_BYTES))
         await asyncio.wait([first], timeout=0)
         second = asyncio.ensure_future(lane.put(put, b"2"))
@@ -204,7 +204,7 @@ async def test_an_error_of_a_put_is_raised_where_it_was_given() -> None:
         raise OSError("no")
 
     with ThreadPoolExecutor(1) as thread:
-        for gate in (Stopwatch(), Shut()):
+        for gate in (DropGate(), Shut()):
             with pytest.raises(OSError, match="no"):
                 await Lane(thread, gate).put(fail, b"")
 
@@ -240,7 +240,7 @@ async def test_if_nobody_comes_the_wait_is_short_and_not_repeated() -> None:
 
 
 async def test_a_token_that_ends_with_our_link_blames_the_link() -> None:
-    mailbox: Mailbox[Liveness] = Mailbox(10)
+    mailbox: Inbox[Liveness] = Inbox(10)
     sightings = Sightings(mailbox)
     sightings.token("a", alive=True)
     sightings.token("b", alive=True)
@@ -260,7 +260,7 @@ async def test_a_token_that_ends_with_our_link_blames_the_link() -> None:
 
 
 async def test_a_token_that_ends_alone_is_reported_after_a_moment_and_in_order() -> None:
-    mailbox: Mailbox[Liveness] = Mailbox(10)
+    mailbox: Inbox[Liveness] = Inbox(10)
     sightings = Sightings(mailbox)
     sightings.token("a", alive=True)
     sightings.token("a", alive=False)
@@ -275,7 +275,7 @@ async def test_a_token_that_ends_alone_is_reported_after_a_moment_and_in_order()
 
 
 async def test_what_is_known_is_not_reported_again() -> None:
-    mailbox: Mailbox[Liveness] = Mailbox(10)
+    mailbox: Inbox[Liveness] = Inbox(10)
     sightings = Sightings(mailbox, patience_s=0)
     for alive in (False, True, True, False, False):
         sightings.token("a", alive=alive)

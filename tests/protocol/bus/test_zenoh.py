@@ -16,7 +16,7 @@ import pytest
 
 from khala_protocol.bus import Delivery, Liveness, Sample
 from khala_protocol.bus.config import BusConfig
-from khala_protocol.bus.mailbox import Mailbox
+from khala_protocol.bus.inbox import Inbox
 from khala_protocol.bus.testing import take
 from khala_protocol.bus.zenoh import probe
 
@@ -209,7 +209,7 @@ async def test_cancelling_an_open_leaves_nothing_behind(socket: str, opened: Ope
 async def test_cancelling_a_subscribe_leaves_nothing_behind(opened: OpenBus) -> None:
     def mailboxes() -> int:
         gc.collect()
-        return sum(isinstance(thing, Mailbox) for thing in gc.get_objects())
+        return sum(isinstance(thing, Inbox) for thing in gc.get_objects())
 
     bus, before = await opened(LOCAL), mailboxes()
     with contextlib.suppress(TimeoutError):
@@ -237,7 +237,7 @@ async def test_an_error_in_a_callback_is_logged_and_the_subscription_lives_on(
     subscription = await bus.subscribe("a/b", Delivery.SPEECH)
     publisher = await bus.publisher("a/b", Delivery.SPEECH)
     with monkeypatch.context() as broken, caplog.at_level(logging.ERROR, "zenoh.handlers"):
-        broken.setattr(Mailbox, "offer_from_thread", lambda *_: 1 / 0)
+        broken.setattr(Inbox, "offer_from_thread", lambda *_: 1 / 0)
         await publisher.put(b"lost")
     await publisher.put(b"kept")
     assert await take(subscription, 1) == [Sample("a/b", b"kept")]

@@ -9,7 +9,7 @@ import pytest
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.api.game import Game, Setup
+from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.observation import observe
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.map_file import read_map
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from khala_simulator.api.seat import Seat
+    from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.world.world import World
 
 BARE = """# A map of Khala's simulator
@@ -55,8 +55,8 @@ class Table:
             sc.PlayerSetup(type=sc.Computer, race=common_pb2.Zerg),
         )
         game_map = read_map(text.encode(), "bare.SC2Map")
-        self.game = Game(Setup(game_map, b"", "bare", players, 1, disable_fog=False, realtime=False), "4.10")
-        self.seat: Seat = self.game.sit(1, options)
+        self.game = HostedGame(Setup(game_map, b"", "bare", players, 1, disable_fog=False, realtime=False), "4.10")
+        self.seat: PlayerSeat = self.game.sit(1, options)
 
     @property
     def world(self) -> World:

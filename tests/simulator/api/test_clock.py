@@ -24,8 +24,8 @@ class Wall:
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     wall = Wall()
-    real = clocks.Clock
-    monkeypatch.setattr("khala_simulator.process.joining.Clock", lambda game: real(game, wall.now, wall.sleep))
+    real = clocks.RealtimeClock
+    monkeypatch.setattr("khala_simulator.process.joining.RealtimeClock", lambda game: real(game, wall.now, wall.sleep))
     return wall
 
 

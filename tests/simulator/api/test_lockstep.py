@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.api.game import Entry, Game, Setup
+from khala_simulator.api.game import HostedGame, LogEntry, Setup
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.process.client import command, interface
 from khala_simulator.process.lockstep import Commit, Leave, Lockstep, LockstepError, decode
@@ -16,7 +16,7 @@ from khala_simulator.process.lockstep import Commit, Leave, Lockstep, LockstepEr
 MEMBERS = frozenset({1, 2, 3})
 
 
-def game(players: int = 2) -> Game:
+def game(players: int = 2) -> HostedGame:
     """A battle of two, with a third one who has nothing if there are to be three."""
     setup = Setup(
         game_map=load_map("llm_smac/2s3z"),
@@ -27,7 +27,7 @@ def game(players: int = 2) -> Game:
         disable_fog=False,
         realtime=False,
     )
-    made = Game(setup, "4.10")
+    made = HostedGame(setup, "4.10")
     for number in range(1, players + 1):
         made.sit(number, interface(screen=0))
     return made
@@ -46,7 +46,7 @@ def attack(lockstep: Lockstep, x: float) -> None:
     "message",
     [
         Commit(1, 8),
-        Commit(2, 448, (Entry(7, 2, sc.Action()), Entry(8, 2, command(23, [1, 2], point=(3, 4)))), {448: "abc"}),
+        Commit(2, 448, (LogEntry(7, 2, sc.Action()), LogEntry(8, 2, command(23, [1, 2], point=(3, 4)))), {448: "abc"}),
         Leave(3, 16),
     ],
 )
@@ -81,8 +81,8 @@ def test_no_bytes_break_the_reader(data: bytes) -> None:
     "message",
     [
         Commit(2, 4),
-        Commit(2, 20, (Entry(5, 2, sc.Action()),)),
-        Commit(2, 20, (Entry(12, 1, sc.Action()),)),
+        Commit(2, 20, (LogEntry(5, 2, sc.Action()),)),
+        Commit(2, 20, (LogEntry(12, 1, sc.Action()),)),
     ],
     ids=["back in time", "into the past", "for another player"],
 )

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, spatial_pb2
 
-from khala_simulator.api.raster import Discs, Layer, draw_discs, sample
+from khala_simulator.api.raster import Discs, RasterLayer, draw_discs, sample
 
 
 def discs(*circles: tuple[float, float, float], size: int = 8) -> Discs:
@@ -101,7 +101,7 @@ def decode(parts: list[bytes | memoryview], name: str) -> common_pb2.ImageData:
     ],
 )
 def test_layers_are_rows_from_the_top_most_significant_bit_first(bits: int, image: list[Any], data: bytes) -> None:
-    layer = Layer(1, bits, 3, 3)
+    layer = RasterLayer(1, bits, 3, 3)
     message = decode(layer.encode(np.array(image)), "height_map")
     assert (message.bits_per_pixel, message.size.x, message.size.y) == (bits, 3, 3)
     assert message.data == data
@@ -109,7 +109,7 @@ def test_layers_are_rows_from_the_top_most_significant_bit_first(bits: int, imag
 
 
 def test_pixels_have_their_values_and_the_later_one_counts() -> None:
-    layer = Layer(6, 32, 8, 8)
+    layer = RasterLayer(6, 32, 8, 8)
     data = decode(layer.encode_pixels(np.array([9, 14, 9]), np.array([74, 73, 105], np.int32)), "unit_type").data
     image = np.frombuffer(data, np.int32).reshape(8, 8)
     assert image[1, 1] == 105

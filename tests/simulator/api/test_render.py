@@ -312,7 +312,7 @@ def test_every_type_can_be_painted(version: str, pixels_per_cell: float) -> None
     wardrobe = sprites.Wardrobe(units, pixels_per_cell)
     for unit in units:
         for unfinished in (False, unit.structure):
-            look = sprites.Look(unit.row, Alliance.ENEMY, 5, veiled=False, unfinished=unfinished)
+            look = sprites.SpriteLook(unit.row, Alliance.ENEMY, 5, veiled=False, unfinished=unfinished)
             sprite = wardrobe.sprite(look)
             assert sprite.paint.any(), unit.name
             assert (sprite.paint.astype(int) + sprite.keep <= 255).all(), unit.name
@@ -321,7 +321,7 @@ def test_every_type_can_be_painted(version: str, pixels_per_cell: float) -> None
 def test_sprites_are_kept_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     units = load_catalog().units
     wardrobe = sprites.Wardrobe(units, 10.0)
-    look = sprites.Look(load_catalog().unit("Zealot").row, Alliance.SELF, 3, veiled=False, unfinished=False)
+    look = sprites.SpriteLook(load_catalog().unit("Zealot").row, Alliance.SELF, 3, veiled=False, unfinished=False)
     first = wardrobe.sprite(look)
     assert wardrobe.sprite(look) is first
     monkeypatch.setattr(sprites, "MAX_BYTES", 1)

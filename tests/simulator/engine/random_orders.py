@@ -47,7 +47,7 @@ def _give(world: World, player: int, slot: int, ability: int, chance: random.Ran
         x, y = world.pos[slot].tolist()
         point = (x + chance.uniform(-9, 9), y + chance.uniform(-9, 9))
     queue = chance.random() < 0.2
-    command = abilities.Command(ability, (world.tag_of(slot),), target, point, queue)
+    command = abilities.UnitCommand(ability, (world.tag_of(slot),), target, point, queue)
     abilities.carry_out(world, abilities.judge(world, player, command))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import MapError, map_from
-from khala_simulator.maps.places import Grid, Region, Span
+from khala_simulator.maps.places import PlaceGrid, Region, Span
 from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario, sheets
 from khala_simulator.maps.script import Comparison
 from khala_simulator.tick import advance, new_game
@@ -112,7 +112,7 @@ def test_a_region_is_what_its_shapes_cover_and_none_takes_out() -> None:
 
 def test_a_span_has_both_its_ends() -> None:
     assert Span.model_validate({"from": 40.5, "to": 55.5}).values()[::15] == (40.5, 55.5)
-    assert Grid.model_validate({"x": 3, "y": [1, 2]}).x == (3,)
+    assert PlaceGrid.model_validate({"x": 3, "y": [1, 2]}).x == (3,)
 
 
 # conditions -----------------------------------------------------------------------------------------------------------

@@ -19,8 +19,8 @@ from khala_agents.scripted.skilled.space import distance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from khala_agents.scripted.reading import Point, Team, Unit
-    from khala_agents.scripted.skilled.plan import Plan
+    from khala_agents.scripted.reading import Point, TextTeam, TextUnit
+    from khala_agents.scripted.skilled.plan import ReplyPlan
 
 UNPOWERED = frozenset({"Pylon", "Nexus", "Assimilator"})
 FIELD = 5.5
@@ -32,14 +32,14 @@ FROM_MINERALS = 3.5
 _HINT = re.compile(r"free place is (\[[^\]]*\])")
 
 
-def leads(plan: Plan) -> bool:
+def leads(plan: ReplyPlan) -> bool:
     """Whether a team is a builder: workers that may build, now or later."""
     names = {action.name for action in plan.team.actions} | plan.situation.impossible
     workers = all(kind_of(unit).role == "worker" for unit in plan.team.own)
     return workers and any(name.startswith("Build_") for name in names)
 
 
-def build(plan: Plan) -> None:
+def build(plan: ReplyPlan) -> None:
     """Begins the first structure that is wanted and can be paid, if the worker is free."""
     team, situation = plan.team, plan.situation
     if any(unit.order.startswith("Build") for unit in team.own):
@@ -57,7 +57,7 @@ def build(plan: Plan) -> None:
             return
 
 
-def _begin(plan: Plan, what: str) -> bool:
+def _begin(plan: ReplyPlan, what: str) -> bool:
     """Orders a structure; says whether it could be."""
     team, situation = plan.team, plan.situation
     if what in {"Nexus", "Assimilator"}:
@@ -70,7 +70,7 @@ def _begin(plan: Plan, what: str) -> bool:
     return place is not None and plan.give(f"Build_{what}_Screen", place)
 
 
-def _hint(plan: Plan, what: str) -> Point | None:
+def _hint(plan: ReplyPlan, what: str) -> Point | None:
     """The place that the host named when it refused the last one."""
     for text in plan.situation.rejected:
         if f"Build_{what}_Screen" in text and (found := _HINT.search(text)):
@@ -78,7 +78,7 @@ def _hint(plan: Plan, what: str) -> Point | None:
     return None
 
 
-def _place(team: Team, what: str, fields: Sequence[Point]) -> Point | None:
+def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
     """A free place: by a Pylon for what needs power, near the base for Pylons; whole cells for odd sizes in halves."""
     half = 0.0 if what == "Pylon" else 0.5
     halls = [unit for unit in team.allies if unit.type in TOWN_HALLS]
@@ -104,7 +104,7 @@ def _place(team: Team, what: str, fields: Sequence[Point]) -> Point | None:
     return min((cell for cell in apart if fits(cell)), key=lambda cell: (_nearest(cell, halls), cell), default=None)
 
 
-def _between(at: Point, halls: Sequence[Unit], resources: Sequence[Point]) -> bool:
+def _between(at: Point, halls: Sequence[TextUnit], resources: Sequence[Point]) -> bool:
     """Whether workers pass there on their way between minerals and base."""
     return any(
         distance(at, hall) + distance(at, resource) < distance(resource, hall) + 2.0
@@ -113,5 +113,5 @@ def _between(at: Point, halls: Sequence[Unit], resources: Sequence[Point]) -> bo
     )
 
 
-def _nearest(at: Point, others: Sequence[Unit] | Sequence[Point]) -> tuple[float, Point]:
+def _nearest(at: Point, others: Sequence[TextUnit] | Sequence[Point]) -> tuple[float, Point]:
     return min((distance(at, other) for other in others), default=0.0), at

@@ -14,8 +14,8 @@ from khala_agents.scripted.skilled.space import away, distance, middle, nearest
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from khala_agents.scripted.reading import Team, Unit
-    from khala_agents.scripted.skilled.plan import Plan
+    from khala_agents.scripted.reading import TextTeam, TextUnit
+    from khala_agents.scripted.skilled.plan import ReplyPlan
 
 HURT = 0.5
 """Share of hit points below which a unit is pulled back."""
@@ -31,7 +31,7 @@ CLINGING = 230.0
 """Worth of a runner at one's heels during a raid; a worker is worth 200."""
 
 
-def targets(team: Team) -> list[Unit]:
+def targets(team: TextTeam) -> list[TextUnit]:
     """The enemies that some unit of the team has a weapon against."""
     mine = [kind_of(unit) for unit in team.own]
     return [
@@ -39,7 +39,7 @@ def targets(team: Team) -> list[Unit]:
     ]
 
 
-def threats(team: Team) -> list[Unit]:
+def threats(team: TextTeam) -> list[TextUnit]:
     """The enemies that have a weapon against some unit of the team."""
     mine = [kind_of(unit) for unit in team.own]
     return [
@@ -49,7 +49,7 @@ def threats(team: Team) -> list[Unit]:
     ]
 
 
-def worth(enemy: Unit, prey: str) -> float:
+def worth(enemy: TextUnit, prey: str) -> float:
     """What it is worth to be rid of an enemy.
 
     Args:
@@ -67,7 +67,7 @@ def worth(enemy: Unit, prey: str) -> float:
     return value
 
 
-def support(teams: Iterable[Team]) -> dict[str, float]:
+def support(teams: Iterable[TextTeam]) -> dict[str, float]:
     """By the tag of an enemy: how many units of all teams have it in reach, or nearly."""
     count: dict[str, float] = {}
     for team in teams:
@@ -77,7 +77,7 @@ def support(teams: Iterable[Team]) -> dict[str, float]:
     return count
 
 
-def best_target(plan: Plan, prey: str = "") -> Unit | None:
+def best_target(plan: ReplyPlan, prey: str = "") -> TextUnit | None:
     """The enemy whose loss helps most for the time and the way that it takes; None without targets.
 
     What others have in reach, too, is the better target.
@@ -88,7 +88,7 @@ def best_target(plan: Plan, prey: str = "") -> Unit | None:
         return None
     patience = MELEE_WALK_COST if all(kind_of(unit).melee for unit in shooters) else WALK_COST
 
-    def value(enemy: Unit) -> tuple[float, str]:
+    def value(enemy: TextUnit) -> tuple[float, str]:
         able = [unit for unit in shooters if kind_of(unit).hits(kind_of(enemy))]
         ways = sorted(max(0.0, distance(unit, enemy) - _range(unit, enemy) - 1.0) for unit in able)
         way = ways[len(ways) // 2]
@@ -101,7 +101,7 @@ def best_target(plan: Plan, prey: str = "") -> Unit | None:
     return min(targets(team), key=value, default=None)
 
 
-def fight(plan: Plan, prey: str = "") -> bool:
+def fight(plan: ReplyPlan, prey: str = "") -> bool:
     """Plans a fight of one team against what it sees; says whether there is one."""
     team = plan.team
     target = best_target(plan, prey)
@@ -115,7 +115,7 @@ def fight(plan: Plan, prey: str = "") -> bool:
     return (not prey and step_back(plan, foes)) or shoot(plan, target)
 
 
-def shoot(plan: Plan, target: Unit) -> bool:
+def shoot(plan: ReplyPlan, target: TextUnit) -> bool:
     """Orders the team to attack one enemy; units that have no weapon against it take the next best one."""
     team = plan.team
     able = [unit for unit in team.own if kind_of(unit).hits(kind_of(target))]
@@ -125,7 +125,7 @@ def shoot(plan: Plan, target: Unit) -> bool:
     return any(given)
 
 
-def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
+def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> None:
     """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
     hit = plan.team.hit
     hurt = [
@@ -145,7 +145,7 @@ def save_the_hurt(plan: Plan, foes: Sequence[Unit], keep: int = 1) -> None:
             plan.cast("Move_Screen", unit, refuge)
 
 
-def step_back(plan: Plan, foes: Sequence[Unit]) -> bool:
+def step_back(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
     """While weapons cool down: out of the reach of enemies who would have to follow; says whether it is worth it."""
     team = plan.team
     kinds = [kind_of(unit) for unit in team.own]
@@ -163,7 +163,7 @@ def step_back(plan: Plan, foes: Sequence[Unit]) -> bool:
     return plan.give("Move_Screen", away(team, centre, foes, STEP_BACK))
 
 
-def _keep_off(plan: Plan, foes: Sequence[Unit]) -> bool:
+def _keep_off(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
     """Keeps a team that cannot fight out of reach."""
     near = [foe for foe in foes if any(_gap(foe, unit) < 2.0 for unit in plan.team.own)]
     if near:
@@ -171,21 +171,21 @@ def _keep_off(plan: Plan, foes: Sequence[Unit]) -> bool:
     return True
 
 
-def _caught(unit: Unit, foes: Sequence[Unit]) -> bool:
+def _caught(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
     """Whether somebody who fights by hand stands at a unit."""
     return any(kind_of(foe).melee and _gap(foe, unit) < 1.0 for foe in foes)
 
 
-def _pressed(unit: Unit, foes: Sequence[Unit]) -> bool:
+def _pressed(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
     foe = nearest(unit, foes)
     return foe is not None and distance(unit, foe) < max(IN_DANGER, kind_of(foe).reach + 1.5)
 
 
-def _gap(foe: Unit, unit: Unit) -> float:
+def _gap(foe: TextUnit, unit: TextUnit) -> float:
     """How far a foe has to come until it reaches a unit."""
     return distance(foe, unit) - _range(foe, unit) - 1.0
 
 
-def _range(unit: Unit, other: Unit) -> float:
+def _range(unit: TextUnit, other: TextUnit) -> float:
     kind = kind_of(unit)
     return kind.air if kind_of(other).flying else kind.ground

@@ -18,7 +18,7 @@ from khala_agents.scripted.writing import point
 
 if TYPE_CHECKING:
     from khala_agents.scripted.reading import Situation
-    from khala_agents.scripted.skilled.plan import Plan
+    from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 16
 """Army units with which the army sets out."""
@@ -30,7 +30,7 @@ NO_ARMY = frozenset({"Probe", "SCV", "MULE", "Drone", "Overlord", "Overseer", "L
 HALLS = ("Nexus", "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "Hatchery", "Lair", "Hive")
 
 
-def lead(plan: Plan) -> None:
+def lead(plan: ReplyPlan) -> None:
     """Plans what is built, trained, researched and commanded for the whole side."""
     command(plan)
     warp_to_the_front(plan)
@@ -40,7 +40,7 @@ def lead(plan: Plan) -> None:
             return
 
 
-def command(plan: Plan) -> None:
+def command(plan: ReplyPlan) -> None:
     """Sends the army out when it is strong, and home when it is not and something is attacked."""
     situation, size = plan.situation, army(plan.situation)
     out = any(name == "All_Units_Attack" for _, name, _ in situation.accepted)
@@ -67,7 +67,7 @@ def army(situation: Situation) -> int:
     return sum(situation.counts.values()) - structures - civil
 
 
-def warp_to_the_front(plan: Plan) -> None:
+def warp_to_the_front(plan: ReplyPlan) -> None:
     """Warps in at a phasing Warp Prism, if there is one: it went there for that."""
     full = " ".join(plan.situation.rejected)
     fields = [tag for kind, tag, _ in plan.situation.power if kind == "WarpPrismPhasing" and tag not in full]
@@ -80,10 +80,10 @@ def warp_to_the_front(plan: Plan) -> None:
 
 
 @dataclass(slots=True)
-class Purse:
+class Budget:
     """What may still be spent in this reply."""
 
-    plan: Plan
+    plan: ReplyPlan
     minerals: int
     vespene: int
     supply: float
@@ -105,11 +105,11 @@ class Purse:
         return True
 
 
-def produce(plan: Plan, build: Build) -> None:
+def produce(plan: ReplyPlan, build: Build) -> None:
     """Goes through a build order; a want that cannot be paid yet may keep others from being paid first."""
     situation = plan.situation
     room = max(0.0, situation.supply_cap - situation.supply_used)
-    purse = Purse(plan, situation.minerals, situation.vespene, room)
+    purse = Budget(plan, situation.minerals, situation.vespene, room)
     if needs_supply(situation, build) and not _pending(situation, build.supply):
         given = purse.buy(build.supply.action)
         mine = build.supply.action in situation.impossible

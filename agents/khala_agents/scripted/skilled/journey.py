@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from khala_agents.scripted.reading import points
 
 if TYPE_CHECKING:
-    from khala_agents.scripted.reading import Point, Situation, Team
-    from khala_agents.scripted.skilled.plan import Plan
+    from khala_agents.scripted.reading import Point, Situation, TextTeam
+    from khala_agents.scripted.skilled.plan import ReplyPlan
 
 MAP_CENTRE = (32.0, 32.0)
 _PASSING = re.compile(r"\b(do not stop|around|along|out of sight|unseen)\b", re.IGNORECASE)
@@ -19,7 +19,7 @@ ARRIVED = 2.0
 FAR = 6.0
 
 
-def passing(plan: Plan) -> bool:
+def passing(plan: ReplyPlan) -> bool:
     """Whether the team is on a way on which it shall not fight."""
     team, named = plan.team, points(plan.team.task)
     if not named or team.minimap is None or not _PASSING.search(team.task):
@@ -27,7 +27,7 @@ def passing(plan: Plan) -> bool:
     return math.dist(named[-1], team.minimap) > ARRIVED
 
 
-def travel(plan: Plan) -> bool:
+def travel(plan: ReplyPlan) -> bool:
     """Plans the way of a team; says whether it has one to go."""
     team, told = plan.team, None if plan.prey else told_goal(plan.situation)
     goal = told or task_goal(team, plan.situation)
@@ -49,7 +49,7 @@ def told_goal(situation: Situation) -> Point | None:
     return named[-1] if named else None
 
 
-def task_goal(team: Team, situation: Situation) -> Point | None:
+def task_goal(team: TextTeam, situation: Situation) -> Point | None:
     """The last place that the team's task names, or that of all; the middle of the map if there is no word of any."""
     for text in (team.task, situation.task):
         if named := points(text):

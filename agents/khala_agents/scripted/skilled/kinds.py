@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 if TYPE_CHECKING:
-    from khala_agents.scripted.reading import Unit
+    from khala_agents.scripted.reading import TextUnit
 
 Role = Literal["army", "worker", "structure", "support"]
 NONE = -1.0
@@ -148,7 +148,7 @@ KINDS: dict[str, Kind] = {
 UNKNOWN = Kind()
 
 
-def kind_of(unit: Unit) -> Kind:
+def kind_of(unit: TextUnit) -> Kind:
     """What is known of a unit's type; what the graviton beam holds flies."""
     kind = KINDS.get(unit.type, UNKNOWN)
     return kind._replace(flying=True) if "GravitonBeam" in unit.effects else kind

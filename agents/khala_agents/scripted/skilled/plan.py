@@ -10,14 +10,14 @@ from khala_agents.scripted.writing import call, inside
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_agents.scripted.reading import Point, Situation, Team, Unit
+    from khala_agents.scripted.reading import Point, Situation, TextTeam, TextUnit
 
 
 @dataclass(slots=True)
-class Plan:
+class ReplyPlan:
     """Calls for one team in one reply; skills first, the order for all of it last."""
 
-    team: Team
+    team: TextTeam
     situation: Situation
     calls: list[str] = field(default_factory=list)
     support: Mapping[str, float] = field(default_factory=dict)
@@ -44,7 +44,7 @@ class Plan:
         self.calls.append(call(name, *fitted))
         return True
 
-    def cast(self, skill: str, caster: Unit, *values: str | Point) -> bool:
+    def cast(self, skill: str, caster: TextUnit, *values: str | Point) -> bool:
         """Gives one unit's skill by its own action, or by the team's if the unit is all of the team."""
         tag = caster.tag
         if tag in self.busy or any(name in skill for name in caster.not_ready):

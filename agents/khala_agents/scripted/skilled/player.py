@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from khala_agents.scripted.reading import points, read
 from khala_agents.scripted.skilled import builder, combat, economy, journey, skills
 from khala_agents.scripted.skilled.kinds import kind_of
-from khala_agents.scripted.skilled.plan import Plan
+from khala_agents.scripted.skilled.plan import ReplyPlan
 from khala_agents.scripted.skilled.space import middle
 from khala_agents.scripted.writing import point, reply
 
 if TYPE_CHECKING:
     import random
 
-    from khala_agents.scripted.reading import Situation, Team
+    from khala_agents.scripted.reading import Situation, TextTeam
 
 MESSAGE_SHARE = 0.2
 """Part of the replies in which something is said to others."""
@@ -33,14 +33,14 @@ def skilled(observation: str, rng: random.Random) -> str:
     support = combat.support(situation.teams.values())
     orders: dict[str, list[str]] = {}
     for team in situation.teams.values():
-        plan = Plan(team, situation, support=support)
+        plan = ReplyPlan(team, situation, support=support)
         _lead(plan)
         if plan.calls:
             orders[team.name] = plan.calls
     return reply(_analysis(situation), orders, _said(situation, rng))
 
 
-def _lead(plan: Plan) -> None:
+def _lead(plan: ReplyPlan) -> None:
     team = plan.team
     if not team.own:
         economy.lead(plan)
@@ -62,7 +62,7 @@ def _lead(plan: Plan) -> None:
         journey.travel(plan)
 
 
-def prey(plan: Plan) -> str:
+def prey(plan: ReplyPlan) -> str:
     """What a team is after by its task: "worker", "hall", or "" for the enemy's army."""
     text = plan.team.task or plan.situation.task
     if not _ATTACK.search(text):
@@ -70,7 +70,7 @@ def prey(plan: Plan) -> str:
     return "hall" if _HALL.search(text) else "worker" if _RAID.search(text) else ""
 
 
-def shade(plan: Plan) -> None:
+def shade(plan: ReplyPlan) -> None:
     """To where the Adepts shall appear: among workers, if it sees any."""
     workers = [unit for unit in plan.team.enemies if kind_of(unit).role == "worker"]
     if workers:
@@ -79,7 +79,7 @@ def shade(plan: Plan) -> None:
         journey.travel(plan)
 
 
-def prism(plan: Plan) -> None:
+def prism(plan: ReplyPlan) -> None:
     """To where its task wants it, and open a field of power there; away when it is shot at."""
     team, plan.prey = plan.team, "place"
     foes = [foe for foe in combat.threats(team) if foe.distance < 9]
@@ -120,6 +120,6 @@ def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     return []
 
 
-def _report(team: Team) -> str:
+def _report(team: TextTeam) -> str:
     assert team.minimap is not None
     return f"{team.name} fights {len(team.enemies)} enemies at {point(team.minimap)} of the minimap."

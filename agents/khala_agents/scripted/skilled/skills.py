@@ -14,15 +14,15 @@ from khala_agents.scripted.skilled.space import crowd, distance, middle, nearest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_agents.scripted.reading import Point, Unit
-    from khala_agents.scripted.skilled.plan import Plan
+    from khala_agents.scripted.reading import Point, TextUnit
+    from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STORM_DAMAGE = 80.0
 STORM_RADIUS = 1.5
 NOVA_DAMAGE = 100.0
 
 
-def use(plan: Plan, prey: str = "", keep: int = 1) -> None:
+def use(plan: ReplyPlan, prey: str = "", keep: int = 1) -> None:
     """Plans the skills of a team that are worth it now; leaves `keep` calls for a fight or a move."""
     plan.prey = prey
     for name, skill in SKILLS.items():
@@ -32,7 +32,7 @@ def use(plan: Plan, prey: str = "", keep: int = 1) -> None:
             skill(plan)
 
 
-def _bodies(plan: Plan, *without: str) -> list[Unit]:
+def _bodies(plan: ReplyPlan, *without: str) -> list[TextUnit]:
     """Enemies of flesh, without those under an effect."""
     return [
         unit
@@ -41,17 +41,17 @@ def _bodies(plan: Plan, *without: str) -> list[Unit]:
     ]
 
 
-def _friends(plan: Plan) -> list[Unit]:
+def _friends(plan: ReplyPlan) -> list[TextUnit]:
     return [*plan.team.own, *plan.team.allies]
 
 
-def _price(unit: Unit) -> float:
+def _price(unit: TextUnit) -> float:
     """What is lost with a unit under an area skill: its hit points up to what a storm takes, by its worth."""
     kind = kind_of(unit)
     return min(unit.hit_points, STORM_DAMAGE) * (0.5 + kind.damage / 20.0) * (0.3 if kind.role == "support" else 1.0)
 
 
-def storm(plan: Plan) -> None:
+def storm(plan: ReplyPlan) -> None:
     """Each templar that can storms a crowd, another one than the others."""
     pool = _bodies(plan, "PsiStorm")
     for caster in sorted(plan.team.own, key=lambda unit: -unit.energy):
@@ -66,7 +66,7 @@ def storm(plan: Plan) -> None:
         pool = [unit for unit in pool if distance(unit, found[1]) > 2 * STORM_RADIUS]
 
 
-def nova(plan: Plan) -> None:
+def nova(plan: ReplyPlan) -> None:
     """A ball at the enemy with the largest crowd around, if no friend is near it."""
     pool = _bodies(plan)
     for caster in plan.team.own:
@@ -80,12 +80,12 @@ def nova(plan: Plan) -> None:
         pool = [unit for unit in pool if distance(unit, target) > 4.0]
 
 
-def _one(unit: Unit) -> float:
+def _one(unit: TextUnit) -> float:
     del unit
     return 1.0
 
 
-def guardian_shield(plan: Plan) -> None:
+def guardian_shield(plan: ReplyPlan) -> None:
     """One shield over the team while several enemies shoot from afar."""
     friends = _friends(plan)
     if sum("GuardianShield" in unit.effects for unit in friends) > len(friends) / 3:
@@ -98,7 +98,7 @@ def guardian_shield(plan: Plan) -> None:
             plan.cast("GuardianShield", caster)
 
 
-def force_field(plan: Plan) -> None:
+def force_field(plan: ReplyPlan) -> None:
     """A wall through the middle of those who come, so that half of them cannot."""
     fields = [unit for unit in plan.team.enemies + plan.team.allies if unit.type == "ForceField"]
     walkers = [u for u in _bodies(plan) if not kind_of(u).flying and kind_of(u).role == "army"]
@@ -115,7 +115,7 @@ def force_field(plan: Plan) -> None:
             plan.cast("ForceField_Screen", caster, place_)
 
 
-def _rich(plan: Plan, energy: float) -> list[Unit]:
+def _rich(plan: ReplyPlan, energy: float) -> list[TextUnit]:
     return [unit for unit in plan.team.own if unit.energy >= energy]
 
 
@@ -128,7 +128,7 @@ def _wall(ours: Point, theirs: Point, away_: float) -> list[Point]:
     return [(centre[0] + across[0] * k * 3.0, centre[1] + across[1] * k * 3.0) for k in (0, 1, -1)]
 
 
-def graviton_beam(plan: Plan) -> None:
+def graviton_beam(plan: ReplyPlan) -> None:
     """Lifts a Queen, or a worker when there is none, once another Phoenix is there to shoot."""
     team = plan.team
     free = [unit for unit in team.own if unit.energy >= 50 and "Graviton" not in unit.order]
@@ -148,14 +148,14 @@ def graviton_beam(plan: Plan) -> None:
         plan.cast("GravitonBeam", caster, target.tag)
 
 
-def prismatic_alignment(plan: Plan) -> None:
+def prismatic_alignment(plan: ReplyPlan) -> None:
     """When at least half of the team is in a fight."""
     foes = [unit for unit in _bodies(plan) if unit.distance < 9]
     if len(foes) >= 2 and not any("VoidRaySwarmDamageBoost" in unit.effects for unit in plan.team.own):
         plan.give("Ability_PrismaticAlignment")
 
 
-def time_warp(plan: Plan) -> None:
+def time_warp(plan: ReplyPlan) -> None:
     """Over the largest crowd that comes."""
     found = crowd([unit for unit in _bodies(plan) if not kind_of(unit).flying], 3.5, _one)
     if found is not None and found[0] >= 6:
@@ -164,14 +164,14 @@ def time_warp(plan: Plan) -> None:
                 plan.cast("TimeWarp_Screen", caster, found[1])
 
 
-def pulsar_beam(plan: Plan) -> None:
+def pulsar_beam(plan: ReplyPlan) -> None:
     """On as soon as something on the ground is near."""
     prey = [unit for unit in _bodies(plan) if not kind_of(unit).flying and unit.distance < 6]
     if prey and not any("OracleWeapon" in unit.effects for unit in plan.team.own) and _rich(plan, 45):
         plan.give("Ability_PulsarBeamOn")
 
 
-def fungal(plan: Plan) -> None:
+def fungal(plan: ReplyPlan) -> None:
     """Growth on a crowd."""
     found = crowd(_bodies(plan, "FungalGrowth"), 2.25, _price, ())
     if found is not None and found[0] >= 200:
@@ -180,7 +180,7 @@ def fungal(plan: Plan) -> None:
                 plan.cast("FungalGrowth_Screen", caster, found[1])
 
 
-def stim(plan: Plan) -> None:
+def stim(plan: ReplyPlan) -> None:
     """When the fight begins and nobody is hurt much."""
     team = plan.team
     near = [foe for foe in threats(team) if foe.distance < 8]
@@ -190,7 +190,7 @@ def stim(plan: Plan) -> None:
         plan.give(name)
 
 
-def siege(plan: Plan) -> None:
+def siege(plan: ReplyPlan) -> None:
     """Tanks dig in when walkers come into their range, and move on when nothing is left."""
     walkers = [foe for foe in _bodies(plan) if not kind_of(foe).flying]
     near = [foe for foe in walkers if foe.distance < 12]
@@ -202,14 +202,14 @@ def siege(plan: Plan) -> None:
         plan.give(next((name for name in names if name.endswith("Morph_Unsiege")), ""))
 
 
-def archon(plan: Plan) -> None:
+def archon(plan: ReplyPlan) -> None:
     """Two templar without energy become one Archon."""
     tired = [unit for unit in plan.team.own if unit.type == "HighTemplar" and unit.energy < 40 and not unit.order]
     if len(tired) >= 2 and plan.give("Select_Two_Units_Morph_Archon", tired[0].tag, tired[1].tag):
         plan.busy |= {tired[0].tag, tired[1].tag}
 
 
-SKILLS: dict[str, Callable[[Plan], None]] = {
+SKILLS: dict[str, Callable[[ReplyPlan], None]] = {
     "PsiStorm": storm,
     "PurificationNova": nova,
     "GuardianShield": guardian_shield,

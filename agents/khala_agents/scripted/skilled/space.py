@@ -5,38 +5,38 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from khala_agents.scripted.reading import Unit
+from khala_agents.scripted.reading import TextUnit
 from khala_agents.scripted.writing import inside
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from khala_agents.scripted.reading import Point, Team
+    from khala_agents.scripted.reading import Point, TextTeam
 
 _DIRECTIONS = tuple((math.cos(k * math.pi / 8), math.sin(k * math.pi / 8)) for k in range(16))
 
 
-def place(unit: Unit) -> Point:
+def place(unit: TextUnit) -> Point:
     """Where a unit is on the screen."""
     return unit.x, unit.y
 
 
-def distance(a: Unit | Point, b: Unit | Point) -> float:
+def distance(a: TextUnit | Point, b: TextUnit | Point) -> float:
     """Between two units or points of one screen, centre to centre."""
     (ax, ay), (bx, by) = _xy(a), _xy(b)
     return math.hypot(ax - bx, ay - by)
 
 
-def _xy(what: Unit | Point) -> Point:
-    return (what.x, what.y) if isinstance(what, Unit) else what
+def _xy(what: TextUnit | Point) -> Point:
+    return (what.x, what.y) if isinstance(what, TextUnit) else what
 
 
-def middle(units: Sequence[Unit]) -> Point:
+def middle(units: Sequence[TextUnit]) -> Point:
     """The mean place of some units."""
     return sum(unit.x for unit in units) / len(units), sum(unit.y for unit in units) / len(units)
 
 
-def nearest(to: Unit | Point, units: Iterable[Unit]) -> Unit | None:
+def nearest(to: TextUnit | Point, units: Iterable[TextUnit]) -> TextUnit | None:
     """The nearest unit; of equally near ones the first."""
     return min(units, key=lambda unit: distance(to, unit), default=None)
 
@@ -49,7 +49,7 @@ def towards(begin: Point, end: Point, length: float) -> Point:
     return begin[0] + (end[0] - begin[0]) * length / way, begin[1] + (end[1] - begin[1]) * length / way
 
 
-def away(team: Team, begin: Point, threats: Sequence[Unit], length: float) -> Point:
+def away(team: TextTeam, begin: Point, threats: Sequence[TextUnit], length: float) -> Point:
     """A point on the map about so far from a place that is as far from some threats as possible."""
 
     def safety(at: Point) -> tuple[float, float]:
@@ -60,7 +60,7 @@ def away(team: Team, begin: Point, threats: Sequence[Unit], length: float) -> Po
 
 
 def crowd(
-    targets: Sequence[Unit], radius: float, worth: Callable[[Unit], float], spared: Sequence[Unit] = ()
+    targets: Sequence[TextUnit], radius: float, worth: Callable[[TextUnit], float], spared: Sequence[TextUnit] = ()
 ) -> tuple[float, Point] | None:
     """Where most is hit within a radius, and what it is worth; None without targets.
 

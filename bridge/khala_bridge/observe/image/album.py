@@ -17,14 +17,14 @@ from khala_bridge.observe.image import features, minimap, own, screen, titles
 from khala_bridge.observe.image.canvas import Canvas, inner_px
 from khala_bridge.observe.image.encoding import encoded
 from khala_bridge.observe.image.layers import LAYERS, coloured, explain
-from khala_bridge.observe.image.minimap import Site
+from khala_bridge.observe.image.minimap import TeamMark
 from khala_bridge.observe.image.moment import Moment
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_bridge.frames import Camera, MapFrame
-    from khala_bridge.observe.image.layers import Cells, Layer
+    from khala_bridge.observe.image.layers import Cells, FeatureLayer
     from khala_bridge.observe.image.lettering import Image
     from khala_bridge.observe.observation import AgentObservation
     from khala_bridge.observe.picture import Picture
@@ -102,7 +102,7 @@ def _minimap(
         pixels = own.minimap(moment.snapshot, inner_px(spec.size_px, world.minimap_size))
     if pixels is None and not spec.is_drawn:
         return
-    sites = [Site(team.name, team.camera) for team in teams]
+    sites = [TeamMark(team.name, team.camera) for team in teams]
     tags = _commanded(moment, teams, seen)
     alerts = [alert.minimap for alert in seen.view.alerts]
     others = [(other.name, other.minimap) for other in seen.view.others]
@@ -143,7 +143,7 @@ def _features(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawin
         yield Drawing(features.draw(values, spec.size_px), f"features-{team.name}", titles.of_features(team.name))
 
 
-def _on_canvas(spec: ImageSpec, layer: Layer, extent: float, values: Cells) -> Image:
+def _on_canvas(spec: ImageSpec, layer: FeatureLayer, extent: float, values: Cells) -> Image:
     canvas = Canvas.on(coloured(layer, values), spec.size_px, extent)
     if spec.grid:
         canvas.rule()
@@ -151,7 +151,7 @@ def _on_canvas(spec: ImageSpec, layer: Layer, extent: float, values: Cells) -> I
     return canvas.image
 
 
-def _values(spec: ImageSpec, moment: Moment, camera: Camera, layer: Layer, size_px: int) -> Cells | None:
+def _values(spec: ImageSpec, moment: Moment, camera: Camera, layer: FeatureLayer, size_px: int) -> Cells | None:
     """The values of a layer, of the game or drawn; None if there are none."""
     if spec.is_taken:
         values = own.layer(moment.snapshot, layer.name, camera, size_px)

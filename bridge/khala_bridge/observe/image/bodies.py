@@ -68,7 +68,7 @@ _OUTLINES: dict[Shape, Outline] = {
 }
 
 
-class Look(NamedTuple):
+class BodyLook(NamedTuple):
     """All that a stamp depends on."""
 
     shape: Shape
@@ -87,7 +87,7 @@ def direction_of(facing: float, shape: Shape) -> int:
 
 
 @functools.lru_cache(2048)
-def body(look: Look) -> Stamp:
+def body(look: BodyLook) -> Stamp:
     """The stamp of a look; the unit is in its middle."""
     half = math.ceil(look.radius_px * _REACH) + 3
     size = 2 * half + 1
@@ -106,7 +106,7 @@ def body(look: Look) -> Stamp:
     return _lettered(stamp, look, half) if look.code else stamp
 
 
-def _draw_solid(colours: Image, opacity: Mask, look: Look) -> None:
+def _draw_solid(colours: Image, opacity: Mask, look: BodyLook) -> None:
     livery = LIVERIES[look.side]
     fill = _NEUTRAL.get(look.shape, livery.body)
     rim = mixed(fill, (0, 0, 0), 0.6) if look.side == "neutral" else livery.rim
@@ -124,14 +124,14 @@ def _draw_solid(colours: Image, opacity: Mask, look: Look) -> None:
         _fill(colours, opacity, _corners(look, 0.55), mixed(fill, (0, 0, 0), 0.5), 255)
 
 
-def _draw_field(colours: Image, opacity: Mask, look: Look) -> None:
+def _draw_field(colours: Image, opacity: Mask, look: BodyLook) -> None:
     """A force field: one sees through it."""
     outline = _corners(look, 1.0)
     _fill(colours, opacity, outline, (255, 214, 170), 235, grow_px=1.5)
     _fill(colours, opacity, outline, (220, 140, 60), 150)
 
 
-def _corners(look: Look, scale: float) -> NDArray[np.int32]:
+def _corners(look: BodyLook, scale: float) -> NDArray[np.int32]:
     """The outline of a look in fractions of the fine image's pixels."""
     angle = 2 * math.pi * look.direction / DIRECTIONS
     forward, left = np.array(_OUTLINES[look.shape]).T * look.radius_px * scale * _FINER
@@ -157,7 +157,7 @@ def _unfringed(colours: Image, cover: Mask) -> Image:
     return np.asarray(np.clip(colours / share, 0, 255), np.uint8)
 
 
-def _lettered(stamp: Stamp, look: Look, half: int) -> Stamp:
+def _lettered(stamp: Stamp, look: BodyLook, half: int) -> Stamp:
     """The same with the letters of its type, upright and as large as the body allows."""
     room = look.radius_px * (0.66 if look.shape == "air" else 0.86)
     if look.radius_px < LETTERS_FROM_PX:
@@ -174,7 +174,7 @@ def _lettered(stamp: Stamp, look: Look, half: int) -> Stamp:
     return Stamp(paint, keep)
 
 
-def _middle(look: Look) -> tuple[int, int]:
+def _middle(look: BodyLook) -> tuple[int, int]:
     """Where the letters have most room: an arrowhead is wide at its back."""
     if look.shape != "air":
         return 0, 0

@@ -40,7 +40,7 @@ _GREY, _DARK, _WHITE = (150, 150, 150), (28, 26, 24), (235, 235, 235)
 
 
 @dataclass(frozen=True)
-class Layer:
+class FeatureLayer:
     """One layer: what its values are, and how they look."""
 
     name: str
@@ -123,8 +123,8 @@ def _percent(share: float) -> int:
 # --- the table ----------------------------------------------------------------------------------------------
 
 
-def _switch(name: str, values: Values | None, about: str, off: str, on: str) -> Layer:
-    return Layer(name, values, "categorical", about, ((0, off, _DARK), (1, on, _WHITE)))
+def _switch(name: str, values: Values | None, about: str, off: str, on: str) -> FeatureLayer:
+    return FeatureLayer(name, values, "categorical", about, ((0, off, _DARK), (1, on, _WHITE)))
 
 
 _SIGHT = ((0, "never seen", (20, 18, 16)), (1, "not seen now", (110, 104, 96)), (2, "seen now", (235, 235, 235)))
@@ -135,40 +135,50 @@ _SIDES = (
     (4, "enemy", LIVERIES["enemy"].body),
 )
 
-LAYERS: dict[str, Layer] = {
+LAYERS: dict[str, FeatureLayer] = {
     layer.name: layer
     for layer in (
-        Layer("height_map", _heights, "scalar", "height of the ground, light is high"),
-        Layer("visibility_map", _sight, "categorical", "what is seen", _SIGHT),
+        FeatureLayer("height_map", _heights, "scalar", "height of the ground, light is high"),
+        FeatureLayer("visibility_map", _sight, "categorical", "what is seen", _SIGHT),
         _switch("creep", _of_land(lambda m: m.land.creep), "creep", "no creep", "creep"),
         _switch("power", _of_land(lambda m: m.land.powered(corner=False)), "power fields", "no power", "power"),
         _switch("pathable", _of_land(lambda m: m.land.open), "where one can walk", "blocked", "walkable"),
         _switch("buildable", _of_land(lambda m: m.land.free), "where one can build", "not free", "buildable"),
-        Layer(
+        FeatureLayer(
             "player_relative",
             _of_units(lambda one: _SIDE_NUMBERS.get(one.side, 0)),
             "categorical",
             "whose units are where",
             _SIDES,
         ),
-        Layer("unit_type", _of_units(lambda one: one.type_id % 254 + 1), "types", "a colour for each type of unit"),
-        Layer("unit_hit_points_ratio", _of_units(lambda one: _percent(one.health)), "scalar", "health, light is full"),
-        Layer("unit_shields_ratio", _of_units(lambda one: _percent(one.shield)), "scalar", "shields, light is full"),
-        Layer("unit_energy_ratio", _of_units(lambda one: _percent(one.energy)), "scalar", "energy, light is full"),
-        Layer("build_progress", _of_units(lambda one: _percent(one.built)), "scalar", "how far built, light is done"),
-        Layer("unit_density", _density, "scalar", "how many units are on a point, light is many"),
-        Layer("effects", _effects, "types", "a colour for each effect on the ground"),
-        Layer("player_id", None, "types", "a colour for each player's units"),
+        FeatureLayer(
+            "unit_type", _of_units(lambda one: one.type_id % 254 + 1), "types", "a colour for each type of unit"
+        ),
+        FeatureLayer(
+            "unit_hit_points_ratio", _of_units(lambda one: _percent(one.health)), "scalar", "health, light is full"
+        ),
+        FeatureLayer(
+            "unit_shields_ratio", _of_units(lambda one: _percent(one.shield)), "scalar", "shields, light is full"
+        ),
+        FeatureLayer(
+            "unit_energy_ratio", _of_units(lambda one: _percent(one.energy)), "scalar", "energy, light is full"
+        ),
+        FeatureLayer(
+            "build_progress", _of_units(lambda one: _percent(one.built)), "scalar", "how far built, light is done"
+        ),
+        FeatureLayer("unit_density", _density, "scalar", "how many units are on a point, light is many"),
+        FeatureLayer("effects", _effects, "types", "a colour for each effect on the ground"),
+        FeatureLayer("player_id", None, "types", "a colour for each player's units"),
         _switch("selected", None, "selected units", "other", "selected"),
-        Layer("unit_hit_points", None, "scalar", "health points, light is most"),
-        Layer("unit_energy", None, "scalar", "energy points, light is most"),
-        Layer("unit_shields", None, "scalar", "shield points, light is most"),
-        Layer("unit_density_aa", None, "scalar", "how many units are on a point, light is many"),
+        FeatureLayer("unit_hit_points", None, "scalar", "health points, light is most"),
+        FeatureLayer("unit_energy", None, "scalar", "energy points, light is most"),
+        FeatureLayer("unit_shields", None, "scalar", "shield points, light is most"),
+        FeatureLayer("unit_density_aa", None, "scalar", "how many units are on a point, light is many"),
         _switch("hallucinations", None, "hallucinations", "real", "not real"),
         _switch("cloaked", None, "cloaked units", "not cloaked", "cloaked"),
         _switch("blip", None, "units known by a sensor tower", "none", "blip"),
-        Layer("buffs", None, "types", "a colour for each buff"),
-        Layer("buff_duration", None, "scalar", "how long buffs last, light is long"),
+        FeatureLayer("buffs", None, "types", "a colour for each buff"),
+        FeatureLayer("buff_duration", None, "scalar", "how long buffs last, light is long"),
         _switch("active", None, "structures at work", "idle", "active"),
         _switch("placeholder", None, "structures that are planned", "none", "planned"),
         _switch("camera", None, "what the game's camera shows", "outside", "camera"),
@@ -185,7 +195,7 @@ _MOST = frozenset(
 # --- colours ------------------------------------------------------------------------------------------------
 
 
-def coloured(layer: Layer, values: Cells) -> Image:
+def coloured(layer: FeatureLayer, values: Cells) -> Image:
     """The picture of a layer's values."""
     table = np.zeros((256, 3), np.uint8)
     if layer.kind == "scalar":
@@ -203,7 +213,7 @@ def _mapped(values: Cells, table: Image) -> Image:
     return np.asarray(cv2.applyColorMap(values.astype(np.uint8), table[:, None]), np.uint8)
 
 
-def _graded(layer: Layer, values: Cells) -> Image:
+def _graded(layer: FeatureLayer, values: Cells) -> Image:
     """From dark to light; heights over the range that is there, units' values over all there could be."""
     low, high = 0, 255
     if layer.name in _MOST:
@@ -226,7 +236,7 @@ def _hues() -> Image:
     return table
 
 
-def explain(image: Image, layer: Layer) -> None:
+def explain(image: Image, layer: FeatureLayer) -> None:
     """Writes a legend into the lower left corner of a layer's picture."""
     entries = [(colour, name) for _, name, colour in layer.colours]
     if layer.kind == "scalar":
@@ -248,7 +258,7 @@ def explain(image: Image, layer: Layer) -> None:
         stamp.press(image, 22, y + 4 - stamp.size[1] // 2)
 
 
-def _ends(layer: Layer) -> tuple[str, str]:
+def _ends(layer: FeatureLayer) -> tuple[str, str]:
     if layer.name in _MOST:
         return "none", "most"
     return ("low", "high") if layer.name == "height_map" else ("0 %", "100 %")

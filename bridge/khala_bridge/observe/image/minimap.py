@@ -42,7 +42,7 @@ _DOTS: dict[str, Colour] = {
 }
 
 
-class Site(NamedTuple):
+class TeamMark(NamedTuple):
     """A team on the minimap."""
 
     name: str
@@ -52,7 +52,7 @@ class Site(NamedTuple):
 def draw(
     moment: Moment,
     world: MapFrame,
-    teams: Sequence[Site],
+    teams: Sequence[TeamMark],
     own: frozenset[int],
     alerts: Iterable[Point],
     size_px: int,
@@ -143,7 +143,7 @@ def _dot(image: Image, one: Subject, side: Side, at: tuple[int, int], scale: flo
 
 
 def _name_teams(
-    canvas: Canvas, teams: Sequence[Site], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
+    canvas: Canvas, teams: Sequence[TeamMark], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
 ) -> None:
     """Frames around what the teams see, crosses at their heads, and their names."""
     image, half = canvas.inner, round(CAMERA_WIDTH / 2 * scale)

@@ -19,7 +19,7 @@ import numpy as np
 
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.observe.image import palette
-from khala_bridge.state.ground import Ground
+from khala_bridge.state.ground import MapGround
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +67,7 @@ class Painting:
     @classmethod
     def of(cls, info: EpisodeInfo) -> Painting:
         """The ground of the map that a game is played on."""
-        return _painting(Ground.of(info), info.playable)
+        return _painting(MapGround.of(info), info.playable)
 
     def seen(self, camera: Camera, size_px: int, veil: Veil) -> Image:
         """What a camera shows of it, (size_px, size_px, 3); at most half of its own pixels beside the truth."""
@@ -97,7 +97,7 @@ class Painting:
 
 
 @functools.lru_cache(8)
-def _painting(ground: Ground, playable: tuple[int, int, int, int]) -> Painting:
+def _painting(ground: MapGround, playable: tuple[int, int, int, int]) -> Painting:
     width, height = ground.size
     walkable = upright(ground.walkable)
     if not walkable.any():  # no grid was sent

@@ -15,7 +15,7 @@ Side: TypeAlias = Literal["team", "own", "ally", "enemy", "neutral"]
 
 
 @dataclass(frozen=True, slots=True)
-class Livery:
+class AllianceColors:
     """The colours of one side: of bodies, of their rims, of letters on them, and of marks and dots."""
 
     name: str
@@ -26,12 +26,12 @@ class Livery:
     mark: Colour
 
 
-LIVERIES: dict[Side, Livery] = {
-    "team": Livery("blue", (248, 128, 40), (255, 240, 222), (255, 255, 255), (255, 216, 160)),
-    "own": Livery("green", (84, 150, 34), (214, 250, 206), (255, 255, 255), (160, 244, 160)),
-    "ally": Livery("yellow", (40, 176, 214), (190, 244, 252), (20, 40, 46), (110, 232, 250)),
-    "enemy": Livery("red", (38, 52, 212), (8, 6, 52), (232, 244, 255), (150, 170, 255)),
-    "neutral": Livery("grey", (146, 156, 160), (60, 64, 68), (34, 38, 40), (200, 206, 208)),
+LIVERIES: dict[Side, AllianceColors] = {
+    "team": AllianceColors("blue", (248, 128, 40), (255, 240, 222), (255, 255, 255), (255, 216, 160)),
+    "own": AllianceColors("green", (84, 150, 34), (214, 250, 206), (255, 255, 255), (160, 244, 160)),
+    "ally": AllianceColors("yellow", (40, 176, 214), (190, 244, 252), (20, 40, 46), (110, 232, 250)),
+    "enemy": AllianceColors("red", (38, 52, 212), (8, 6, 52), (232, 244, 255), (150, 170, 255)),
+    "neutral": AllianceColors("grey", (146, 156, 160), (60, 64, 68), (34, 38, 40), (200, 206, 208)),
 }
 
 MINERALS: Colour = (232, 200, 84)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.observe.image import palette
-from khala_bridge.observe.image.bodies import LETTERS_FROM_PX, Look, body, direction_of
+from khala_bridge.observe.image.bodies import LETTERS_FROM_PX, BodyLook, body, direction_of
 from khala_bridge.observe.image.canvas import SMALL_PX, Canvas, inner_px
 from khala_bridge.observe.image.effects import draw_orders, draw_patches
 from khala_bridge.observe.image.marks import Marked, marks_of, place
@@ -121,10 +121,12 @@ def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) 
     return sorted(seen, key=lambda one: (one.subject.level, one.side == "team"))
 
 
-def _look(one: _Drawn, *, lettered: bool) -> Look:
+def _look(one: _Drawn, *, lettered: bool) -> BodyLook:
     unit = one.subject
     direction = direction_of(unit.facing, unit.shape)
-    return Look(unit.shape, one.side, one.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1)
+    return BodyLook(
+        unit.shape, one.side, one.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1
+    )
 
 
 def _bars(image: Image, one: _Drawn) -> None:

@@ -8,7 +8,7 @@ from khala_bridge.observe.image.features import SHOWN
 from khala_bridge.observe.image.palette import LIVERIES
 
 if TYPE_CHECKING:
-    from khala_bridge.observe.image.layers import Layer
+    from khala_bridge.observe.image.layers import FeatureLayer
     from khala_bridge.observe.image.palette import Side
     from khala_bridge.observe.image.screen import Legend
 
@@ -51,12 +51,12 @@ def of_minimap(extent: float, legend: Legend) -> str:
     return "; ".join(part for part in parts if part) + "."
 
 
-def of_layer(team: str, extent: float, layer: Layer) -> str:
+def of_layer(team: str, extent: float, layer: FeatureLayer) -> str:
     """Of a feature layer of a team's screen."""
     return f"Layer {layer.name} of the screen of team {team}, to {_corner(extent)}: {layer.about}."
 
 
-def of_minimap_layer(extent: float, layer: Layer) -> str:
+def of_minimap_layer(extent: float, layer: FeatureLayer) -> str:
     """Of a feature layer of the minimap."""
     return f"Layer {layer.name} of the minimap, to {_corner(extent)}: {layer.about}."
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import Offer, TeamView
+    from khala_protocol.messages import ActionCost, TeamView
 
 
 @section("valid_actions")
@@ -46,11 +46,11 @@ def _calls(page: Page) -> Iterator[str]:
         yield f"{INDENT}Team {team.name}: {calls or 'none'}"
 
 
-def _offers(page: Page) -> dict[str, Offer]:
+def _offers(page: Page) -> dict[str, ActionCost]:
     return {offer.action: offer for team in page.teams for offer in team.offers}
 
 
-def _price(offer: Offer) -> str:
+def _price(offer: ActionCost) -> str:
     parts = [f"{offer.minerals} minerals"] if offer.minerals else []
     parts += [f"{offer.vespene} vespene"] if offer.vespene else []
     parts += [f"{n(offer.supply)} supply"] if offer.supply else []

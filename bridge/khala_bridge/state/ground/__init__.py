@@ -1,12 +1,12 @@
 """The ground: terrain, footprints, resources and base places, and what stands where at a moment, all as arrays.
 
-`Ground.of(info)` is of a map and never changes; `land_of(snapshot)` is of a moment. Above: `khala_bridge.auto`, and
+`MapGround.of(info)` is of a map and never changes; `land_of(snapshot)` is of a moment. Above: `khala_bridge.auto`, and
 whoever shows the ground to an agent.
 """
 
 from khala_bridge.state.ground.footprints import Footprint, Site, footprint_of, footprints, sites
 from khala_bridge.state.ground.land import Land, land_of
 from khala_bridge.state.ground.resources import Base
-from khala_bridge.state.ground.terrain import Ground
+from khala_bridge.state.ground.terrain import MapGround
 
-__all__ = ["Base", "Footprint", "Ground", "Land", "Site", "footprint_of", "footprints", "land_of", "sites"]
+__all__ = ["Base", "Footprint", "Land", "MapGround", "Site", "footprint_of", "footprints", "land_of", "sites"]

@@ -16,7 +16,7 @@ from khala_bridge.catalogue.functions import functions_of
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground.footprints import ADDON, ADDON_OFFSET, footprint_of, sites, stands_on
 from khala_bridge.state.ground.resources import base_places, coordinates, mark
-from khala_bridge.state.ground.terrain import Ground
+from khala_bridge.state.ground.terrain import MapGround
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -47,7 +47,7 @@ class Land:
     """What is known of the ground at the moment of a snapshot."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        self.ground = Ground.of(snapshot.info)
+        self.ground = MapGround.of(snapshot.info)
         self._snapshot = snapshot
 
     @functools.cached_property
@@ -287,7 +287,7 @@ def land_of(snapshot: Snapshot) -> Land:
 
 
 @functools.lru_cache(maxsize=8)
-def _lines(ground: Ground, bases: tuple[Base, ...], halls: Places) -> Bools:
+def _lines(ground: MapGround, bases: tuple[Base, ...], halls: Places) -> Bools:
     """(w, h) between town halls and their resources, and where town halls are going to stand."""
     kept = np.zeros(ground.size, np.bool_)
     resources = [place for base in bases for place in (*base.fields, *base.geysers)]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_bridge.state.ground.footprints import Cells
-    from khala_bridge.state.ground.terrain import Bools, Floats, Ground
+    from khala_bridge.state.ground.terrain import Bools, Floats, MapGround
 
 SPREAD = 8.5
 """Resources of one base lie at most so far from the next one; the usual figure of bots, an estimate."""
@@ -49,7 +49,7 @@ Places = tuple[tuple[float, float], ...]
 
 
 @functools.lru_cache(maxsize=32)
-def base_places(ground: Ground, fields: Places, geysers: Places, halls: Places = ()) -> tuple[Base, ...]:
+def base_places(ground: MapGround, fields: Places, geysers: Places, halls: Places = ()) -> tuple[Base, ...]:
     """Every place for a town hall on a map, by ascending coordinates.
 
     Args:
@@ -72,7 +72,7 @@ def base_places(ground: Ground, fields: Places, geysers: Places, halls: Places =
     return tuple(sorted(found, key=lambda base: base.place))
 
 
-def _clusters(ground: Ground, places: NDArray[np.float64]) -> list[list[int]]:
+def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]:
     """Indices of the places that hang together, each cluster in ascending order."""
     if not len(places):
         return []
@@ -90,7 +90,7 @@ def _clusters(ground: Ground, places: NDArray[np.float64]) -> list[list[int]]:
     return clusters
 
 
-def _free_of(ground: Ground, fields: Places, geysers: Places) -> Bools:
+def _free_of(ground: MapGround, fields: Places, geysers: Places) -> Bools:
     """(w, h) the middle cells on which a town hall would stand on free ground, clear of all resources."""
     clear = ground.buildable.copy()
     for name, places in (("mineral_field", fields), ("geyser", geysers)):

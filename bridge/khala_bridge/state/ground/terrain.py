@@ -28,7 +28,7 @@ SEED_REACH = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Ground:
+class MapGround:
     """The ground of one map; one object for all snapshots of an episode."""
 
     buildable: Bools
@@ -41,7 +41,7 @@ class Ground:
     """Where other players may have begun."""
 
     @classmethod
-    def of(cls, info: EpisodeInfo) -> Ground:
+    def of(cls, info: EpisodeInfo) -> MapGround:
         """The ground of the map that a game is played on; remembered by the map's own grids."""
         return _ground(info.size, info.playable, info.placement, info.pathing, info.height, info.starts)
 
@@ -77,7 +77,7 @@ def _ground(
     pathing: Grid,
     height: Grid,
     starts: tuple[WorldPoint, ...],
-) -> Ground:
+) -> MapGround:
     empty = np.zeros(size, np.uint8)
     inside = np.zeros(size, np.bool_)
     x0, y0, x1, y1 = playable
@@ -89,11 +89,11 @@ def _ground(
     levels = HEIGHT_LOW + HEIGHT_STEP * (empty if raised is None else raised).astype(np.float32)
     for array in (buildable, walkable, levels):
         array.setflags(write=False)
-    return Ground(buildable, walkable, levels.astype(np.float32), starts)
+    return MapGround(buildable, walkable, levels.astype(np.float32), starts)
 
 
 @functools.lru_cache(maxsize=64)
-def _ways(ground: Ground, cell: tuple[int, int]) -> Floats:
+def _ways(ground: MapGround, cell: tuple[int, int]) -> Floats:
     width, height = ground.size
     far = np.full((width + 2, height + 2), np.inf, np.float32)
     open_ = np.pad(ground.walkable, 1)

@@ -39,7 +39,7 @@ _LIGHT = np.array([0, 105, 255, 0], np.uint8)
 """Brightness of ground that was never seen, was seen before, is seen, is hidden."""
 
 
-class Ground:
+class PaintedGround:
     """The ground on one of a client's images; painted anew only when the view moves or creep spreads."""
 
     def __init__(self, columns: int, rows: int, pixels_per_cell: float, *, grid: bool = False) -> None:

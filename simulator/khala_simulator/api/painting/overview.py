@@ -12,7 +12,7 @@ import numpy as np
 
 from khala_simulator.api.effects import blips
 from khala_simulator.api.painting import marks, palette
-from khala_simulator.api.painting.ground import Ground
+from khala_simulator.api.painting.ground import PaintedGround
 from khala_simulator.api.projection import Rect
 from khala_simulator.api.sight import Alliance, Display
 
@@ -36,7 +36,7 @@ class OverviewPainter:
         self._minimap, self._screen, self._types = minimap, screen, types
         area, scale = minimap.area, minimap.scale
         self._shown = Rect(area.x0, area.y1 - minimap.rows * scale, area.x0 + minimap.columns * scale, area.y1)
-        self._ground = Ground(minimap.columns, minimap.rows, 1 / scale)
+        self._ground = PaintedGround(minimap.columns, minimap.rows, 1 / scale)
         x, y = minimap.to_pixels(area.x1, area.y0)
         self._rest = (round(x), round(y))  # where the map ends, in an image of another shape
 

@@ -25,7 +25,7 @@ Colour: TypeAlias = "tuple[int, int, int]"
 
 
 @dataclasses.dataclass(frozen=True)
-class Livery:
+class PlayerColors:
     """The colours of one side's units."""
 
     body: Colour
@@ -36,20 +36,20 @@ class Livery:
     dot: Colour  # on the minimap
 
 
-LIVERIES: dict[int, Livery] = {
-    Alliance.SELF: Livery(
+LIVERIES: dict[int, PlayerColors] = {
+    Alliance.SELF: PlayerColors(
         body=(58, 140, 255), rim=(214, 236, 255), dark=(16, 54, 122), ink=(255, 255, 255),
         beam=(150, 220, 255), dot=(70, 165, 255),
     ),
-    Alliance.ALLY: Livery(
+    Alliance.ALLY: PlayerColors(
         body=(40, 178, 120), rim=(206, 255, 228), dark=(8, 78, 52), ink=(255, 255, 255),
         beam=(160, 255, 200), dot=(60, 220, 150),
     ),
-    Alliance.NEUTRAL: Livery(
+    Alliance.NEUTRAL: PlayerColors(
         body=(168, 162, 146), rim=(96, 92, 84), dark=(104, 98, 88), ink=(40, 38, 34),
         beam=(220, 220, 200), dot=(170, 166, 150),
     ),
-    Alliance.ENEMY: Livery(
+    Alliance.ENEMY: PlayerColors(
         body=(226, 66, 34), rim=(44, 4, 2), dark=(110, 22, 8), ink=(255, 240, 214),
         beam=(255, 176, 96), dot=(255, 84, 44),
     ),
@@ -107,7 +107,7 @@ def sides(owner: NDArray[np.int64], alliance: NDArray[np.int64], player: int) ->
     return _OF_PLAYER.take(row)
 
 
-def livery_of(unit: UnitType, side: int) -> Livery:
+def livery_of(unit: UnitType, side: int) -> PlayerColors:
     """The colours of a unit of a side; what can be harvested has colours of its own."""
     livery = LIVERIES[side]
     if unit.resource:

@@ -13,9 +13,9 @@ import numpy as np
 
 from khala_simulator.api.effects import BLIP_RADIUS, blips, seen_buffs
 from khala_simulator.api.painting import marks, palette, weather
-from khala_simulator.api.painting.ground import Ground
+from khala_simulator.api.painting.ground import PaintedGround
 from khala_simulator.api.painting.silhouettes import Class, class_of
-from khala_simulator.api.painting.sprites import DIRECTIONS, Look, wardrobe
+from khala_simulator.api.painting.sprites import DIRECTIONS, SpriteLook, wardrobe
 from khala_simulator.api.shots import in_flight, strikes
 from khala_simulator.api.sight import Alliance, Cloak, Display
 
@@ -44,7 +44,7 @@ BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
 """What has no bars until it is damaged."""
 
 
-class Actor(NamedTuple):
+class DrawnUnit(NamedTuple):
     """One unit on the screen, in pixels."""
 
     row: int  # of the sight
@@ -62,7 +62,7 @@ class ScenePainter:
         self._wardrobe = wardrobe(types.catalog.version, self._scale)
         self._level = np.array([_level(unit) for unit in types.catalog.units])
         self._bare = np.array([class_of(unit) in BARE for unit in types.catalog.units])
-        self._ground = Ground(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)
+        self._ground = PaintedGround(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)
 
     def paint(self, frame: Frame) -> Image:
         """The image of this frame."""
@@ -78,7 +78,7 @@ class ScenePainter:
         self._buffs(image, frame, actors)
         return image
 
-    def _actors(self, frame: Frame) -> list[Actor]:
+    def _actors(self, frame: Frame) -> list[DrawnUnit]:
         """The units in view in drawing order, from below to above, the larger ones first."""
         sight, screen = frame.sight, self._screen
         x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
@@ -89,11 +89,11 @@ class ScenePainter:
         rows = np.flatnonzero(near)
         rows = rows[np.lexsort((-radius[rows], layer[rows]))]
         columns = (rows, x[rows], y[rows], radius[rows])
-        return [Actor(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
+        return [DrawnUnit(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
 
     # units ------------------------------------------------------------------------------------------------------------
 
-    def _units(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+    def _units(self, image: Image, frame: Frame, actors: list[DrawnUnit]) -> None:
         looks, selected = self._looks(frame), frame.selected.tolist()
         for actor in actors:
             if selected[actor.row]:
@@ -102,7 +102,7 @@ class ScenePainter:
         for actor in actors:
             self._wardrobe.sprite(looks[actor.row]).stamp(image, int(actor.x), int(actor.y))
 
-    def _looks(self, frame: Frame) -> list[Look]:
+    def _looks(self, frame: Frame) -> list[SpriteLook]:
         """The look of each unit of the sight."""
         sight = frame.sight
         turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
@@ -111,7 +111,7 @@ class ScenePainter:
         veiled |= sight.hallucination | sight.burrowed
         sides = palette.sides(sight.owner, sight.alliance, frame.player)
         columns = (sight.row, sides, turn, veiled, sight.build_progress < 1)
-        return list(map(Look._make, zip(*(column.tolist() for column in columns), strict=True)))
+        return list(map(SpriteLook._make, zip(*(column.tolist() for column in columns), strict=True)))
 
     def _blips(self, image: Image, frame: Frame) -> None:
         """Where radar tells of somebody: dark discs without a type."""
@@ -164,7 +164,7 @@ class ScenePainter:
 
     # bars -------------------------------------------------------------------------------------------------------------
 
-    def _bars(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+    def _bars(self, image: Image, frame: Frame, actors: list[DrawnUnit]) -> None:
         sight = frame.sight
         quiet = (sight.display != Display.VISIBLE.value) | (sight.life_max <= 0)
         quiet |= self._bare[sight.row] & ((sight.life >= sight.life_max) | (sight.alliance == Alliance.NEUTRAL.value))
@@ -190,7 +190,7 @@ class ScenePainter:
             bottom = int(actor.y - actor.radius * 1.12) - 1
             marks.bars(image, int(actor.x), bottom, size, shares, border=int(actor.radius >= TINY))
 
-    def _buffs(self, image: Image, frame: Frame, actors: list[Actor]) -> None:
+    def _buffs(self, image: Image, frame: Frame, actors: list[DrawnUnit]) -> None:
         """A pip for each buff, below the unit."""
         worn = seen_buffs(frame.world, frame.sight)
         if worn is None:

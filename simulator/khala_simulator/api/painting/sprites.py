@@ -22,7 +22,7 @@ from khala_simulator.tables.catalog import load_catalog
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.api.painting.palette import Colour, Livery
+    from khala_simulator.api.painting.palette import Colour, PlayerColors
     from khala_simulator.tables.records import UnitType
 
     Image = NDArray[np.uint8]
@@ -56,7 +56,7 @@ _SHIFT = 4
 """OpenCV takes fractions of pixels as whole numbers of sixteenths."""
 
 
-class Look(NamedTuple):
+class SpriteLook(NamedTuple):
     """What a sprite depends on, besides its size."""
 
     row: int  # of the type in the catalog
@@ -94,10 +94,10 @@ class Wardrobe:
     def __init__(self, units: tuple[UnitType, ...], pixels_per_cell: float) -> None:
         self._units, self._scale = units, pixels_per_cell
         self._bodies: dict[tuple[int, int, bool], Floats] = {}
-        self._sprites: dict[Look, Sprite] = {}
+        self._sprites: dict[SpriteLook, Sprite] = {}
         self._bytes = 0
 
-    def sprite(self, look: Look) -> Sprite:
+    def sprite(self, look: SpriteLook) -> Sprite:
         """The sprite of a look."""
         sprite = self._sprites.get(look)
         if sprite is None:
@@ -107,7 +107,7 @@ class Wardrobe:
                 self._sprites, self._bodies, self._bytes = {look: sprite}, {}, 0
         return sprite
 
-    def _make(self, look: Look) -> Sprite:
+    def _make(self, look: SpriteLook) -> Sprite:
         unit = self._units[look.row]
         livery, radius = palette.livery_of(unit, look.side), max(unit.radius_shown, 0.1) * self._scale
         radius = min(radius, MAX_RADIUS)
@@ -137,7 +137,7 @@ def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
 # images of four channels: red, green, blue, all times the cover, and the cover, 0 to 255 ------------------------------
 
 
-def draw_body(unit: UnitType, livery: Livery, radius: float, *, unfinished: bool) -> Floats:
+def draw_body(unit: UnitType, livery: PlayerColors, radius: float, *, unfinished: bool) -> Floats:
     """A unit facing right, `_finer` times larger than it is shown: its rim, its body, what is on it."""
     kind, easel = class_of(unit), _Easel(radius)
     body = easel.outline(outline_of(unit))
@@ -233,7 +233,7 @@ def _light(side: int) -> Floats:
 
 
 @functools.lru_cache(maxsize=512)
-def _letters(code: str, radius: float, side: int, livery: Livery) -> Floats:
+def _letters(code: str, radius: float, side: int, livery: PlayerColors) -> Floats:
     """Capitals in the middle of an image, with an edge around them."""
     size = side * FINER
     mask = _text(code, size, LETTER_HEIGHT * radius * FINER, LETTERS_WIDTH * radius * FINER)

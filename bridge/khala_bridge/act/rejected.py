@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Call, RejectionReason
 
 
-class Refused(Exception):
+class CallRejected(Exception):
     """Leaves the checks of a call with the reason of its rejection."""
 
     def __init__(self, reason: RejectionReason, message: str) -> None:
@@ -22,7 +22,7 @@ class Refused(Exception):
         super().__init__(message)
 
 
-def reject(call: Call, refused: Refused, team: str | None = None) -> Rejection:
+def reject(call: Call, refused: CallRejected, team: str | None = None) -> Rejection:
     """A rejection of a call, with its place in the reply."""
     return Rejection(
         reason=refused.reason, message=refused.message, text=render(call), start=call.start, team=team or call.team

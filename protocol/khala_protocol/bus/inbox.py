@@ -43,7 +43,7 @@ class Doorbell:
             self._calls.popleft()()
 
 
-class Mailbox(Generic[T]):
+class Inbox(Generic[T]):
     """A `khala_protocol.bus.Subscription` of what `offer` or `offer_from_thread` are given.
 
     Made on the loop that iterates over it. What arrived before `close` is still handed out after it.
