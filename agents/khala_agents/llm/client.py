@@ -3,7 +3,7 @@
 A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_agents.llm.limits` holds back, and
 `khala_agents.policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
 
-    LLMError                    .status as recorded in an `Exchange`, .retryable
+    LLMError                    .status as recorded in a `ModelCall`, .retryable
     ├── Refused                 ours: the request is wrong, and stays wrong (400, 404, 413, 422, …)
     │   └── Unauthorized        the user's: the key (401, 403)
     ├── OutOfMoney              the account is empty or its quota used up (402, some 429)
@@ -118,7 +118,7 @@ class LLMError(KhalaError):
     """No completion came.
 
     Attributes:
-        status: as in `Exchange.status`: `http 429`, `timeout`, `connection`, …
+        status: as in `ModelCall.status`: `http 429`, `timeout`, `connection`, …
         retryable: whether the same request may succeed a little later.
         may_be_billed: whether an answer may have been generated; False if the endpoint refused to.
     """

@@ -15,7 +15,7 @@ from khala_protocol.messages import LOOPS_PER_S, OrderView, UnitDetails, UnitVie
 
 if TYPE_CHECKING:
     from khala_bridge.frames import MapFrame
-    from khala_bridge.state import Order, Unit
+    from khala_bridge.state import Unit, UnitOrder
     from khala_protocol.messages import Point
 
 _BLANK = UnitView(
@@ -93,7 +93,7 @@ def _details(unit: Unit) -> UnitDetails | None:
 _NO_ORDER = OrderView(name="")
 
 
-def _order(order: Order, world: MapFrame) -> OrderView:
+def _order(order: UnitOrder, world: MapFrame) -> OrderView:
     found: dict[str, object] = {"name": order.name}
     if order.target_unit_tag:
         found["target"] = hex(order.target_unit_tag)

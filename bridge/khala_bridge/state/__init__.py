@@ -1,6 +1,6 @@
 """State: what one player knows of the game at one moment, as values.
 
-    snapshot   `Snapshot`, one per player and step        unit       `Unit` and `Order`
+    snapshot   `Snapshot`, one per player and step        unit       `Unit` and `UnitOrder`
     episode    `EpisodeInfo`, one per episode             grid       creep, sight and ground as sent
     read       messages of the SC2 API → these values     pictures   the game's own pixels
 
@@ -12,7 +12,7 @@ from khala_bridge.state.grid import Grid
 from khala_bridge.state.pictures import GamePictures
 from khala_bridge.state.read import read_info, read_snapshot, read_unit
 from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
-from khala_bridge.state.unit import Alliance, Display, Order, Unit
+from khala_bridge.state.unit import Alliance, Display, Unit, UnitOrder
 
 __all__ = [
     "ActionError",
@@ -22,13 +22,13 @@ __all__ = [
     "EpisodeInfo",
     "GamePictures",
     "Grid",
-    "Order",
     "PictureSizes",
     "PlayerScore",
     "PlayerState",
     "PowerSource",
     "Snapshot",
     "Unit",
+    "UnitOrder",
     "read_info",
     "read_snapshot",
     "read_unit",

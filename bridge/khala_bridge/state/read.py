@@ -25,7 +25,7 @@ from khala_bridge.state.episode import EpisodeInfo, PictureSizes
 from khala_bridge.state.grid import NO_GRID, Grid
 from khala_bridge.state.pictures import GamePictures
 from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
-from khala_bridge.state.unit import Alliance, Display, Order, Unit
+from khala_bridge.state.unit import Alliance, Display, Unit, UnitOrder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -175,11 +175,11 @@ def _only_own(unit: raw_pb2.Unit) -> tuple[Any, ...]:
 _NOTHING_OWN = tuple(Unit._field_defaults.values())
 
 
-def _order(order: raw_pb2.UnitOrder) -> Order:
+def _order(order: raw_pb2.UnitOrder) -> UnitOrder:
     target = order.WhichOneof("target")
     tag = order.target_unit_tag if target == "target_unit_tag" else 0
     place = _point(order.target_world_space_pos) if target == "target_world_space_pos" else None
-    return Order(order.ability_id, tag, place, order.progress)
+    return UnitOrder(order.ability_id, tag, place, order.progress)
 
 
 # --- the rest ---------------------------------------------------------------------------------------------------

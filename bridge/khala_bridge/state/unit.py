@@ -40,7 +40,7 @@ class Display(IntEnum):
 _OWN, _ENEMY, _NEUTRAL, _REMEMBERED = Alliance.OWN, Alliance.ENEMY, Alliance.NEUTRAL, Display.REMEMBERED
 
 
-class Order(NamedTuple):
+class UnitOrder(NamedTuple):
     """One order that a unit carries out or has in its queue."""
 
     ability_id: int
@@ -119,7 +119,7 @@ class Unit(NamedTuple):
     """Workers that it has work for."""
     passengers: tuple[str, ...] = ()
     """Types of the units in it, by name."""
-    orders: tuple[Order, ...] = ()
+    orders: tuple[UnitOrder, ...] = ()
     """The order at work first; () for an idle unit."""
 
     @property

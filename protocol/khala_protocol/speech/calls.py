@@ -82,7 +82,8 @@ def close_parentheses(text: str, opening: Opening) -> tuple[int, int]:
     the parentheses are closed and nothing else follows (rule S22).
 
     Raises:
-        MalformedCall: the call is not closed before the next `<` or the end of the text, or what was meant is not clear.
+        MalformedCall: the call is not closed before the next `<` or the end of the text, or what was meant is not
+        clear.
     """
     opened = ["("]
     for match in _BRACKET.finditer(text, opening.end):

@@ -24,7 +24,7 @@ CLIFF: Final = 0.5  # a Pylon does not power ground that lies so much higher tha
 
 
 @dataclass(frozen=True, slots=True)
-class PowerField:
+class PoweredArea:
     """A power field: the slot it is around, its middle, its radius, and whether units warp in fast in it."""
 
     slot: int
@@ -40,7 +40,7 @@ def _rows(catalog: Catalog) -> tuple[Bools, Bools]:
     return fields, np.array([u.needs_power for u in catalog.units])
 
 
-def sources(world: World, player: int) -> list[PowerField]:
+def sources(world: World, player: int) -> list[PoweredArea]:
     """A player's power fields, by ascending slot."""
     live = world.live
     mine = live[_rows(world.catalog)[0][world.type[live]] & (world.owner[live] == player)]
@@ -50,17 +50,17 @@ def sources(world: World, player: int) -> list[PowerField]:
     return [_source(world, s, hasteners) for s in slots if world.unit_type(s).name in SUPPLIES]
 
 
-def _source(world: World, slot: int, hasteners: list[int]) -> PowerField:
+def _source(world: World, slot: int, hasteners: list[int]) -> PoweredArea:
     unit = world.unit_type(slot)
     x, y = world.pos[slot].tolist()
     fast = unit.name in ALWAYS_FAST or any(
         float(np.hypot(*(world.pos[h] - world.pos[slot]))) <= max(r for r, _ in world.unit_type(h).power)
         for h in hasteners
     )
-    return PowerField(slot, (x, y), max(radius for radius, _ in unit.power), fast)
+    return PoweredArea(slot, (x, y), max(radius for radius, _ in unit.power), fast)
 
 
-def covered(world: World, source: PowerField, points: Floats) -> Bools:
+def covered(world: World, source: PoweredArea, points: Floats) -> Bools:
     """(k,) which points (k, 2) lie in a field; a Pylon's does not reach up a cliff."""
     offset = points - np.array(source.point)
     inside: Bools = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= source.radius**2
@@ -70,7 +70,7 @@ def covered(world: World, source: PowerField, points: Floats) -> Bools:
     return inside
 
 
-def best(world: World, player: int, point: tuple[float, float]) -> PowerField | None:
+def best(world: World, player: int, point: tuple[float, float]) -> PoweredArea | None:
     """The field over a point, a fast one if there is any; None without power."""
     at = np.array([point])
     found = [source for source in sources(world, player) if covered(world, source, at)[0]]

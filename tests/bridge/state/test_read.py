@@ -14,12 +14,12 @@ from khala_bridge.state import (
     Display,
     Effect,
     EpisodeInfo,
-    Order,
     PictureSizes,
     PlayerScore,
     PlayerState,
     PowerSource,
     Unit,
+    UnitOrder,
     read_info,
     read_snapshot,
     read_unit,
@@ -82,9 +82,9 @@ def test_a_unit_has_what_the_api_says_of_it() -> None:
     assert found.buffs == ("GravitonBeam", "PowerUserWarpable")
     assert found.passengers == ("Zealot", "Stalker")
     assert found.orders == (
-        Order(3674, target_unit_tag=99, progress=0.25),
-        Order(3794, target_world_space_pos=WorldPoint(1, 2)),
-        Order(3793),
+        UnitOrder(3674, target_unit_tag=99, progress=0.25),
+        UnitOrder(3794, target_world_space_pos=WorldPoint(1, 2)),
+        UnitOrder(3793),
     )
     assert [order.name for order in found.orders] == ["Attack", "Move", "HoldPosition"]
 

@@ -80,7 +80,7 @@ def warp_to_the_front(plan: ReplyPlan) -> None:
 
 
 @dataclass(slots=True)
-class Budget:
+class ReplyBudget:
     """What may still be spent in this reply."""
 
     plan: ReplyPlan
@@ -109,7 +109,7 @@ def produce(plan: ReplyPlan, build: Build) -> None:
     """Goes through a build order; a want that cannot be paid yet may keep others from being paid first."""
     situation = plan.situation
     room = max(0.0, situation.supply_cap - situation.supply_used)
-    purse = Budget(plan, situation.minerals, situation.vespene, room)
+    purse = ReplyBudget(plan, situation.minerals, situation.vespene, room)
     if needs_supply(situation, build) and not _pending(situation, build.supply):
         given = purse.buy(build.supply.action)
         mine = build.supply.action in situation.impossible
