@@ -42,9 +42,9 @@ WORDS = (
 HE = ("he", "his", "him")
 FIRST_VERBS = {
     "Adds", "Asks", "Begins", "Builds", "Calls", "Checks", "Closes", "Counts", "Draws", "Ends", "Finds", "Gets",
-    "Gives", "Goes", "Keeps", "Makes", "Moves", "Opens", "Plays", "Prints", "Publishes", "Puts", "Raises", "Reads", "Removes",
-    "Returns", "Runs", "Says", "Sends", "Sets", "Shows", "Starts", "Stops", "Takes", "Tells", "Turns", "Waits",
-    "Writes",
+    "Gives", "Goes", "Keeps", "Makes", "Moves", "Opens", "Plays", "Prints", "Publishes", "Puts", "Raises", "Reads",
+    "Removes", "Returns", "Runs", "Says", "Sends", "Sets", "Shows", "Starts", "Stops", "Takes", "Tells", "Turns",
+    "Waits", "Writes",
 }  # fmt: skip
 
 
