@@ -96,7 +96,7 @@ def apply_damage(
         owner: Whose damage it is.
         victim: Slot of the unit that takes it; one that can't be touched takes none.
         amount: Before armor, bonuses included.
-        kind: ``ranged``, ``melee_start``, ``splash`` or ``spell``; buffs answer to it.
+        kind: ``ranged``, ``melee``, ``splash`` or ``spell``; buffs answer to it.
         ignores_armor: Whether armor does not count.
         shield_bonus: More damage that only shields take.
     """
