@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 TAG, OTHER = 0x100040001, 0x100080001
-RICH = {"minerals": 1000.0, "vespene": 1000.0, "supply": 50.0}
+RICH: dict[str, Any] = {"minerals": 1000.0, "vespene": 1000.0, "supply": 50.0}
 
 
 def reason(
