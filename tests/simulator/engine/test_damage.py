@@ -60,6 +60,20 @@ def test_one_hit_takes_what_the_tables_say(
     assert life - world.life[v] == pytest.approx(from_life)
 
 
+@pytest.mark.parametrize(("level", "from_shields"), [(0, 13), (1, 12), (2, 11), (3, 10)])
+def test_each_level_of_plasma_shields_takes_one_from_what_shields_lose(
+    field: Any, level: int, from_shields: float
+) -> None:
+    world = field.world
+    a, v = field.put("Stalker", 1, 10, 16), field.put("Zealot", 2, 11, 16)
+    for number in range(1, level + 1):
+        commands.grant_upgrade(world, 2, world.catalog.upgrade(f"ProtossShieldsLevel{number}").id)
+    weapon = world.catalog.unit("Stalker").weapon_against("ground")
+    damage.strike(world, a, 1, v, world.stats.damage[1][weapon.row][0])
+    assert world.shields[v] == 50 - from_shields
+    assert world.life[v] == 100
+
+
 def test_a_hit_takes_at_least_a_half(field: Any) -> None:
     world = field.world
     a, v = field.put("Zealot", 1, 10, 16), field.put("Ultralisk", 2, 11, 16)
