@@ -174,7 +174,7 @@ def make_snapshot(*, loop: int = 0, dead: Sequence[int] = (), outcome: Outcome |
     layers.width = 24
     layers.resolution.x = layers.resolution.y = 128
     layers.minimap_resolution.x = layers.minimap_resolution.y = 64
-    return read_snapshot(response, read_info(info), dead=frozenset(dead), outcome=outcome)
+    return read_snapshot(response, read_info(info), dead=frozenset(dead), outcome=outcome, ended=outcome is not None)
 
 
 @dataclass
@@ -305,15 +305,15 @@ def card() -> Callable[..., Run]:
     return make
 
 
-async def heard(samples: Subscription[Sample]) -> list[Sample]:
-    """All that has arrived; ends the subscription."""
-    await samples.close()
-    return [sample async for sample in samples]
-
-
 @pytest.fixture
 def drain() -> Callable[[Subscription[Sample]], Awaitable[list[Sample]]]:
-    return heard
+    """Ends a subscription and returns what had arrived."""
+
+    async def rest(samples: Subscription[Sample]) -> list[Sample]:
+        await samples.close()
+        return [sample async for sample in samples]
+
+    return rest
 
 
 # --- a whole match --------------------------------------------------------------------------------------
@@ -358,6 +358,8 @@ class Hall:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            for one in peers:
+                one.bus.kill()
 
     @property
     def reports(self) -> list[Report]:

@@ -67,9 +67,7 @@ def test_a_file_that_is_not_there_is_named() -> None:
     assert str(raised.value) == "missing.yaml: there is no such file"
 
 
-def test_a_mistake_in_a_task_file_is_named_with_its_line_and_field(
-    tmp_path: Path, subtests: pytest.Subtests
-) -> None:
+def test_a_mistake_in_a_task_file_is_named_with_its_line_and_field(tmp_path: Path, subtests: pytest.Subtests) -> None:
     path = tmp_path / "mine.yaml"
     for old, new, said in (
         ("map: 2s3z", "map: 2s3", "2 (map): there is no map '2s3', did you mean '2s3z'?"),

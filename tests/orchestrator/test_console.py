@@ -115,7 +115,14 @@ def test_pictures_and_requests_of_unknown_size_are_named_beside_the_tokens(print
 
 
 def test_game_time_is_minutes_and_seconds(subtests: pytest.Subtests) -> None:
-    for game_loop, shown in ((0, "0:00"), (22, "0:00"), (23, "0:01"), (224, "0:10"), (1344, "1:00"), (100_000, "74:24")):
+    for game_loop, shown in (
+        (0, "0:00"),
+        (22, "0:00"),
+        (23, "0:01"),
+        (224, "0:10"),
+        (1344, "1:00"),
+        (100_000, "74:24"),
+    ):
         with subtests.test(game_loop=game_loop):
             assert clock(game_loop) == shown
 

@@ -146,9 +146,7 @@ async def test_an_agent_is_gone_when_its_last_instance_is(
     await new.arrive("2")
     async with called(broker) as (roster, gone):
         await settle()
-        assert caplog.messages == [
-            "2 instances of agent p1/Zealots are there: the first reply of a step counts"
-        ]
+        assert caplog.messages == ["2 instances of agent p1/Zealots are there: the first reply of a step counts"]
         old.bus.kill()
         await settle()
         assert (roster.present(ZEALOTS), gone) == (True, [])
@@ -175,9 +173,7 @@ async def test_agents_that_have_no_seat_are_named_and_count_for_nothing(
     ]
 
 
-async def test_agents_of_another_run_are_not_seen(
-    broker: MemoryBroker, caplog: pytest.LogCaptureFixture
-) -> None:
+async def test_agents_of_another_run_are_not_seen(broker: MemoryBroker, caplog: pytest.LogCaptureFixture) -> None:
     await broker.session().announce(alive_key("other", *ZEALOTS, "1"))
     async with called(broker) as (roster, _):
         await settle()

@@ -62,9 +62,7 @@ def report(step: int, *agents: AgentReport) -> Report:
     return Report(run=RUN, episode=0, step=step, game_loop=224 * step, agents=agents, score=5.0 * step)
 
 
-FAULT = Rejection(
-    reason="unknown_target", message="There is no unit 0x9 in sight.", text="<Attack_Unit(0x9)>", start=0
-)
+FAULT = Rejection(reason="unknown_target", message="There is no unit 0x9 in sight.", text="<Attack_Unit(0x9)>", start=0)
 RESULT = Result(
     run=RUN, episode=0, outcome="draw", cause="step limit", steps=2, env_steps=2, game_loop=448, game_s=20.0,
     wall_s=1.0, killed=Casualties(), lost=Casualties(), kd=None,

@@ -117,9 +117,7 @@ async def test_a_reply_of_another_time_is_counted_and_not_taken(
     assert (answer.status, answer.text, answer.ignored) == ("ok", "right", 1)
 
 
-async def test_a_late_reply_is_counted_in_the_next_step_and_not_executed(
-    table: Table, observe: Observe
-) -> None:
+async def test_a_late_reply_is_counted_in_the_next_step_and_not_executed(table: Table, observe: Observe) -> None:
     async with table(ZEALOTS) as (turn, (zealots,)):
         late = (await turn.ask(observe(ZEALOTS, step=0, within_s=0.01))).by_seat[ZEALOTS]
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=1, within_s=60)))
@@ -156,9 +154,7 @@ async def test_an_agent_that_restarts_in_a_step_can_still_answer_it(
         assert (await asked).by_seat[STALKERS].text == "back"
 
 
-async def test_our_own_lost_link_is_no_death_of_others(
-    broker: MemoryBroker, peer: MakePeer, observe: Observe
-) -> None:
+async def test_our_own_lost_link_is_no_death_of_others(broker: MemoryBroker, peer: MakePeer, observe: Observe) -> None:
     host = broker.session()
     zealots = peer(ZEALOTS)
     await zealots.arrive()
@@ -184,9 +180,7 @@ async def test_our_own_lost_link_is_no_death_of_others(
         (encode(Reply(run=RUN, side="p1", agent="Stalkers", episode=0, step=0, text="")), "under the key of"),
     ],
 )
-async def test_garbage_is_named_and_not_waited_for(
-    table: Table, observe: Observe, payload: bytes, reason: str
-) -> None:
+async def test_garbage_is_named_and_not_waited_for(table: Table, observe: Observe, payload: bytes, reason: str) -> None:
     async with table(ZEALOTS) as (turn, (zealots,)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
         await zealots.observed()
@@ -196,9 +190,7 @@ async def test_garbage_is_named_and_not_waited_for(
     assert reason in answer.detail
 
 
-async def test_an_agent_of_another_match_is_not_heard(
-    table: Table, peer: MakePeer, observe: Observe
-) -> None:
+async def test_an_agent_of_another_match_is_not_heard(table: Table, peer: MakePeer, observe: Observe) -> None:
     stranger = peer(Seat("p1", "Stranger"))
     async with table(ZEALOTS) as (turn, (zealots,)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
