@@ -342,8 +342,9 @@ class Hall:
         **agents: Callable[[Peer, Observation], Awaitable[None]] | None,
     ) -> list[Result]:
         """Host a match; agents that are not given order nothing, those that are None do not come."""
-        reactions = {agent.name: agree for agent in config.task.agents} | agents
-        peers = [Peer(self.broker.session(), Seat("blue", name)) for name, react in reactions.items() if react]
+        given = {agent.name: agents.get(agent.name, agree) for agent in config.task.agents}
+        reactions = {name: react for name, react in given.items() if react is not None}
+        peers = [Peer(self.broker.session(), Seat("blue", name)) for name in reactions]
         for one in peers:
             await one.arrive()
         tasks = [asyncio.create_task(one.play(reactions[one.seat.agent])) for one in peers]

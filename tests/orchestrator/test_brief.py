@@ -6,8 +6,6 @@ import importlib.metadata
 import platform
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.game.game import GameInfo
 from khala_bridge.task.config import TaskConfig
@@ -17,6 +15,8 @@ from khala_protocol.messages import AgentCard, Clock, Correspondent, Frames, Tea
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import pytest
 
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Briefing

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from khala_orchestrator.cli import people, replay, router, tasks
+from khala_orchestrator.config import load_task
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode
@@ -51,7 +52,7 @@ def test_tasks_are_data_for_a_program(capsys: pytest.CaptureFixture[str]) -> Non
         "name": "2s3z_pair",
         "map": "2s3z",
         "agents": ["Stalkers", "Zealots"],
-        "description": "The battle 2s3z played by two agents who can talk, one for the Stalkers and one for the Zealots.",
+        "description": load_task("2s3z_pair").description,
     }
 
 

@@ -15,8 +15,9 @@ from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
+
+NAMES = "use 1 to 64 letters, digits, '_', '.' or '-', beginning with a letter or a digit"
 
 GOOD = """\
 name: mine
@@ -94,8 +95,7 @@ def test_a_mistake_in_a_task_file_is_named_with_its_line_and_field(tmp_path: Pat
         (
             "name: All",
             "name: All of us",
-            "5 (agents.0.name): name 'All of us' cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
-            "beginning with a letter or a digit",
+            f"5 (agents.0.name): name 'All of us' cannot stand in a key: {NAMES}",
         ),
         ("name: mine", "name: [", "3: this is no YAML: expected ',' or ']', but got ':'"),
     ):

@@ -200,7 +200,7 @@ async def test_the_default_reply_counts_where_an_agent_has_no_words(
 async def test_an_agent_that_dies_and_comes_back_misses_the_steps_between(
     hall: Hall, config: MakeConfig, peer: MakePeer
 ) -> None:
-    again = peer(Seat("blue", "Stalkers"))
+    again, arrived = peer(Seat("blue", "Stalkers")), asyncio.Event()
 
     async def dies(stalkers: Peer, seen: Observation) -> None:
         if seen.step == 1:
@@ -212,6 +212,7 @@ async def test_an_agent_that_dies_and_comes_back_misses_the_steps_between(
         await asyncio.sleep(4)
         if seen.step == 2:
             await again.arrive("2")
+            arrived.set()
         await peer.answer(seen)
 
     async def next_step(peer: Peer, seen: Observation) -> None:
@@ -219,8 +220,7 @@ async def test_an_agent_that_dies_and_comes_back_misses_the_steps_between(
             await peer.answer(seen, STOP)
 
     async def come_back() -> None:
-        while again._observations is None:
-            await asyncio.sleep(1)
+        await arrived.wait()
         await again.play(next_step)
 
     back = asyncio.create_task(come_back())
@@ -308,7 +308,7 @@ async def test_a_cancelled_match_takes_back_what_it_declared_and_ends_its_record
         with subtests.test(name):
             bus, path = hall.broker.session(), tmp_path / f"{steps}.mcap"
             changes: dict[str, Any] = {"record": path, "max_wait_s": 1e6}
-            playing = asyncio.create_task(hall.play(config(**changes), bus=bus, **agents))  # type: ignore[arg-type]
+            playing = asyncio.create_task(hall.play(config(**changes), bus=bus, **agents))
             await asyncio.sleep(20)
             playing.cancel()
             with pytest.raises(asyncio.CancelledError):

@@ -155,7 +155,7 @@ async def test_what_is_refused_is_said_in_the_report_and_in_the_next_step(play: 
     assert [r.reason for r in rejections] == ["unknown_target", "unknown_action", "unknown_recipient"]
     assert played.pool.of("Stalkers")[1].rejections == rejections
     assert played.pool.of("Zealots")[1].rejections == ()
-    assert played.results[0].rejections == {reason: 1 for reason in sorted(r.reason for r in rejections)}
+    assert played.results[0].rejections == dict.fromkeys((r.reason for r in rejections), 1)
 
 
 async def test_what_is_shown_of_one_episode_is_not_shown_in_the_next(play: Play) -> None:

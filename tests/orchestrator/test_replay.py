@@ -99,13 +99,14 @@ async def test_a_match_that_is_played_again_is_the_same_to_the_last_byte(recordi
 async def test_a_recording_that_was_cut_off_is_played_up_to_its_last_whole_step(
     recording: Recording, again: Replay, tmp_path: Path
 ) -> None:
+    over = asyncio.Event()
+
     def cut(message: Wire) -> Wire | None:
-        nonlocal over
-        kept = None if over else message
-        over = over or (isinstance(message, Observation) and (message.episode, message.step) == (1, 1))
+        kept = None if over.is_set() else message
+        if isinstance(message, Observation) and (message.episode, message.step) == (1, 1):
+            over.set()
         return kept
 
-    over = False
     torn = changed(recording, tmp_path / "torn.mcap", cut)
     assert len(list(torn.of(Report))) == 5
     assert await again(torn) == []

@@ -227,7 +227,7 @@ async def test_a_reply_is_in_time_until_the_deadline_and_late_from_then_on(
 
 
 async def test_all_that_comes_in_time_counts_when_one_is_late(table: Table, observe: Observe) -> None:
-    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+    async with table(ZEALOTS, STALKERS) as (turn, (_, stalkers)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
         await asyncio.sleep(4)
         await stalkers.reply("here")
@@ -501,7 +501,7 @@ async def test_without_a_reply_there_are_no_words_and_no_usage(table: Table, obs
 
 
 async def test_a_turn_takes_back_what_it_declared(table: Table, broker: MemoryBroker, observe: Observe) -> None:
-    async with table(ZEALOTS) as (turn, (zealots,)):
+    async with table(ZEALOTS) as (turn, _):
         (question,) = observe(ZEALOTS, within_s=1)
         await turn.ask([question._replace(pictures=[b"picture"])])
     late = await broker.session().subscribe("**", Delivery.STATE)
