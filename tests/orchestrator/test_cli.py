@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
+import re
+import signal
+from pathlib import Path
+
 import pytest
 
-from khala_orchestrator.cli import people, tasks
+from khala_orchestrator.cli import people, replay, router, tasks
+from khala_orchestrator.config import load_task
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.codec import encode
+from khala_protocol.errors import BusError
+from khala_protocol.messages import AgentReport, Observation, Report, View
+from khala_protocol.recording import Recorder
 
 
 @pytest.mark.parametrize(
@@ -30,3 +43,97 @@ def test_a_task_is_listed_with_its_agents_and_what_it_is_about(
     first = lines.index("pvz_task5_level1  Commander, CombatGroup1 2 5 6")
     assert lines[first + 1].startswith("    LLM-PySC2 task 5, ")
     assert all(len(line) <= 80 for line in lines)
+
+
+def test_tasks_are_data_for_a_program(capsys: pytest.CaptureFixture[str]) -> None:
+    tasks(as_json=True)
+    found = {task["name"]: task for task in json.loads(capsys.readouterr().out)["tasks"]}
+    assert found["2s3z_pair"] == {
+        "name": "2s3z_pair",
+        "map": "2s3z",
+        "agents": ["Stalkers", "Zealots"],
+        "description": load_task("2s3z_pair").description,
+    }
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Three steps of two agents that say nothing."""
+    agents = tuple(AgentReport(agent=name, side="blue", status="late") for name in ("Stalkers", "Zealots"))
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        for step in range(3):
+            seen = Observation(
+                run="test", side="blue", agent="Stalkers", episode=0, step=step, game_loop=0, answer_within_s=None,
+                text="[bold]nothing[/bold]", view=View(time_s=0.0),
+            )  # fmt: skip
+            recorder.write("khala/test/blue/Stalkers/observation", encode(seen))
+            report = Report(run="test", episode=0, step=step, game_loop=224 * step, agents=agents)
+            recorder.write("khala/test/report", encode(report))
+    return recorder.path
+
+
+def test_a_replay_tells_the_part_that_is_asked_for(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    replay(recording, agent="Stalkers", steps="1-")
+    assert capsys.readouterr().out.splitlines() == [
+        "step 1  0:10  score 0",
+        "  Stalkers: late",
+        "step 2  0:20  score 0",
+        "  Stalkers: late",
+    ]
+
+
+def test_a_replay_word_for_word_shows_words_as_they_are(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    replay(recording, steps="0", text=True)
+    assert capsys.readouterr().out.splitlines()[:2] == ["step 0, Stalkers sees", "  │ [bold]nothing[/bold]"]
+
+
+def test_a_replay_as_data_is_one_object(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    replay(recording, steps="2", as_json=True)
+    found = json.loads(capsys.readouterr().out)
+    assert [report["step"] for report in found["reports"]] == [2]
+    assert found["samples"] == {"khala/test/blue/Stalkers/observation": 3, "khala/test/report": 3}
+
+
+def test_a_replay_for_its_pictures_says_where_they_are(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    replay(recording, images=tmp_path / "pictures", as_json=True)
+    assert json.loads(capsys.readouterr().out) == {"pictures": []}
+    monkeypatch.chdir(tmp_path)
+    replay(recording, images=Path("pictures_of_it"))
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", "0 pictures are in pictures_of_it\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_router_says_where_it_listens_and_ends_at_a_signal(
+    number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+
+    def hear(line: str) -> None:
+        said.append(line)
+        signal.raise_signal(number)
+
+    monkeypatch.setattr("khala_orchestrator.cli.typer.echo", hear)
+    router(listen=["tcp/127.0.0.1:0"], as_json=True)
+    ((endpoint,),) = [json.loads(line)["endpoints"] for line in said]
+    assert re.fullmatch(r"tcp/127\.0\.0\.1:[1-9]\d*", endpoint)
+
+
+async def test_a_router_that_answers_is_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+    try:
+        (endpoint,) = bus.endpoints
+        await asyncio.to_thread(router, check=True, connect=endpoint, as_json=True)
+        found = json.loads(capsys.readouterr().out)
+        assert (found["endpoint"], len(found["routers"])) == (endpoint, 1)
+        await asyncio.to_thread(router, check=True, connect=endpoint)
+        assert capsys.readouterr() == ("", f"a router answers at {endpoint}\n")
+    finally:
+        await bus.close()
+
+
+def test_a_router_does_not_let_other_machines_in_without_being_told_to() -> None:
+    with pytest.raises(BusError, match=r"^tcp/0\.0\.0\.0:0 would let every machine that reaches it join without TLS"):
+        router(listen=["tcp/0.0.0.0:0"])

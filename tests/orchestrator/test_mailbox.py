@@ -65,3 +65,53 @@ def test_a_long_message_is_cut(mailbox: Mailbox) -> None:
 def test_listening_ends_with_the_episode(mailbox: Mailbox) -> None:
     mailbox.clear()
     assert not mailbox.deliver([said(C, "Channel-1")]).received
+
+
+def test_one_that_may_write_to_nobody_is_told_so() -> None:
+    post = Mailbox({A: []}).deliver([said(A, "B")])
+    assert [r.message for r in post.rejections[A]] == ["You cannot write to 'B': there is nobody to write to."]
+
+
+def test_a_rejection_names_the_recipient_as_it_was_written(mailbox: Mailbox) -> None:
+    (rejection,) = mailbox.deliver([said(A, "nOBODY")]).rejections[A]
+    assert (rejection.text, rejection.start) == ("nOBODY", 0)
+
+
+def test_one_that_listens_twice_hears_once(mailbox: Mailbox) -> None:
+    mailbox.listen(B, "CHANNEL-1")
+    assert [m.text for m in mailbox.deliver([said(C, "Channel-1")]).received[B]] == ["hi"]
+
+
+def test_an_unknown_channel_can_be_listened_to_and_not_written_to(mailbox: Mailbox) -> None:
+    mailbox.listen(B, "Channel-9")
+    post = mailbox.deliver([said(A, "Channel-9")])
+    assert not post.received
+    assert list(post.rejections) == [A]
+
+
+def test_a_channel_that_nobody_listens_to_swallows_what_is_said(mailbox: Mailbox) -> None:
+    mailbox.clear()
+    post = mailbox.deliver([said(A, "Channel-1")])
+    assert (dict(post.received), dict(post.rejections)) == ({}, {})
+
+
+def test_a_recipient_reads_from_whom_a_message_is_and_how_it_was_addressed(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(C, "channel-1"), said(A, "b")])
+    assert [(m.sender, m.recipient) for m in post.received[B]] == [("C", "channel-1"), ("A", "b")]
+
+
+def test_channels_have_the_name_before_agents() -> None:
+    box = Mailbox({A: [B], B: [A], C: []}, ["B"])
+    box.listen(C, "B")
+    assert list(box.deliver([said(A, "B")]).received) == [C]
+
+
+def test_each_side_has_its_channels_to_itself() -> None:
+    box = Mailbox({A: [], FOE: []}, ["Channel-1"])
+    box.listen(FOE, "Channel-1")
+    assert not box.deliver([said(A, "Channel-1")]).received
+
+
+def test_nothing_said_is_nothing_delivered(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([])
+    assert (dict(post.received), dict(post.rejections)) == ({}, {})

@@ -83,3 +83,46 @@ def test_steps_usage_statuses_and_rejections_are_added_up() -> None:
     assert found.usage["A"] == Usage(requests=3, prompt_tokens=300, completion_tokens=30, cost_usd=1.5)
     assert (found.latency_p50_s, found.latency_p95_s) == (2.0, 3.0)
     assert (found.game_loop, found.game_s) == (224, 10.0)
+
+
+def test_an_episode_without_a_step_has_no_latency_and_nothing_to_count() -> None:
+    found = result()
+    assert (found.steps, found.env_steps, found.accepted, found.game_loop) == (0, 0, 0, 0)
+    assert (found.latency_p50_s, found.latency_p95_s, found.kd) == (None, None, None)
+    assert (found.usage, found.statuses, found.rejections) == ({}, {}, {})
+
+
+def test_steps_without_a_reply_have_no_latency() -> None:
+    found = result(snapshot({1}, {11}), reports=[report(0, "late", None)])
+    assert (found.latency_p50_s, found.latency_p95_s) == (None, None)
+
+
+def test_one_step_in_twenty_may_be_slower_than_the_95th_percentile(subtests: pytest.Subtests) -> None:
+    for latencies, median, slowest in (
+        ([1.0], 1.0, 1.0),
+        ([4.0, 1.0], 2.5, 4.0),
+        ([float(number) for number in range(20)], 9.5, 19.0),
+        ([float(number) for number in range(21)], 10.0, 19.0),
+        ([float(number) for number in range(100)], 49.5, 95.0),
+    ):
+        with subtests.test(count=len(latencies)):
+            now = snapshot({1}, {11})
+            reports = [report(step, latency_s=latency) for step, latency in enumerate(latencies)]
+            found = result(*[now] * len(latencies), reports=reports)
+            assert (found.latency_p50_s, found.latency_p95_s) == (median, slowest)
+
+
+def test_rejections_are_counted_by_their_reason() -> None:
+    now = snapshot({1}, {11})
+    reports = [report(0, rejected=1), report(1, rejected=1)]
+    (agent,) = reports[1].agents
+    other = agent.rejections[0].model_copy(update={"reason": "malformed"})
+    reports[1] = reports[1].model_copy(
+        update={"agents": (agent.model_copy(update={"rejections": (*agent.rejections, other, other)}),)}
+    )
+    assert result(now, now, reports=reports).rejections == {"unknown_target": 2, "malformed": 2}
+
+
+def test_a_unit_that_changed_sides_is_counted_for_the_last_one() -> None:
+    found = result(snapshot({1, 11}, {12}), snapshot({1}, {12}, dead={11}))
+    assert (found.lost.units, found.killed.units) == (1, 0)

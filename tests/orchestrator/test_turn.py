@@ -1,68 +1,62 @@
+"""Who is asked, whose reply is taken and who is waited for no longer; on a clock that jumps."""
+
 from __future__ import annotations
 
 import asyncio
-from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_orchestrator.roster import MissingAgents, Roster, Seat
+from khala_orchestrator.roster import Roster, Seat
 from khala_orchestrator.turn import Question, Turn
 from khala_protocol.bus import Delivery
-from khala_protocol.codec import decode_as, encode
-from khala_protocol.keys import Topic, agent_key, alive_key
-from khala_protocol.messages import Observation, Reply
+from khala_protocol.bus.memory import MemoryBus
+from khala_protocol.codec import encode
+from khala_protocol.keys import Topic
+from khala_protocol.messages import Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
+    from collections.abc import Callable, Iterator
 
-    from khala_protocol.bus.memory import MemoryBroker, MemoryBus
+    from khala_protocol.bus import Publisher
+    from khala_protocol.bus.memory import MemoryBroker
+    from tests.orchestrator.conftest import Peer, Table
 
     Observe = Callable[..., list[Question]]
+    MakePeer = Callable[[Seat], Peer]
+
+CLOCK = "jumps"
 
 RUN = "test"
 ZEALOTS, STALKERS = Seat("p1", "Zealots"), Seat("p1", "Stalkers")
 
 
-class Peer:
-    """An agent that says what a test tells it to, when the test tells it to."""
+@dataclass
+class _SlowPublisher:
+    publisher: Publisher
 
-    def __init__(self, bus: MemoryBus, seat: Seat) -> None:
-        self.bus, self.seat = bus, seat
+    @property
+    def key(self) -> str:
+        return self.publisher.key
 
-    async def arrive(self, instance: str = "1") -> None:
-        key = agent_key(RUN, *self.seat, Topic.OBSERVATION)
-        self._observations = await self.bus.subscribe(key, Delivery.STATE)
-        await self.bus.announce(alive_key(RUN, *self.seat, instance))
+    async def put(self, payload: bytes) -> None:
+        await asyncio.sleep(2)
+        await self.publisher.put(payload)
 
-    async def observed(self) -> Observation:
-        return decode_as(Observation, (await anext(self._observations)).payload)
-
-    async def put(self, topic: Topic, payload: bytes) -> None:
-        publisher = await self.bus.publisher(agent_key(RUN, *self.seat, topic), Delivery.SPEECH)
-        await publisher.put(payload)
-
-    async def reply(
-        self, text: str, *, step: int = 0, episode: int = 0, run: str = RUN, agent: str | None = None
-    ) -> None:
-        side, name = self.seat
-        said = Reply(run=run, side=side, agent=agent or name, episode=episode, step=step, text=text)
-        await self.put(Topic.REPLY, encode(said))
+    async def close(self) -> None:
+        await self.publisher.close()
 
 
-@asynccontextmanager
-async def table(broker: MemoryBroker, *seats: Seat) -> AsyncIterator[tuple[Turn, list[Peer]]]:
-    host = broker.session()
-    peers = [Peer(broker.session(), seat) for seat in seats]
-    for peer in peers:
-        await peer.arrive()
-    async with Roster(host, RUN, seats) as roster, Turn(host, RUN, roster) as turn:
-        await roster.assemble(seats, 1)
-        yield turn, peers
+class SlowBus(MemoryBus):
+    """A session whose puts take two seconds."""
+
+    async def publisher(self, key: str, delivery: Delivery) -> Publisher:
+        return _SlowPublisher(await super().publisher(key, delivery))
 
 
-async def test_a_step_ends_when_all_have_replied(broker: MemoryBroker, observe: Observe) -> None:
-    async with table(broker, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+async def test_a_step_ends_when_all_have_replied(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
         assert (await zealots.observed()).agent == "Zealots"
         await zealots.reply("for Aiur")
@@ -76,9 +70,9 @@ async def test_a_step_ends_when_all_have_replied(broker: MemoryBroker, observe: 
 
 
 async def test_pictures_are_published_before_the_observation_that_names_them(
-    broker: MemoryBroker, observe: Observe
+    broker: MemoryBroker, table: Table, observe: Observe
 ) -> None:
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+    async with table(ZEALOTS) as (turn, (zealots,)):
         heard = await broker.session().subscribe("**", Delivery.STATE)
         for step, pictures in enumerate(([b"one", b"two"], [b"three"], [])):
             (question,) = observe(ZEALOTS, step=step, within_s=60)
@@ -99,8 +93,8 @@ async def test_pictures_are_published_before_the_observation_that_names_them(
     ]
 
 
-async def test_the_first_valid_reply_counts_and_a_second_is_ignored(broker: MemoryBroker, observe: Observe) -> None:
-    async with table(broker, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+async def test_the_first_valid_reply_counts_and_a_second_is_ignored(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
         await zealots.observed()
         await zealots.reply("first")
@@ -112,9 +106,9 @@ async def test_the_first_valid_reply_counts_and_a_second_is_ignored(broker: Memo
 
 @pytest.mark.parametrize(("episode", "step"), [(0, 7), (3, 1)], ids=["of another step", "of another episode"])
 async def test_a_reply_of_another_time_is_counted_and_not_taken(
-    broker: MemoryBroker, observe: Observe, episode: int, step: int
+    table: Table, observe: Observe, episode: int, step: int
 ) -> None:
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+    async with table(ZEALOTS) as (turn, (zealots,)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=1, within_s=60)))
         await zealots.observed()
         await zealots.reply("wrong", episode=episode, step=step)
@@ -123,10 +117,8 @@ async def test_a_reply_of_another_time_is_counted_and_not_taken(
     assert (answer.status, answer.text, answer.ignored) == ("ok", "right", 1)
 
 
-async def test_a_late_reply_is_counted_in_the_next_step_and_not_executed(
-    broker: MemoryBroker, observe: Observe
-) -> None:
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+async def test_a_late_reply_is_counted_in_the_next_step_and_not_executed(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
         late = (await turn.ask(observe(ZEALOTS, step=0, within_s=0.01))).by_seat[ZEALOTS]
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=1, within_s=60)))
         assert [(await zealots.observed()).step for _ in range(2)] == [0, 1]
@@ -137,8 +129,8 @@ async def test_a_late_reply_is_counted_in_the_next_step_and_not_executed(
     assert (answer.text, answer.ignored) == ("in time", 1)
 
 
-async def test_an_agent_that_dies_is_not_waited_for(broker: MemoryBroker, observe: Observe) -> None:
-    async with table(broker, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+async def test_an_agent_that_dies_is_not_waited_for(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
         await zealots.observed()
         await zealots.reply("")
@@ -147,12 +139,14 @@ async def test_an_agent_that_dies_is_not_waited_for(broker: MemoryBroker, observ
     assert {seat.agent: a.status for seat, a in answers.items()} == {"Zealots": "ok", "Stalkers": "gone"}
 
 
-async def test_an_agent_that_restarts_in_a_step_can_still_answer_it(broker: MemoryBroker, observe: Observe) -> None:
-    async with table(broker, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+async def test_an_agent_that_restarts_in_a_step_can_still_answer_it(
+    table: Table, peer: MakePeer, observe: Observe
+) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
         await zealots.observed()
         stalkers.bus.kill()
-        again = Peer(broker.session(), STALKERS)
+        again = peer(STALKERS)
         await again.arrive("2")
         assert (await again.observed()).step == 0
         await again.reply("back")
@@ -160,9 +154,9 @@ async def test_an_agent_that_restarts_in_a_step_can_still_answer_it(broker: Memo
         assert (await asked).by_seat[STALKERS].text == "back"
 
 
-async def test_our_own_lost_link_is_no_death_of_others(broker: MemoryBroker, observe: Observe) -> None:
+async def test_our_own_lost_link_is_no_death_of_others(broker: MemoryBroker, peer: MakePeer, observe: Observe) -> None:
     host = broker.session()
-    zealots = Peer(broker.session(), ZEALOTS)
+    zealots = peer(ZEALOTS)
     await zealots.arrive()
     async with Roster(host, RUN, [ZEALOTS]) as roster, Turn(host, RUN, roster) as turn:
         await roster.assemble([ZEALOTS], 1)
@@ -186,10 +180,8 @@ async def test_our_own_lost_link_is_no_death_of_others(broker: MemoryBroker, obs
         (encode(Reply(run=RUN, side="p1", agent="Stalkers", episode=0, step=0, text="")), "under the key of"),
     ],
 )
-async def test_garbage_is_named_and_not_waited_for(
-    broker: MemoryBroker, observe: Observe, payload: bytes, reason: str
-) -> None:
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+async def test_garbage_is_named_and_not_waited_for(table: Table, observe: Observe, payload: bytes, reason: str) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
         await zealots.observed()
         await zealots.put(Topic.REPLY, payload)
@@ -198,9 +190,9 @@ async def test_garbage_is_named_and_not_waited_for(
     assert reason in answer.detail
 
 
-async def test_an_agent_of_another_match_is_not_heard(broker: MemoryBroker, observe: Observe) -> None:
-    stranger = Peer(broker.session(), Seat("p1", "Stranger"))
-    async with table(broker, ZEALOTS) as (turn, (zealots,)):
+async def test_an_agent_of_another_match_is_not_heard(table: Table, peer: MakePeer, observe: Observe) -> None:
+    stranger = peer(Seat("p1", "Stranger"))
+    async with table(ZEALOTS) as (turn, (zealots,)):
         asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
         await zealots.observed()
         await stranger.reply("let me in")
@@ -209,10 +201,309 @@ async def test_an_agent_of_another_match_is_not_heard(broker: MemoryBroker, obse
     assert list(answers.by_seat) == [ZEALOTS]
 
 
-async def test_missing_agents_are_named(broker: MemoryBroker) -> None:
-    async with Roster(broker.session(), RUN, [ZEALOTS, STALKERS]) as roster:
-        await Peer(broker.session(), ZEALOTS).arrive()
-        with pytest.raises(
-            MissingAgents, match=r"no agent took the place of p1/Stalkers within 0\.01 s: start one with"
-        ):
-            await roster.assemble([ZEALOTS, STALKERS], 0.01)
+# --- the deadline -------------------------------------------------------------------------------------
+
+
+async def test_a_reply_is_in_time_until_the_deadline_and_late_from_then_on(
+    table: Table, observe: Observe, subtests: pytest.Subtests
+) -> None:
+    for after_s, status in ((0.0, "ok"), (9.999, "ok"), (10.0, "late"), (10.001, "late")):
+        with subtests.test(after_s=after_s):
+            async with table(ZEALOTS) as (turn, (zealots,)):
+
+                async def think(zealots: Peer = zealots, after_s: float = after_s) -> None:
+                    seen = await zealots.observed()
+                    await asyncio.sleep(after_s)
+                    await zealots.answer(seen, "done")
+
+                thinking = asyncio.create_task(think())
+                answers = await turn.ask(observe(ZEALOTS, within_s=10))
+                answer = answers.by_seat[ZEALOTS]
+                await thinking
+            assert answer.status == status
+            assert answers.wait_s == pytest.approx(min(after_s, 10.0))
+            assert answer.latency_s == (pytest.approx(after_s) if status == "ok" else None)
+            assert answer.detail == ("" if status == "ok" else "no reply before the deadline")
+
+
+async def test_all_that_comes_in_time_counts_when_one_is_late(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (_, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        await asyncio.sleep(4)
+        await stalkers.reply("here")
+        answers = await asked
+    assert {seat: (a.status, a.text, a.latency_s) for seat, a in answers.by_seat.items()} == {
+        ZEALOTS: ("late", None, None),
+        STALKERS: ("ok", "here", 4.0),
+    }
+    assert answers.wait_s == 10
+
+
+async def test_without_a_deadline_it_waits_as_long_as_it_takes(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=None)))
+        await asyncio.sleep(86_400)
+        await zealots.reply("at last")
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.latency_s) == ("ok", 86_400)
+
+
+async def test_the_wait_begins_when_the_last_observation_is_published(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    for seat in (ZEALOTS, STALKERS):
+        await peer(seat).arrive()
+    host = SlowBus(broker._hub)
+    async with Roster(host, RUN, [ZEALOTS, STALKERS]) as roster, Turn(host, RUN, roster) as turn:
+        await roster.assemble([ZEALOTS, STALKERS], 1)
+        answers = await turn.ask(observe(ZEALOTS, STALKERS, within_s=10))
+    assert (answers.publish_s, answers.wait_s) == (4.0, 10.0)
+    assert {a.status for a in answers.by_seat.values()} == {"late"}
+
+
+async def test_one_that_answers_before_the_others_are_asked_does_not_end_the_step(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    zealots, stalkers = peer(ZEALOTS), peer(STALKERS)
+    await zealots.arrive()
+    await stalkers.arrive()
+    host = SlowBus(broker._hub)
+    async with Roster(host, RUN, [ZEALOTS, STALKERS]) as roster, Turn(host, RUN, roster) as turn:
+        await roster.assemble([ZEALOTS, STALKERS], 1)
+        quick = asyncio.create_task(zealots.play(lambda peer, seen: peer.answer(seen, "quick")))
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        await stalkers.observed()
+        await asyncio.sleep(3)
+        await stalkers.reply("slow")
+        answers = await asked
+        quick.cancel()
+    assert answers.wait_s == 3.0
+    assert [(seat.agent, a.text, a.latency_s) for seat, a in answers.by_seat.items()] == [
+        ("Zealots", "quick", 2.0),
+        ("Stalkers", "slow", 5.0),
+    ]
+
+
+async def test_a_question_is_published_before_the_next_is_made(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        made: list[str] = []
+
+        def questions() -> Iterator[Question]:
+            for question in observe(ZEALOTS, STALKERS, within_s=1):
+                made.append(question.observation.agent)
+                yield question
+
+        asked = asyncio.create_task(turn.ask(questions()))
+        assert (await zealots.observed()).agent == "Zealots"
+        assert (await stalkers.observed()).agent == "Stalkers"
+        await zealots.reply()
+        await stalkers.reply()
+        answers = await asked
+    assert made == ["Zealots", "Stalkers"] == [seat.agent for seat in answers.by_seat]
+
+
+# --- what is not taken --------------------------------------------------------------------------------
+
+
+async def test_what_is_ignored_is_counted_for_its_agent_once(
+    table: Table, observe: Observe, subtests: pytest.Subtests
+) -> None:
+    wrong: dict[str, dict[str, Any]] = {
+        "of a step before": {"step": 0},
+        "of a step to come": {"step": 2},
+        "of another episode": {"episode": 1},
+        "of another run": {"run": "other"},
+        "of another side": {"side": "p2"},
+        "of another agent": {"agent": "Stalkers"},
+    }
+    for name, changes in wrong.items():
+        with subtests.test(name):
+            async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+                asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, step=1, within_s=10)))
+                await zealots.observed()
+                await zealots.reply("wrong", **{"step": 1} | changes)
+                await zealots.reply("right", step=1)
+                await stalkers.reply("mine", step=1)
+                answers = (await asked).by_seat
+                assert {seat: (a.text, a.ignored) for seat, a in answers.items()} == {
+                    ZEALOTS: ("right", 1),
+                    STALKERS: ("mine", 0),
+                }
+                asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=2, within_s=10)))
+                await zealots.reply(step=2)
+                assert (await asked).by_seat[ZEALOTS].ignored == 0
+
+
+async def test_a_reply_between_two_steps_is_counted_in_the_next(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        assert (await turn.ask(observe(ZEALOTS, within_s=1))).by_seat[ZEALOTS].ignored == 0
+        await zealots.reply("too late", step=0)
+        await zealots.put(Topic.REPLY, b"garbage")
+        await asyncio.sleep(1)
+        answer = (await turn.ask(observe(ZEALOTS, step=1, within_s=1))).by_seat[ZEALOTS]
+    assert (answer.status, answer.text, answer.ignored) == ("late", None, 2)
+
+
+async def test_garbage_after_a_reply_changes_nothing(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        await zealots.observed()
+        await zealots.reply("mine")
+        await zealots.put(Topic.REPLY, b"garbage")
+        await stalkers.reply()
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.text, answer.detail, answer.ignored) == ("ok", "mine", "", 1)
+
+
+async def test_a_reply_after_garbage_is_taken_while_the_step_is_open(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        await zealots.observed()
+        await zealots.put(Topic.REPLY, b"garbage")
+        await asyncio.sleep(3)
+        await zealots.reply("mended")
+        await stalkers.reply()
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.text, answer.latency_s, answer.ignored) == ("ok", "mended", 3.0, 1)
+
+
+async def test_a_reply_under_a_key_that_is_none_is_passed_over(
+    broker: MemoryBroker, table: Table, observe: Observe, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        await zealots.observed()
+        odd = await broker.session().publisher(f"khala/{RUN}/p1/Zea lots/reply", Delivery.SPEECH)
+        await odd.put(encode(Reply(run=RUN, side="p1", agent="Zealots", episode=0, step=0, text="odd")))
+        await zealots.reply("mine")
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.text, answer.ignored) == ("mine", 0)
+    assert caplog.messages == ["'khala/test/p1/Zea lots/reply' is no key of this protocol"]
+
+
+async def test_an_agent_of_no_seat_is_named_in_the_log(
+    table: Table, peer: MakePeer, observe: Observe, caplog: pytest.LogCaptureFixture
+) -> None:
+    stranger = peer(Seat("p1", "Stranger"))
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        await stranger.reply("hear me")
+        await zealots.reply()
+        await asked
+    assert caplog.messages == ["agent p1/Stranger sent no valid reply: p1/Stranger is not in this match"]
+
+
+# --- who is there -------------------------------------------------------------------------------------
+
+
+async def test_one_that_goes_in_the_middle_ends_its_own_wait_and_no_other(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
+        await asyncio.sleep(5)
+        await stalkers.leave()
+        await asyncio.sleep(20)
+        assert not asked.done()
+        await zealots.reply("patient")
+        answers = await asked
+    assert answers.wait_s == 25
+    assert {seat.agent: (a.status, a.detail) for seat, a in answers.by_seat.items()} == {
+        "Zealots": ("ok", ""),
+        "Stalkers": ("gone", "its liveliness token went away"),
+    }
+
+
+async def test_nobody_waits_when_all_are_gone(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, peers):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
+        await asyncio.sleep(5)
+        for one in peers:
+            await one.leave()
+        first = await asked
+        second = await turn.ask(observe(ZEALOTS, STALKERS, step=1, within_s=60))
+    assert (first.wait_s, second.wait_s) == (5, 0)
+    assert {a.status for answers in (first, second) for a in answers.by_seat.values()} == {"gone"}
+
+
+async def test_one_that_comes_back_is_asked_and_waited_for_in_the_next_step(
+    table: Table, peer: MakePeer, observe: Observe
+) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        zealots.bus.kill()
+        await asyncio.sleep(1)
+        assert (await turn.ask(observe(ZEALOTS, within_s=60))).by_seat[ZEALOTS].status == "gone"
+        again = peer(ZEALOTS)
+        await again.arrive("2")
+        await asyncio.sleep(1)
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, step=1, within_s=60)))
+        await asyncio.sleep(30)
+        await again.reply("back", step=1)
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.text, answer.latency_s) == ("ok", "back", 30.0)
+
+
+async def test_the_reply_of_one_that_went_afterwards_counts(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
+        await asyncio.sleep(1)
+        await zealots.reply("my last words")
+        await zealots.leave()
+        await stalkers.reply()
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.text) == ("ok", "my last words")
+
+
+async def test_one_of_two_instances_may_go_and_the_agent_is_waited_for(
+    table: Table, peer: MakePeer, observe: Observe
+) -> None:
+    async with table(ZEALOTS) as (turn, (old,)):
+        new = peer(ZEALOTS)
+        await new.arrive("2")
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
+        await asyncio.sleep(1)
+        await old.leave()
+        await asyncio.sleep(1)
+        assert not asked.done()
+        await new.reply("I took over")
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.text, answer.latency_s) == ("ok", "I took over", 2.0)
+
+
+async def test_of_two_instances_the_first_reply_counts(table: Table, peer: MakePeer, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (old, stalkers)):
+        new = peer(ZEALOTS)
+        await new.arrive("2")
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=60)))
+        await new.observed()
+        await new.reply("new")
+        await old.reply("old")
+        await stalkers.reply()
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.text, answer.ignored) == ("new", 1)
+
+
+# --- what a reply brings ------------------------------------------------------------------------------
+
+
+async def test_a_fallback_is_a_reply_that_says_why_it_is_none(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
+        await zealots.observed()
+        await zealots.reply("", status="fallback", detail="http 500", usage=Usage(requests=2, prompt_tokens=7))
+        answer = (await asked).by_seat[ZEALOTS]
+    assert (answer.status, answer.detail, answer.text) == ("fallback", "http 500", "")
+    assert answer.usage == Usage(requests=2, prompt_tokens=7)
+
+
+async def test_without_a_reply_there_are_no_words_and_no_usage(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, _):
+        answer = (await turn.ask(observe(ZEALOTS, within_s=1))).by_seat[ZEALOTS]
+    assert (answer.text, answer.usage) == (None, Usage())
+
+
+async def test_a_turn_takes_back_what_it_declared(table: Table, broker: MemoryBroker, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, _):
+        (question,) = observe(ZEALOTS, within_s=1)
+        await turn.ask([question._replace(pictures=[b"picture"])])
+    late = await broker.session().subscribe("**", Delivery.STATE)
+    await late.close()
+    assert [sample.key async for sample in late] == []

@@ -1,0 +1,196 @@
+"""What a person sees of a match while it runs and at its end."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from rich.console import Console
+
+from khala_orchestrator.console import Progress, card, clock, stderr_console, table
+from khala_protocol.messages import AgentReport, Casualties, Clock, Rejection, Report, Result, Usage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_protocol.messages import Run
+
+    Printed = Callable[..., list[str]]
+    MakeRun = Callable[..., Run]
+
+RUN = "test"
+FAULT = Rejection(reason="unknown_target", message="No.", text="<Attack_Unit(0x9)>", start=0)
+
+
+def make_result(**changes: Any) -> Result:
+    fields: dict[str, Any] = {
+        "run": RUN,
+        "episode": 0,
+        "outcome": "win",
+        "cause": "enemy defeated",
+        "steps": 42,
+        "env_steps": 45,
+        "game_loop": 1500,
+        "game_s": 66.9,
+        "wall_s": 12.34,
+        "killed": Casualties(units=3, value=450),
+        "lost": Casualties(units=1, value=125),
+        "kd": 3.6,
+        "usage": {
+            "Stalkers": Usage(requests=42, prompt_tokens=120_000, completion_tokens=4_000, cost_usd=0.25),
+            "Zealots": Usage(requests=40, prompt_tokens=80_000, completion_tokens=1_000, cost_usd=0.125),
+        },
+        "statuses": {"Zealots": {"ok": 40, "late": 2}, "Stalkers": {"ok": 42}},
+        "rejections": {"unknown_target": 2, "malformed": 1},
+        "accepted": 99,
+        "latency_p50_s": 0.8,
+        "latency_p95_s": 2.5,
+    }
+    return Result.model_validate(fields | changes)
+
+
+def agent(name: str, **changes: Any) -> AgentReport:
+    return AgentReport.model_validate({"agent": name, "side": "blue", "status": "ok", "latency_s": 0.8} | changes)
+
+
+def report(step: int, *agents: AgentReport) -> Report:
+    return Report(run=RUN, episode=0, step=step, game_loop=224 * step, agents=agents, score=2.5 * step)
+
+
+# --- panels -----------------------------------------------------------------------------------------------
+
+
+def test_a_run_card(printed: Printed, card_of_run: Run) -> None:
+    assert printed(card(card_of_run), width=80) == [
+        "╭──────────────────────────────────── test ────────────────────────────────────╮",
+        "│ task    2s3z_pair on 2s3z, seed 1, 1 episode(s)                              │",
+        "│ game    Khala simulator 0.1.0, as 4.10.0.75689, raw executor                 │",
+        "│ clock   frozen: 11 loops a step, waits at most 15 s                          │",
+        "│ agents  Stalkers (Stalker-1), Zealots (Zealot-1, Zealot-2)                   │",
+        "╰──────────────────────────────────────────────────────────────────────────────╯",
+    ]
+
+
+def test_a_run_card_without_a_deadline(printed: Printed, make_run: MakeRun) -> None:
+    lines = printed(card(make_run(clock=Clock(max_wait_s=None))), width=80)
+    assert lines[3] == "│ clock   frozen: 8 loops a step, waits as long as it takes                    │"
+
+
+def test_a_result(printed: Printed) -> None:
+    assert printed(table(make_result()), width=80) == [
+        "╭────────────────────── win, enemy defeated (episode 0) ───────────────────────╮",
+        "│ K/D       3.60  (killed 3 unit(s) worth 450, lost 1 unit(s) worth 125)       │",
+        "│ steps     42, 1:06 of game in 12.3 s, 45 calls of SC2Env.step                │",
+        "│ latency   median 800 ms, 95 % below 2500 ms                                  │",
+        "│ actions   99 accepted; rejected: 1 malformed, 2 unknown_target               │",
+        "│ tokens    200,000 in, 5,000 out, 82 request(s), 0.3750 USD                   │",
+        "│ Stalkers  42 ok                                                              │",
+        "│ Zealots   2 late, 40 ok                                                      │",
+        "╰──────────────────────────────────────────────────────────────────────────────╯",
+    ]
+
+
+def test_what_is_not_known_of_a_result_is_said_or_left_out(printed: Printed) -> None:
+    nothing = make_result(
+        kd=None, lost=Casualties(), usage={}, rejections={}, accepted=0, latency_p50_s=None, latency_p95_s=None,
+        outcome="draw", cause="step limit", episode=3, statuses={},
+    )  # fmt: skip
+    assert [line.strip("│ ") for line in printed(table(nothing), width=80)[1:-1]] == [
+        "K/D      none lost  (killed 3 unit(s) worth 450, lost 0 unit(s) worth 0)",
+        "steps    42, 1:06 of game in 12.3 s, 45 calls of SC2Env.step",
+        "actions  0 accepted; rejected: none",
+        "tokens   0 in, 0 out, 0 request(s), no price known",
+    ]
+    assert "draw, step limit (episode 3)" in printed(table(nothing))[0]
+
+
+def test_pictures_and_requests_of_unknown_size_are_named_beside_the_tokens(printed: Printed) -> None:
+    usage = Usage(requests=3, prompt_tokens=5000, completion_tokens=70, images=2, image_tokens=1600, unknown_requests=1)
+    (line,) = [line for line in printed(table(make_result(usage={"A": usage})), width=140) if "tokens" in line]
+    assert line.strip("│ ") == (
+        "tokens    5,000 in (about 1,600 of them for 2 pictures), 70 out, 3 request(s), 1 of unknown size, "
+        "no price known"
+    )
+
+
+def test_game_time_is_minutes_and_seconds(subtests: pytest.Subtests) -> None:
+    for game_loop, shown in (
+        (0, "0:00"),
+        (22, "0:00"),
+        (23, "0:01"),
+        (224, "0:10"),
+        (1344, "1:00"),
+        (100_000, "74:24"),
+    ):
+        with subtests.test(game_loop=game_loop):
+            assert clock(game_loop) == shown
+
+
+# --- while it runs ----------------------------------------------------------------------------------------
+
+
+def test_without_a_terminal_every_twentieth_step_is_a_line(make_run: MakeRun) -> None:
+    screen = Console(file=io.StringIO(), width=80, force_terminal=False)
+    with Progress(screen, max_steps=50) as show:
+        show(make_run())
+        for step in range(42):
+            show(report(step, agent("Stalkers")))
+        show(make_result())
+    lines = screen.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    steps = [line for line in lines if line.startswith("step")]
+    assert steps == ["step 0, 0:00", "step 20, 3:20", "step 40, 6:40"]
+    assert [line for line in lines if line.startswith("╭")] == [
+        "╭──────────────────────────────────── test ────────────────────────────────────╮",
+        "╭────────────────────── win, enemy defeated (episode 0) ───────────────────────╮",
+    ]
+
+
+def test_on_a_terminal_every_agent_has_a_line(printed: Printed, make_run: MakeRun) -> None:
+    screen = Console(file=io.StringIO(), width=100, force_terminal=True)
+    usage = Usage(requests=1, prompt_tokens=1000, completion_tokens=234)
+    with Progress(screen, max_steps=50) as show:
+        show(make_run())
+        show(report(0, agent("Stalkers", accepted=("Stalker-1 <Stop()>", "Stalker-1 <Hold()>"), usage=usage)))
+        show(
+            report(
+                1,
+                agent("Stalkers", usage=usage, rejections=(FAULT, FAULT)),
+                agent("Zealots", status="late", latency_s=None, detail="no reply before the deadline"),
+            )
+        )
+        picture = printed(show._live.renderable)
+    assert picture == [
+        "╭──────────────────────────────────────── 2s3z_pair · test ────────────────────────────────────────╮",
+        "│ step 1 of 50   game 0:10   score 2.5                                                             │",
+        "│ agent     status  latency  accepted  rejected  tokens  last action                               │",
+        "│ Stalkers  ok      0.80 s   2         2         2,468                                             │",
+        "│ Zealots   late             0         0         0       no reply before the deadline              │",
+        "╰──────────────────────────────────────────────────────────────────────────────────────────────────╯",
+    ]
+
+
+def test_the_last_action_is_the_last_one_that_was_accepted(printed: Printed) -> None:
+    screen = Console(file=io.StringIO(), width=100, force_terminal=True)
+    with Progress(screen) as show:
+        show(report(3, agent("Stalkers", accepted=("Stalker-1 <Stop()>", "Stalker-1 <Hold()>"))))
+        lines = printed(show._live.renderable)
+    assert lines[1].startswith("│ step 3   game 0:30   score 7.5 ")
+    assert "Stalker-1 <Hold()>" in lines[3]
+    assert "<Stop()>" not in lines[3]
+
+
+def test_people_are_spoken_to_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    stderr_console().print("ready: 7")
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", "ready: 7\n")
+
+
+@pytest.fixture
+def make_run(card: MakeRun) -> MakeRun:
+    return card
+
+
+@pytest.fixture
+def card_of_run(card: MakeRun) -> Run:
+    return card()

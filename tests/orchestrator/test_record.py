@@ -1,0 +1,190 @@
+"""What is written down of a run, in which order, and when it is safe; on a clock that jumps."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+import pytest
+
+from khala_orchestrator.record import Listener, RecordingBus
+from khala_protocol.bus import Delivery, Sample
+from khala_protocol.codec import encode
+from khala_protocol.errors import BusClosed, RecordingError
+from khala_protocol.keys import Topic, agent_key, alive_key, every_agent
+from khala_protocol.messages import ModelCall, Reply
+from khala_protocol.recording import Recorder, Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala_protocol.bus.memory import MemoryBroker
+
+CLOCK = "jumps"
+
+RUN = "test"
+REPLIES = every_agent(RUN, Topic.REPLY)
+OBSERVATION = agent_key(RUN, "blue", "Stalkers", Topic.OBSERVATION)
+REPLY = agent_key(RUN, "blue", "Stalkers", Topic.REPLY)
+EXCHANGE = agent_key(RUN, "blue", "Stalkers", Topic.EXCHANGE)
+
+
+def recorded(path: Path) -> list[tuple[str, bytes]]:
+    return [(sample.key, sample.payload) for sample in Recording.open(path)]
+
+
+async def test_what_is_sent_and_what_is_taken_stand_in_the_order_of_the_host(
+    broker: MemoryBroker, tmp_path: Path
+) -> None:
+    agent = await broker.session().publisher(REPLY, Delivery.SPEECH)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        bus = RecordingBus(broker.session(), recorder)
+        publisher = await bus.publisher(OBSERVATION, Delivery.STATE)
+        replies = await bus.subscribe(REPLIES, Delivery.SPEECH)
+        await publisher.put(b"step 0")
+        await agent.put(b"early")
+        await agent.put(b"never taken")
+        await publisher.put(b"step 1")
+        assert await anext(replies) == Sample(REPLY, b"early")
+        await publisher.put(b"step 2")
+    assert recorded(tmp_path / "run.mcap") == [
+        (OBSERVATION, b"step 0"),
+        (OBSERVATION, b"step 1"),
+        (REPLY, b"early"),
+        (OBSERVATION, b"step 2"),
+    ]
+
+
+async def test_what_is_sent_arrives_as_without_a_recording(broker: MemoryBroker, tmp_path: Path) -> None:
+    agent = await broker.session().subscribe(OBSERVATION, Delivery.STATE)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+        assert publisher.key == OBSERVATION
+        await publisher.put(b"step 0")
+        assert (await anext(agent)).payload == b"step 0"
+        late = await broker.session().subscribe(OBSERVATION, Delivery.STATE)
+        assert (await anext(late)).payload == b"step 0"
+        await publisher.close()
+        with pytest.raises(BusClosed):
+            await publisher.put(b"step 1")
+
+
+async def test_it_is_recorded_before_it_is_sent(broker: MemoryBroker, tmp_path: Path) -> None:
+    """What cannot be sent any more was meant to be, and stands in the file."""
+    session = broker.session()
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        publisher = await RecordingBus(session, recorder).publisher(OBSERVATION, Delivery.STATE)
+        session.kill()
+        with pytest.raises(BusClosed):
+            await publisher.put(b"last")
+    assert recorded(tmp_path / "run.mcap") == [(OBSERVATION, b"last")]
+
+
+async def test_bytes_that_are_no_message_are_kept_as_they_came(broker: MemoryBroker, tmp_path: Path) -> None:
+    agent = await broker.session().publisher(REPLY, Delivery.SPEECH)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        replies = await RecordingBus(broker.session(), recorder).subscribe(REPLIES, Delivery.SPEECH)
+        await agent.put(b"\x00\xff garbage")
+        await anext(replies)
+    (sample,) = Recording.open(tmp_path / "run.mcap")
+    assert (sample.payload, sample.message) == (b"\x00\xff garbage", None)
+
+
+async def test_a_subscription_keeps_its_depth_and_says_what_it_lost(broker: MemoryBroker, tmp_path: Path) -> None:
+    agent = await broker.session().publisher(OBSERVATION, Delivery.STATE)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        samples = await RecordingBus(broker.session(), recorder).subscribe(OBSERVATION, Delivery.STATE, depth=1)
+        await agent.put(b"0")
+        await agent.put(b"1")
+        assert (samples.dropped, samples.missed) == (1, 0)
+        await samples.close()
+        assert [sample.payload async for sample in samples] == [b"1"]
+    assert recorded(tmp_path / "run.mcap") == [(OBSERVATION, b"1")]
+
+
+async def test_it_says_how_many_samples_were_missed_while_the_link_was_down(
+    broker: MemoryBroker, tmp_path: Path
+) -> None:
+    session = broker.session()
+    agent = await broker.session().publisher(OBSERVATION, Delivery.STATE)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        samples = await RecordingBus(session, recorder).subscribe(OBSERVATION, Delivery.STATE)
+        await agent.put(b"0")
+        session.cut()
+        for payload in (b"1", b"2", b"3"):
+            await agent.put(payload)
+        session.mend()
+        assert (samples.dropped, samples.missed) == (0, 2)
+
+
+async def test_tokens_pass_through_and_are_not_recorded(broker: MemoryBroker, tmp_path: Path) -> None:
+    key = alive_key(RUN, "blue", "Stalkers", "1")
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        bus = RecordingBus(broker.session(), recorder)
+        others = await broker.session().watch(every_agent(RUN, Topic.ALIVE))
+        own = await bus.watch(every_agent(RUN, Topic.ALIVE))
+        token = await bus.announce(key)
+        await token.close()
+        for watcher in (others, own):
+            assert [((seen := await anext(watcher)).key, seen.alive) for _ in range(2)] == [(key, True), (key, False)]
+    assert recorded(tmp_path / "run.mcap") == []
+
+
+async def test_closing_closes_the_bus_below_and_leaves_the_recorder(broker: MemoryBroker, tmp_path: Path) -> None:
+    session = broker.session()
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        await RecordingBus(session, recorder).close()
+        with pytest.raises(BusClosed):
+            await session.publisher(OBSERVATION, Delivery.STATE)
+        recorder.write(OBSERVATION, b"still open")
+    assert recorded(tmp_path / "run.mcap") == [(OBSERVATION, b"still open")]
+
+
+async def test_what_was_flushed_is_there_when_the_process_is_killed(broker: MemoryBroker, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run.mcap")
+    publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+    await publisher.put(b"step 0")
+    recorder.flush()
+    await publisher.put(b"step 1")
+    assert recorded(tmp_path / "run.mcap") == [(OBSERVATION, b"step 0")]
+    assert not Recording.open(tmp_path / "run.mcap").complete
+    recorder.close()
+    assert recorded(tmp_path / "run.mcap") == [(OBSERVATION, b"step 0"), (OBSERVATION, b"step 1")]
+    assert Recording.open(tmp_path / "run.mcap").complete
+
+
+async def test_a_sample_that_cannot_be_recorded_is_not_sent(broker: MemoryBroker, tmp_path: Path) -> None:
+    agent = await broker.session().subscribe(OBSERVATION, Delivery.STATE)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+    with pytest.raises(RecordingError, match=r"run\.mcap was closed: open another recording to write more"):
+        await publisher.put(b"after the end")
+    await agent.close()
+    assert [sample async for sample in agent] == []
+
+
+async def test_a_listener_takes_what_agents_asked_their_models(broker: MemoryBroker, tmp_path: Path) -> None:
+    asked = ModelCall(
+        run=RUN, side="blue", agent="Stalkers", episode=0, step=0, attempt=1, model="m", endpoint="http://m/v1",
+        prompt=(), completion="for Aiur", status="ok", started_s=0.0, latency_s=1.5,
+    )  # fmt: skip
+    agent = broker.session()
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        bus = RecordingBus(broker.session(), recorder)
+        async with Listener(bus, RUN):
+            await (await agent.publisher(EXCHANGE, Delivery.LOG)).put(encode(asked))
+            said = Reply(run=RUN, side="blue", agent="Stalkers", episode=0, step=0, text="")
+            await (await agent.publisher(REPLY, Delivery.SPEECH)).put(encode(said))
+            await asyncio.sleep(0.001)
+            recorder.flush()
+            assert Recording.open(tmp_path / "run.mcap").counts == {EXCHANGE: 1}
+    assert list(Recording.open(tmp_path / "run.mcap").of(ModelCall)) == [asked]
+
+
+async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBroker, tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        async with Listener(RecordingBus(broker.session(), recorder), RUN):
+            agent = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+            await agent.put(b"at the last moment")
+        await agent.put(b"after the end")
+    assert recorded(tmp_path / "run.mcap") == [(EXCHANGE, b"at the last moment")]
