@@ -211,3 +211,12 @@ def test_a_unit_whose_only_enemy_died_while_it_aimed_fights_the_next_one(field: 
     world.acquires[after] = False
     field.play(20)
     assert world.target[a] == after
+
+
+@pytest.mark.parametrize(("gap", "fires"), [(1.8, False), (2.2, True)])
+def test_a_sieged_tank_does_not_fire_at_what_is_nearer_than_its_least_range(
+    field: Any, gap: float, fires: bool
+) -> None:
+    bodies = sum(float(field.world.catalog.unit(name).radius) for name in ("SiegeTankSieged", "SpineCrawler"))
+    tank, _ = duel(field, "SiegeTankSieged", "SpineCrawler", bodies + gap)
+    assert bool(starts_of(field, tank, 100)) == fires
