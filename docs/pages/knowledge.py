@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.knowledge import AbilityFacts, UnitType, UpgradeFacts, Weapon
 
-SOURCE = "`bridge/data/knowledge`"
+SOURCE = "`bridge/khala_bridge/data/knowledge`"
 MAKING = {"train", "warp_in", "build", "build_addon", "grow", "structure_morph"}
 """Kinds of abilities that make units and structures."""
 MANY = 12

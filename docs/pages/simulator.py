@@ -161,7 +161,8 @@ def _short(names: list[str]) -> list[str]:
 def _chapter(title: str) -> str:
     """A chapter of the data's own account of its sources."""
     text = (resources.files("khala_simulator.data") / SOURCES).read_text(encoding="utf-8")
-    return prose(text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip())
+    chapter = text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip()
+    return prose(chapter.replace("](../../../docs/reference/", "]("))
 
 
 def _refused() -> str:
