@@ -27,6 +27,7 @@ HIDDEN = {"__pycache__", "build", "dist"}
 
 NAME = re.compile(rf"(?<![\w./-])(?:{'|'.join(PACKAGES)})(?:\.[A-Za-z_]\w*)+(?![\w/-])")
 PATH = re.compile(rf"(?<![\w./<>-])(?:{'|'.join(FOLDERS)})/[\w.*<>/-]*[\w*>]")
+PLACED = re.compile(r"`([A-Za-z_][\w.]*)` in `(khala[\w.]*)`")
 FILE = re.compile(r"`([\w*<>-][\w.*<>/-]*\.(?:py|md|yaml|toml|json|tsv))`")
 MODULE = re.compile(r"(?<![\w./<>*-])\w[\w/]*\.py\b")
 
@@ -125,6 +126,7 @@ def stale(mention: Mention) -> list[str]:
     """What a text names that does not exist."""
     paths = {*PATH.findall(mention.text), *FILE.findall(mention.text), *MODULE.findall(mention.text)}
     names = {name for name in NAME.findall(mention.text) if not name.endswith(".py")}
+    names |= {f"{module}.{name}" for name, module in PLACED.findall(mention.text)}
     return sorted(
         {name for name in names if not resolves(name)} | {path for path in paths if not exists(path, mention.file)}
     )
@@ -146,6 +148,7 @@ def test_what_is_named_exists() -> None:
         ("bridge/khala_bridge/data/actions/*.yaml and simulator/khala_simulator/data/tables/<version>", []),
         ("bridge/nowhere/data/*.yaml", ["bridge/nowhere/data/*.yaml"]),
         ("`nowhere.py`", ["nowhere.py"]),
+        ("`Nothing` in `khala_bridge.frames`", ["khala_bridge.frames.Nothing"]),
         ("the key khala/<run>/<side> is no path", []),
     ],
 )
