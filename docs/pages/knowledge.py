@@ -66,8 +66,8 @@ def abilities_page() -> str:
     rest = [ability for ability in special if ability not in (*titled, *makes, *research)]
     return join(
         head("Abilities", SOURCE),
-        f"All {len(known)} abilities that somebody in a melee game has. " + NUMBERS + " Which text actions stand for "
-        "them is on the page of [actions](actions.md); who is refused one, and why, follows from these facts.",
+        f"All {len(known)} abilities that a unit in a melee game has. " + NUMBERS + " Which text actions stand for "
+        "them is on the page of [actions](actions.md); which unit is refused one, and why, follows from these facts.",
         LOOK_UP.format("Effect_PsiStorm"),
         "## Skills",
         _abilities(titled),
