@@ -72,14 +72,16 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  $(UV) sync --quiet --frozen --python $$python && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
-bench: install ## Measure what the README claims
+bench: install ## Measure what docs/measurements.md claims
 	$(RUN)python -m bench
 
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
 	$(RUN)python -m bench.scenarios
 
-docs: install ## Write the generated pages of docs/reference
+docs: install ## Write the generated pages of docs/reference, and build the site with search into site/
 	$(RUN)python -m docs.generate
+	$(UV) sync --quiet --frozen --group docs
+	NO_MKDOCS_2_WARNING=1 $(RUN)mkdocs build --strict --quiet
 
 golden: install ## Record the battle anew that the tests replay, after a change that was meant
 	rm -rf runs/golden
@@ -90,4 +92,4 @@ picture: install ## Play a battle and draw docs/images/2s3z.webp from its record
 	$(RUN)python -m docs.picture
 
 clean: ## Remove what make made
-	rm -rf .coverage .coverage.* .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist
+	rm -rf site .coverage .coverage.* .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist

@@ -1,4 +1,4 @@
-"""Measures what the README claims: `python -m bench` runs every measurement, `python -m bench turn bus` some of them.
+"""Measure what docs/measurements.md claims: `python -m bench` runs all, `python -m bench turn bus` some of it.
 
 Each is a module of its own with options of its own, see `python -m bench.turn --help`. They take minutes, one after
 the other: on a machine that does nothing else the figures mean most.

@@ -72,9 +72,9 @@ def _legend() -> str:
         "which the host chooses.\n"
         "* *Function* is PySC2's, in which both executors end.\n"
         "* *At once* ones do not wait for the orders that the unit was given earlier in the same reply.\n"
-        "* Whatever a team can be told, one of its units can be told too: `Select_Unit_<name>` with the unit's tag "
+        "* Every action of a team has a form for one of its units: `Select_Unit_<name>` with the unit's tag "
         "before the other arguments, "
-        f"{code(example(catalogue()['Select_Unit_Attack_Minimap']))}. Training and research can be told to one "
+        f"{code(example(catalogue()['Select_Unit_Attack_Minimap']))}. Training and research can be given to one "
         "structure in the same way. Only those with names or words of their own are listed."
     )
 

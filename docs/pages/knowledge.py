@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.knowledge import AbilityFacts, UnitFacts, UpgradeFacts, WeaponFacts
 
-SOURCE = "`bridge/data/knowledge`"
+SOURCE = "`bridge/khala_bridge/data/knowledge`"
 MAKING = {"train", "warp_in", "build", "build_addon", "grow", "structure_morph"}
 """Kinds of abilities that make units and structures."""
 MANY = 12
@@ -32,7 +32,7 @@ LOOK_UP = "One entry in full, with all that it is related to:\n\n```bash\nkhala 
 
 
 def units() -> str:
-    """What agents are told of unit types."""
+    """What agents read about unit types."""
     known = knowledge().values()
     races = [_race(race, [kind for kind in known if kind.race == race and kind.melee]) for race in RACES]
     neutral: dict[str, list[str]] = {}
@@ -66,15 +66,15 @@ def abilities_page() -> str:
     rest = [ability for ability in special if ability not in (*titled, *makes, *research)]
     return join(
         head("Abilities", SOURCE),
-        f"All {len(known)} abilities that somebody in a melee game has. " + NUMBERS + " Which text actions stand for "
-        "them is told by [actions](actions.md); who is refused one, and why, follows from these facts.",
+        f"All {len(known)} abilities that a unit in a melee game has. " + NUMBERS + " Which text actions stand for "
+        "them is on the page of [actions](actions.md); which unit is refused one, and why, follows from these facts.",
         LOOK_UP.format("Effect_PsiStorm"),
         "## Skills",
         _abilities(titled),
         "## Making units and structures",
         _abilities(makes),
         "## Research",
-        "What each does is told with the [upgrades](upgrades.md).",
+        "What each does is with the [upgrades](upgrades.md).",
         _abilities(research),
         "## Other orders",
         _abilities(rest),

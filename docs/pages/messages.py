@@ -23,7 +23,7 @@ def page() -> str:
     """Keys, messages, their parts, and what single words mean."""
     return join(
         head("Messages", "`protocol/khala_protocol/messages.py` and `protocol/khala_protocol/keys.py`"),
-        "UTF-8 JSON, one object a message, told apart by `kind`. Unknown fields are errors, and so is another major "
+        "UTF-8 JSON, one object a message, with its `kind`. Unknown fields are errors, and so is another major "
         "version `v`. How they are delivered: [the bus](../design/bus.md).",
         "## Keys",
         _keys(),

@@ -33,7 +33,7 @@ def page() -> str:
     return join(
         head(
             "Rules of combat",
-            "`simulator/data/tables`, `simulator/khala_simulator/abilities` and `simulator/khala_simulator/systems`",
+            "`data/tables`, `abilities` and `systems` of `simulator/khala_simulator`",
         ),
         "What of StarCraft II the simulator models. *Implemented*: the numbers are the game's and the rule is known. "
         "*Estimated*: it works, and what is said beside it could not be taken from a source. *Not modelled*: it is "

@@ -44,8 +44,11 @@ def page() -> str:
         "[SOURCES.md](../../simulator/khala_simulator/data/SOURCES.md).",
         _tables(),
         "## One game loop",
-        "The laws of the world, in the order in which they apply.",
-        table(("law", "in words"), [(code(system.__module__.rpartition(".")[2]), _law(system)) for system in SYSTEMS]),
+        "The systems of the world, in the order in which they run.",
+        table(
+            ("system", "in words"),
+            [(code(system.__module__.rpartition(".")[2]), _system(system)) for system in SYSTEMS],
+        ),
         "## What a player can order",
         _abilities(),
         "## Requests",
@@ -79,7 +82,7 @@ def _tables() -> str:
     return table(("tables of version", "build", "unit types", "weapons", "upgrades", "what clients see"), rows)
 
 
-def _law(system: Callable[[World], None]) -> str:
+def _system(system: Callable[[World], None]) -> str:
     return (inspect.getdoc(sys.modules[system.__module__]) or "").split("\n\n", maxsplit=1)[0]
 
 
@@ -146,22 +149,23 @@ def _maps() -> str:
 
 
 def _short(names: list[str]) -> list[str]:
-    """Names of maps, where all that begin alike are told as one."""
+    """Names of maps, where all with the same beginning are named as one."""
     families: dict[str, list[str]] = {}
     for name in names:
         families.setdefault(name.partition("/")[0], []).append(name)
-    told: list[str] = []
+    listed: list[str] = []
     for some in families.values():
         prefix = os.path.commonprefix(some)  # noqa: RUF071  # of names, not of paths: letter by letter is meant
         whole = len(some) > 1 and some == [name for name in map_names() if name.startswith(prefix)]
-        told += [f"{prefix}*"] if whole else some
-    return told
+        listed += [f"{prefix}*"] if whole else some
+    return listed
 
 
 def _chapter(title: str) -> str:
     """A chapter of the data's own account of its sources."""
     text = (resources.files("khala_simulator.data") / SOURCES).read_text(encoding="utf-8")
-    return prose(text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip())
+    chapter = text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip()
+    return prose(chapter.replace("](../../../docs/reference/", "]("))
 
 
 def _refused() -> str:

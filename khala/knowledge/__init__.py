@@ -1,4 +1,4 @@
-"""The knowledge of the game, made from the simulator's tables: the facts in `bridge/data/knowledge/<version>/`.
+"""Make the facts about the game in `bridge/khala_bridge/data/knowledge/<version>/` from the simulator's tables.
 
     units, abilities, upgrades, buffs   records out of a catalogue          files   the files that they become
     naming, measures, melee             names, seconds, what is in use    cli     `khala knowledge`

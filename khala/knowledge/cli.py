@@ -61,7 +61,7 @@ def write(
     ] = None,
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail if a file is out of date.")] = False,
 ) -> None:
-    """Make the facts in bridge/data/knowledge anew from the simulator's tables.
+    """Make the facts in bridge/khala_bridge/data/knowledge anew from the simulator's tables.
 
     To be done after a change of the tables: one line is one unit type, ability, upgrade or buff. Words about them, in
     bridge/khala_bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts by themselves.
@@ -73,7 +73,10 @@ def write(
         for path in (path for one in versions for path in files.write(one)):
             typer.echo(f"wrote {path}")
     elif old := [f"{one}/{name}" for one in versions for name in files.outdated(one)]:
-        raise OutOfDate(f"out of date in bridge/data/knowledge: {', '.join(old)}; `khala knowledge write` makes them")
+        names = ", ".join(old)
+        raise OutOfDate(
+            f"out of date in bridge/khala_bridge/data/knowledge: {names}; `khala knowledge write` makes them"
+        )
 
 
 class OutOfDate(KhalaError):

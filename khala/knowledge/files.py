@@ -1,4 +1,4 @@
-"""Writes what is known of the game into the data of the bridge: `bridge/data/knowledge/<version>/*.json`.
+"""Writes what is known of the game into the data of the bridge: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
 
 One record per line, in a fixed order, so that a change of the tables is a small difference of the files.
 """

@@ -46,13 +46,15 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Observation
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+DOCUMENTS = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
 GOLDEN = ROOT / "tests" / "khala" / "golden.mcap"
 FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
 LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", "yaml actions", *MODELS}
-OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "source", "ssh"}
+OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "pip", "source", "ssh"}
+ALONE = {"khala-agent": "agent", "khala-llm": "llm", "khala-sc2": "sc2"}
+"""The commands of a package that is installed without the others, and what `khala` calls them."""
 
 
 class Block(NamedTuple):
@@ -188,8 +190,8 @@ def test_a_command_can_be_given(subtests: pytest.Subtests, monkeypatch: pytest.M
         with subtests.test(place):
             for part in re.sub(r"\$\([^)]*\)", "", line).split(" && "):
                 program, *words = itertools.dropwhile(lambda word: "=" in word, shlex.split(part, comments=True))
-                if program == "khala":
-                    parse(words)
+                if program == "khala" or program in ALONE:
+                    parse([ALONE[program], *words] if program in ALONE else words)
                 elif program == "make":
                     assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), (
                         f"make {words[0]}"

@@ -1,7 +1,7 @@
 """One request to a language model, and what can come of it: the interface that every client implements.
 
 A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_agents.llm.limits` holds back, and
-`khala_agents.policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
+`khala_agents.llm_policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
 
     LLMError                    .status as recorded in a `ModelCall`, .retryable
     ├── Refused                 ours: the request is wrong, and stays wrong (400, 404, 413, 422, …)

@@ -1,4 +1,4 @@
-"""The facts of a version of the game, as they were generated: `bridge/data/knowledge/<version>/*.json`.
+"""The facts of a version of the game, as they were generated: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
 
 `khala knowledge write` makes the files out of the simulator's tables. There are no words in them yet: `load` adds
 these. Each file is read when it is first asked for.

@@ -1,7 +1,7 @@
 """What is known of the game: the facts of a version, merged with the words about them, read once when asked for.
 
-Words are written by hand in `bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above: everything
-that speaks of the game. Below: `facts`, which reads what was generated, and `words`, which fills in.
+Words are written by hand in `bridge/khala_bridge/data/knowledge/words/*.yaml`; their numbers are filled in here.
+Above: everything that speaks of the game. Below: `facts`, which reads what was generated, and `words`, which fills in.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A map of ours is a text file: a first line that marks it, then the name of a shi
 the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
 path. An archive of StarCraft II itself is read by `archive.py`.
 
-Above: `install.py`, `api/lobby.py`. Below: `maps.py`, `archive.py`.
+Above: `process/install.py`, `process/lobby.py`. Below: `game_map.py`, `archive.py`.
 """
 
 from __future__ import annotations

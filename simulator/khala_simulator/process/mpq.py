@@ -3,7 +3,7 @@
 Only what a reader needs: members are stored as they are, and the two tables are scrambled as the format wants. Clients
 look into a replay for the version of the game before they ask the game itself.
 
-Above: `api/replay.py`.
+Above: `process/replay.py`.
 """
 
 from __future__ import annotations

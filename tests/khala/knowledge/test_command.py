@@ -81,7 +81,8 @@ def test_write_makes_files_that_are_missing_or_old(
 ) -> None:
     monkeypatch.setattr(files, "directory", lambda version: tmp_path / version)
     names = ["4.10/units.json", "4.10/abilities.json", "4.10/upgrades.json", "4.10/buffs.json"]
-    error = f"khala: out of date in bridge/data/knowledge: {', '.join(names)}; `khala knowledge write` makes them\n"
+    place = "bridge/khala_bridge/data/knowledge"
+    error = f"khala: out of date in {place}: {', '.join(names)}; `khala knowledge write` makes them\n"
     assert said(["write", "--version", "4.10", "--check"], capsys) == (1, "", error)
     assert said(["write", "--version", "4.10"], capsys)[1] == "".join(f"wrote {tmp_path / name}\n" for name in names)
     assert said(["write", "--version", "4.10", "--check"], capsys) == (0, "", "")
