@@ -2,8 +2,8 @@
 
 Where only this package is installed they are `khala-agent` and `khala-llm`.
 
-They read options, put things together and run until they are told to end. What goes wrong on the user's side is
-raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the front door's part.
+They read options, put things together and run until they are stopped. A mistake of the user is raised
+as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` or `run_command` prints it.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,6 @@
 """The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala.cli` mounts.
 
-What goes wrong on the user's side is raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the
-front door's part.
+A mistake of the user is raised as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` prints it.
 """
 
 import asyncio
@@ -55,7 +54,7 @@ def router(
 ) -> None:
     """Join hosts and agents: a Zenoh router, until Ctrl-C.
 
-    It is needed when host and agents are on several machines; `khala run` has one of its own. A zenohd of the same
+    It is needed when host and agents are on several machines; `khala run` has its own. A zenohd of the same
     version works as well.
     """
     if check:
@@ -82,7 +81,7 @@ def tasks(*, as_json: Json = False) -> None:
 
 
 def people(names: Sequence[str]) -> str:
-    """Names of agents, those that only differ by a number together: `Commander, CombatGroup1 2 5`."""
+    """Return the names of agents, grouping those that only differ by a number: `Commander, CombatGroup1 2 5`."""
     groups: dict[str, list[str]] = {}
     for name in names:
         stem = name.rstrip("0123456789")
@@ -101,7 +100,7 @@ def replay(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Tell what was said and done in a recorded run."""
+    """Show what was said and done in a recorded run."""
     from khala_orchestrator.transcript import (  # noqa: PLC0415  # zstd is not for --help
         StepSelection,
         save_pictures,
