@@ -230,7 +230,7 @@ app.add_typer(knowledge, name="knowledge")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; an error that the user can fix is one sentence on stderr, with an exit code that is not 0."""
+    """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
     run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
 
 

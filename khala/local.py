@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
 MAX_PROCESSES = 4
-"""Up to this many agents have a process each, more agents share them: a Python process costs half a second and 60 MB."""
+"""Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +142,7 @@ async def _start_agents(children: Children, config: MatchConfig, minds: Minds, b
 async def _unless_one_dies(
     match: Coroutine[Any, Any, list[Result]], children: Children, begun: asyncio.Event
 ) -> list[Result]:
-    """Return the results of the match. A child that fails before the first step ends it; the match handles later ones."""
+    """Return the results of the match. A child's failure before the first step ends it; the match handles others."""
     playing = asyncio.create_task(match)
     failing = asyncio.create_task(children.first_failure())
     beginning = asyncio.create_task(begun.wait())

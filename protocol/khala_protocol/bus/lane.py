@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Ask = Callable[[Callable[[bool], None]], None]
 
 WINDOW_BYTES = TX_SLOTS // 2 * BATCH_BYTES - BATCH_BYTES // 2
-"""Bytes that surely fit into a queue. A sample that does not fit into the current batch starts the next, so two adjacent
+"""Bytes that surely fit into a queue. A sample that does not fit into the current batch starts the next: two adjacent
 batches hold more than one is large, and all of them more than half; the rest is for the question and for headers."""
 HEADER_BYTES = 200
 SLOW_S = 0.002
@@ -67,7 +67,7 @@ class Lane:
 
 
 class Window:
-    """The gate of puts that BLOCK: open while all bytes that were put and have not arrived would fit into an empty queue.
+    """The gate of puts that BLOCK: open while all bytes that are still on their way would fit into an empty queue.
 
     The kernel's buffers come on top: with them empty, 225 puts of 20 kB went through before the first one blocked; with
     them full, 32. A question that follows a put through the same queue shows that it has arrived.
@@ -87,7 +87,7 @@ class Window:
         with self._lock:
             return self._in_flight + size <= WINDOW_BYTES
 
-    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  the signature of a gate
         """See `Gate`; asks when a quarter of the window is used."""
         with self._lock:
             self._in_flight += size
@@ -112,7 +112,7 @@ class DropGate:
         """See `Gate`."""
         return size <= BATCH_BYTES and not self._slow
 
-    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  the signature of a gate
         """See `Gate`."""
         self._slow = took_s > SLOW_S
 

@@ -144,7 +144,7 @@ class MessageReader:
 
 
 def _end_of(mark: str, *, naked: bool = False) -> re.Pattern[str]:
-    """Return the end of a text that begins with this quote: the quote and `)>`; or another message that begins the same."""
+    """Return the end of a text that begins with this quote: the quote and `)>`, or another message that begins so."""
     family = next((f"[{family}]" for family in _FAMILIES if mark in family), mark)
     end = _END_OF_NAKED if naked else _END_OF_THREE if mark in _RUNS[:3] else _END
     message = _NAKED_MESSAGE if naked else _MESSAGE
