@@ -337,7 +337,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes that the agents are spread over")
     parser.add_argument("--observation-bytes", type=int, default=20_000)
     parser.add_argument("--reply-bytes", type=int, default=2_000)
-    parser.add_argument("--scale", type=float, default=1.0, help="of the number of rounds")
+    parser.add_argument("--scale", type=float, default=1.0, help="factor on the number of rounds")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     parser.add_argument("--process", nargs="+", help=argparse.SUPPRESS)
     arguments = parser.parse_args()

@@ -33,7 +33,7 @@ def main() -> None:
     """Print the table; end with 1 if a package is below the threshold."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("report", type=Path)
-    parser.add_argument("packages", nargs="*", help="those that have to be covered")
+    parser.add_argument("packages", nargs="*", help="packages that have to be covered")
     parser.add_argument("--at-least", type=float, default=0.0, metavar="PER_CENT")
     options = parser.parse_intermixed_args()
     found = by_package(options.report)

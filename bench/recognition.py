@@ -204,7 +204,7 @@ def main() -> None:
     """Print the figures."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    options.add_argument("--misses", action="store_true", help="show what is not read as it is meant")
+    options.add_argument("--misses", action="store_true", help="show replies that are not read as meant")
     chosen = options.parse_args()
     found = scores(list(corpus().items()))
     columns = ("replies", "exact", "meant", "found", "invented", "rejections", "rejected", "not_meant")

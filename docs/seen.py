@@ -41,9 +41,9 @@ PREFACE = """# Four observations, with their pictures
 
 What one agent of each kind is sent at one moment of a game, word for word, with the pictures that the paper gives to
 the kind. `python -m docs.seen` makes this page from two games on the simulator, which the scripted player `skilled`
-plays from these texts alone. How texts are composed is told in [what an agent sees](observation.md), how pictures are
-switched on and what is on them in [images](../how-to/images.md). Sizes are of the bytes that go over the bus; tokens
-are estimates, for Anthropic's and for OpenAI's models.
+plays from these texts alone. [What an agent sees](observation.md) explains how texts are composed,
+[images](../how-to/images.md) how pictures are switched on and what they show. Sizes are of the bytes that go over the
+bus; tokens are estimates, for Anthropic's and for OpenAI's models.
 """
 
 

@@ -43,13 +43,13 @@ def actions(
     race: Annotated[
         Literal["protoss", "terran", "zerg"] | None, typer.Option(help="Only of this race, or of every race.")
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="Only what units of this type can be told.", metavar="TYPE")] = None,
+    unit: Annotated[str | None, typer.Option(help="Only orders for units of this type.", metavar="TYPE")] = None,
     group: Annotated[str | None, typer.Option(help="Only of this group: basic, skill, build, …")] = None,
     name: Annotated[str | None, typer.Option(help="Only with this in the name or an alias.", metavar="TEXT")] = None,
     function: Annotated[
-        str | None, typer.Option(help="Only what ends in this function of PySC2, by name or number.")
+        str | None, typer.Option(help="Only actions that call this function of PySC2, by name or number.")
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All, where else only the groups would be listed.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="List all actions instead of only the groups.")] = False,
     as_json: Json = False,
 ) -> None:
     """List what agents can say, with arguments, meaning and an example call.

@@ -65,17 +65,17 @@ Examples:\n
 Task = Annotated[str, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")]
 Game = Annotated[
     str,
-    typer.Option(help="What plays: simulator, starcraft2 (by SC2PATH), or a directory of either.", metavar="GAME"),
+    typer.Option(help="Game to use: simulator, starcraft2 (at SC2PATH), or a directory of either.", metavar="GAME"),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Of the first episode; each further one adds 1.")]
-Episodes = Annotated[int, typer.Option(min=1, help="How many are played.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; each further one adds 1.")]
+Episodes = Annotated[int, typer.Option(min=1, help="Number of episodes.")]
 RunName = Annotated[
     str | None,
     typer.Option(envvar="KHALA_RUN", help="Name of the run.", show_default="task, time, digits", metavar="NAME"),
 ]
 MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
 StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
-MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after so many steps.")]
+MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after this many steps.")]
 ExecutorName = Annotated[
     str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
 ]
@@ -88,7 +88,7 @@ Images = Annotated[
     ),
 ]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
-Out = Annotated[Path, typer.Option(help="Directory that gets a directory for the run.", metavar="DIR")]
+Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 
 
 def run(
@@ -99,13 +99,13 @@ def run(
     ] = "scripted",
     model_name: Annotated[
         str | None,
-        typer.Option(help="Another model there; scripted has skilled, focus-fire, random-legal, silent."),
+        typer.Option(help="Another model of the endpoint; scripted has skilled, focus-fire, random-legal, silent."),
     ] = None,
     base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
     policy: Annotated[
-        str | None, typer.Option(help="Decide without a model, by your own code.", metavar="MODULE:NAME")
+        str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
     ] = None,
-    budget_usd: Annotated[float | None, typer.Option(min=0, help="What all agents together may spend.")] = None,
+    budget_usd: Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")] = None,
     latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
     game: Game = "simulator",
     seed: Seed = 1,

@@ -68,7 +68,7 @@ class Guard:
         if self._abandoned:
             _, pending = await asyncio.wait(self._abandoned, timeout=timeout_s)
             if pending:
-                log.warning("agent %s: %d decision(s) ignored that they were cancelled", self._agent, len(pending))
+                log.warning("agent %s: %d decision(s) ignored their cancellation", self._agent, len(pending))
 
     def _outcome(self, task: asyncio.Task[Said]) -> Decision:
         if task.cancelled():

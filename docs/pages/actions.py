@@ -53,7 +53,7 @@ def functions() -> str:
         head("Functions", "`khala_bridge.catalogue.coverage`"),
         f"PySC2 has {len(rows)} functions. {len(reached)} can be reached in words. {len(interface)} are those of its "
         f"interface, {len(gone)} belong to what version 4.10 of the game does not have; both are listed first, each "
-        "with the reason. `khala actions --function NAME` tells of one.",
+        "with the reason. `khala actions --function NAME` shows one.",
         table(("kind", "functions", "reached in words", "not"), [*counts, _counts("all", list(rows))]),
         "## Not reached",
         table(("id", "function", "why"), [(r.function.id, code(r.function.name), r.reason) for r in rows if r.reason]),
@@ -69,13 +69,13 @@ def _legend() -> str:
         "* `tag` is a unit's tag as the observation gives it, `screen` a point `[x, y]` of the team's screen, "
         "`minimap` a point of the whole map.\n"
         "* *Who*: unit types of the team; *one unit*: the first tag says which; *the side's*: units of the whole side, "
-        "which the host chooses.\n"
-        "* *Function* is PySC2's, in which both executors end.\n"
-        "* *At once* ones do not wait for the orders that the unit was given earlier in the same reply.\n"
-        "* Whatever a team can be told, one of its units can be told too: `Select_Unit_<name>` with the unit's tag "
+        "chosen by the host.\n"
+        "* *Function* is PySC2's, which both executors call.\n"
+        "* *At once* ones do not wait for the unit's earlier orders in the same reply.\n"
+        "* Every order for a team is also one for a single unit of it: `Select_Unit_<name>` with the unit's tag "
         "before the other arguments, "
-        f"{code(example(catalogue()['Select_Unit_Attack_Minimap']))}. Training and research can be told to one "
-        "structure in the same way. Only those with names or words of their own are listed."
+        f"{code(example(catalogue()['Select_Unit_Attack_Minimap']))}. Training and research can be ordered from one "
+        "structure in the same way. Only those with their own names or words are listed."
     )
 
 

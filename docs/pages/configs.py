@@ -39,7 +39,7 @@ def task_files() -> str:
         "A mistake is reported with file, line and field. A name has 1 to 64 letters, digits, `_`, `.` or `-`.",
         "Of the rules of the clock, `frozen` is the only one that is played so far.",
         *_sections(config.TaskConfig, "##"),
-        "## Which unit answers to whom",
+        "## Which unit belongs to which team",
         _grouping(),
         "## Example",
         *_file(example, "yaml task"),

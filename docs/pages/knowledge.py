@@ -66,15 +66,15 @@ def abilities_page() -> str:
     rest = [ability for ability in special if ability not in (*titled, *makes, *research)]
     return join(
         head("Abilities", SOURCE),
-        f"All {len(known)} abilities that somebody in a melee game has. " + NUMBERS + " Which text actions stand for "
-        "them is told by [actions](actions.md); who is refused one, and why, follows from these facts.",
+        f"All {len(known)} abilities of units in melee games. " + NUMBERS + " The page of [actions](actions.md) lists "
+        "the text actions for them; these facts decide which units are refused one, and why.",
         LOOK_UP.format("Effect_PsiStorm"),
         "## Skills",
         _abilities(titled),
         "## Making units and structures",
         _abilities(makes),
         "## Research",
-        "What each does is told with the [upgrades](upgrades.md).",
+        "The effects are listed with the [upgrades](upgrades.md).",
         _abilities(research),
         "## Other orders",
         _abilities(rest),

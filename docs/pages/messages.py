@@ -23,8 +23,8 @@ def page() -> str:
     """Return the page of keys, messages, their parts, and single words."""
     return join(
         head("Messages", "`protocol/khala_protocol/messages.py` and `protocol/khala_protocol/keys.py`"),
-        "UTF-8 JSON, one object a message, told apart by `kind`. Unknown fields are errors, and so is another major "
-        "version `v`. How they are delivered: [the bus](../design/bus.md).",
+        "UTF-8 JSON, one object per message, distinguished by `kind`. Unknown fields are errors, and so is another "
+        "major version `v`. How they are delivered: [the bus](../design/bus.md).",
         "## Keys",
         _keys(),
         table(("message", "about"), [(f"[{m.__name__}]({anchor(m.__name__)})", _first(m)) for m in MESSAGE_TYPES]),

@@ -24,7 +24,7 @@ Examples:\n
 """
 
 app = typer.Typer(
-    help="What agents are told of unit types, abilities and upgrades: look it up, or make it anew.",
+    help="Look up what agents read about unit types, abilities and upgrades, or rebuild it.",
     no_args_is_help=True,
     add_completion=False,
 )

@@ -19,7 +19,7 @@ from khala_orchestrator.config import all_tasks
 from khala_orchestrator.console import stderr_console
 from khala_protocol.bus.config import BusConfig
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")]
 Listen = Annotated[
     list[str] | None,
     typer.Option(help="Endpoint to listen on; may be given several times.", show_default="tcp/127.0.0.1:7447"),
@@ -90,11 +90,11 @@ def people(names: Sequence[str]) -> str:
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="A recording, such as `khala run` leaves behind.")],
+    file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
     *,
     agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
-    text: Annotated[bool, typer.Option("--text", help="Observations and replies word for word.")] = False,
+    text: Annotated[bool, typer.Option("--text", help="Show observations and replies word for word.")] = False,
     images: Annotated[
         Path | None, typer.Option(help="Write the pictures that agents were shown into this directory.", metavar="DIR")
     ] = None,

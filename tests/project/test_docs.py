@@ -302,7 +302,7 @@ def test_every_page_can_be_found_from_the_map_of_the_documentation() -> None:
 
 
 def test_the_reference_is_up_to_date() -> None:
-    assert outdated() == [], "`make docs` writes these pages anew"
+    assert outdated() == [], "`make docs` writes these pages again"
 
 
 def test_a_page_that_is_old_missing_or_foreign_is_found(tmp_path: Path) -> None:

@@ -277,7 +277,7 @@ class ZenohBus:
         try:
             self._loop.call_soon_threadsafe(action, *args)
         except RuntimeError:
-            log.debug("the loop is closed; %s is not told", action)
+            log.debug("the loop is closed; %s is not called", action)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         peer = str(event.transport.zid)

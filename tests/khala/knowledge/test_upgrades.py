@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
 
 WITHOUT, WITH = 0, 1
-"""Two players, of whom one has the upgrade."""
+"""Two players, one with the upgrade."""
 
 
 def test_prices_times_and_places_are_those_of_the_research(
