@@ -1,10 +1,10 @@
-# Two images from the packages of uv.lock. The first has all of Khala, with the simulator laid out in /opt/StarCraftII;
-# the second has the agents alone, without any game.
+# Two images from the packages of uv.lock. The first has all of Khala, with the simulator in /opt/StarCraftII;
+# the second has only the agents, without any game.
 #
 #     docker build -t khala .                          docker run --rm khala run 2s3z_pair
 #     docker build -t khala-agents --target agents .   docker run --rm khala-agents Stalkers --run first --connect …
 #
-# Any image with Python 3.11, 3.12 or 3.13 and pip on a glibc will do: docker build --build-arg PYTHON_IMAGE=…
+# Any image with Python 3.11, 3.12 or 3.13, pip and glibc works: docker build --build-arg PYTHON_IMAGE=…
 ARG PYTHON_IMAGE=python:3.12-slim
 
 FROM ${PYTHON_IMAGE} AS source

@@ -1,21 +1,21 @@
-# `make demo` and `make test` need Python 3.11 or newer, git and make; they install all else into .venv.
+# `make demo` and `make test` need Python 3.11 or newer, git and make; they install everything else into .venv.
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 PYTHON ?= $(firstword $(foreach p,python3.13 python3.12 python3.11 python3 python,$(shell $(p) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(p))))
 PYTHONS ?= 3.11 3.12 3.13
-# uv from PATH when it is there, else one of our own in .uv
+# uv from PATH if it is there, else our own in .uv
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
-# pytest on every core; PARALLEL= on one
+# pytest on every core; `PARALLEL=` for one core
 PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
-# per cent that `make cover` wants of these packages; COVERED=0 only prints
+# per cent that `make cover` requires of these packages; COVERED=0 only prints
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
 .PHONY: help install check format types test pysc2 slow cover test-all demo bench scenarios docs golden picture clean
 
-help: ## What can be made
+help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 .uv/bin/uv:
@@ -33,7 +33,7 @@ install: .venv/.ready ## Install everything into .venv
 demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
 	$(RUN)khala run 2s3z_pair
 
-test: install ## Lint, types and contracts beside every test that is not long
+test: install ## Lint, types, contracts and every short test
 	@said=$$(mktemp) && trap 'rm -f $$said' EXIT; \
 	$(MAKE) --no-print-directory check >$$said 2>&1 & checks=$$!; \
 	$(RUN)pytest $(PARALLEL); tests=$$?; \
@@ -42,7 +42,7 @@ test: install ## Lint, types and contracts beside every test that is not long
 	[ $$checks = 0 ] || echo "make test: a check failed, it is the last one above"; \
 	[ $$tests = 0 ] && [ $$checks = 0 ]
 
-pysc2: install ## Those of PySC2's own game tests that take long; `make test` runs the others
+pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the others
 	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
 
 slow: install ## All long tests: whole tables, those of PySC2, random agents, long games, every scenario
@@ -59,7 +59,7 @@ check: install ## Lint, format, types and import contracts
 	$(RUN)mypy
 	$(RUN)lint-imports --no-logo
 
-format: install ## Format the code and mend what the linter can
+format: install ## Format the code and fix what the linter can
 	$(RUN)ruff format .
 	$(RUN)ruff check --fix .
 
@@ -83,7 +83,7 @@ docs: install ## Write the generated pages of docs/reference, and build the site
 	$(UV) sync --quiet --frozen --group docs
 	NO_MKDOCS_2_WARNING=1 $(RUN)mkdocs build --strict --quiet
 
-golden: install ## Record the battle anew that the tests replay, after a change that was meant
+golden: install ## Record the tests' battle again, after an intended change
 	rm -rf runs/golden
 	$(RUN)khala run 2s3z_pair --run golden --latency 0
 	cp runs/golden/recording.mcap tests/khala/golden.mcap

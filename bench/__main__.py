@@ -1,7 +1,7 @@
-"""Measure what docs/measurements.md claims: `python -m bench` runs all, `python -m bench turn bus` some of it.
+"""Measure what the README claims: `python -m bench` runs every measurement, `python -m bench turn bus` some of them.
 
-Each is a module of its own with options of its own, see `python -m bench.turn --help`. They take minutes, one after
-the other: on a machine that does nothing else the figures mean most.
+Each is a module with its own options, see `python -m bench.turn --help`. They take minutes, one after
+the other: the figures are most reliable on an otherwise idle machine.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MEASUREMENTS = (
 
 
 def main() -> None:
-    """Runs the measurements that are named, or all."""
+    """Run the measurements that are named, or all."""
     wanted = sys.argv[1:] or MEASUREMENTS
     if unknown := [name for name in wanted if name not in MEASUREMENTS]:
         raise SystemExit(f"there is no measurement {unknown[0]!r}; there are {', '.join(MEASUREMENTS)}")

@@ -1,11 +1,11 @@
-"""Asks a game what its units can do, as every observation does, and says how long that takes.
+"""Ask a game what its units can do, as every observation does, and measure how long that takes.
 
     python bench/abilities.py            a table
     python bench/abilities.py --json     one JSON object on stdout
 
-The simulator runs as a process of its own, and PySC2 asks it over its websocket, as in a match: the base and the
-workers that a game of Simple64 begins with, and 30 and 100 units of sixteen types beside them. The time is that of
-the question, its way, its answer, and of reading it into a snapshot.
+The simulator runs in its own process, and PySC2 asks it over its websocket, as in a match: the base and the
+workers that a game of Simple64 begins with, plus 30 and 100 units of sixteen types. The time is that of
+the question, its transport, its answer, and of reading it into a snapshot.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ROUNDS = 100
 
 
 def measure(sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
-    """One row for each number of units besides those that a game begins with."""
+    """Return one row for each number of units added to those that a game begins with."""
     with tempfile.TemporaryDirectory() as directory:
         game = PySC2Game(GameConfig(sc2path=install(Path(directory) / "sc2"), map=known_maps()["Simple64"], seed=1))
         try:
@@ -77,7 +77,7 @@ def _with_army(game: PySC2Game, size: int) -> Snapshot:
 
 
 def main() -> None:
-    """Prints the measurements."""
+    """Print the measurements."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     arguments = parser.parse_args()

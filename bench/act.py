@@ -1,13 +1,13 @@
-"""Makes commands of replies of about 2 kB, and says how long it takes from the text to the checked commands.
+"""Make commands of replies of about 2 kB, and measure the time from the text to the checked commands.
 
     python -m bench.act            a table
     python -m bench.act --json     one JSON object on stdout
 
-One agent has five teams of four units and may say every text action of the catalogue, those of other races among them.
-The game has told what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands: names,
-teams and arguments, who may do it now, at what, and the accounts of the turn. `wrong` is a reply of the same length of
-which two calls of three are refused, with what it takes to say what was most likely meant. The times are of the
-processor: nothing is waited for here, and other programs disturb them less.
+One agent has five teams of four units and may use every text action of the catalogue, including other races'.
+The game has reported what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:
+names, teams and arguments, who may do it now, at what, and the accounts of the turn. `wrong` is a reply of the same
+length with two of three calls refused, including the search for what was most likely meant. The times are of the
+processor: nothing waits here, and other programs disturb them less.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ ROUNDS = 300
 
 
 def scene() -> tuple[Actor, Any]:
-    """An actor, and what its agent sees."""
+    """Return an actor, and what its agent sees."""
     actions = [action for action in catalogue().values() if action.subject != "side"]
     base = tuple(action.name for action in catalogue().values() if action.subject == "side")
     agent = AgentConfig.model_validate(
@@ -63,7 +63,7 @@ def scene() -> tuple[Actor, Any]:
 
 
 def snapshot() -> Snapshot:
-    """Five teams of four, and forty enemies around them."""
+    """Return a snapshot of five teams of four, and forty enemies around them."""
     response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
     units = response.observation.raw_data.units
     own = [name for name in TEAMS for _ in range(UNITS_PER_TEAM)]
@@ -87,18 +87,18 @@ def snapshot() -> Snapshot:
 
 
 def every_form(unit_type: str) -> frozenset[int]:
-    """All abilities of a type, as themselves and in their general form."""
+    """Return all abilities of a type, as themselves and in their general form."""
     known = knowledge()[unit_type].ability_ids
     return frozenset((*known, *map(general, known)))
 
 
 def tag_of(index: int) -> int:
-    """Tag of the unit of this number, as the game forms them."""
+    """Return the tag of the unit of this number, as the game forms them."""
     return (index << 18) + 1
 
 
 def reply(calls: tuple[str, ...]) -> str:
-    """What an agent says: an analysis, then three calls for each team."""
+    """Return an agent's reply: an analysis, then three calls for each team."""
     thoughts = "the Roaches come nearer and their first row is hurt, so all teams take it down. "
     lines = ["Analysis: " + thoughts * 14, "Actions:"]
     for place, name in enumerate(TEAMS):
@@ -109,7 +109,7 @@ def reply(calls: tuple[str, ...]) -> str:
 
 
 def measure(calls: tuple[str, ...]) -> dict[str, Any]:
-    """Figures of one kind of reply."""
+    """Return the figures of one kind of reply."""
     actor, sight = scene()
     text = reply(calls)
     read_ms, check_ms = [], []
@@ -135,7 +135,7 @@ def measure(calls: tuple[str, ...]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Prints the figures."""
+    """Print the figures."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     results = {"right": measure(CALLS), "wrong": measure(WRONG)}

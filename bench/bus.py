@@ -3,12 +3,12 @@
     python bench/bus.py                      a table
     python bench/bus.py --json               one JSON object on stdout
 
-Compared are, in turns of a few rounds so that a noisy machine treats them alike:
+It compares, in turns of a few rounds so that a noisy machine treats them the same:
     bus    `khala_protocol.bus`: observations as STATE, replies as SPEECH
     raw    Zenoh in asyncio: plain publishers, direct callbacks, a queue filled by `call_soon_threadsafe`
     bare   Zenoh without asyncio: the agent answers inside its callback, the host waits on a thread's event
 with the host itself as the router, and with a router process between them. Agents are spread over worker processes, one
-session each, over TCP on this machine. No codec and no work are in it: it is what the bus costs.
+session each, over TCP on this machine. Without codec and work, it measures the cost of the bus alone.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ TURN_ROUNDS = 10
 WARM_UP_ROUNDS = 10
 TIMEOUT_S = 60.0
 HEAD_BYTES = 8
-BLOCK = zenoh.CongestionControl.BLOCK  # raw publishers have no cache to make good what DROP loses
+BLOCK = zenoh.CongestionControl.BLOCK  # raw publishers have no cache to repair losses of DROP
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,14 @@ def reply_key(agent: int) -> str:
 
 
 def open_raw(config: BusConfig) -> zenoh.Session:
-    """Zenoh with the same transport as the bus has."""
+    """Open Zenoh with the same transport as the bus has."""
     zenoh_config = zenoh.Config()
     for path, value in settings(config).items():
         zenoh_config.insert_json5(path, json.dumps(value))
     return zenoh.open(zenoh_config)
 
 
-# --- agents, in processes of their own ---------------------------------------------------------------
+# --- agents, in their own processes ------------------------------------------------------------------
 
 
 async def work_bus(endpoint: str, agents: range, size: int) -> None:
@@ -117,7 +117,7 @@ async def work_bare(endpoint: str, agents: range, size: int) -> None:
 
 
 def barrier(count: int) -> Any:
-    """Says on stdout that all are ready, when called `count` times."""
+    """Print on stdout that all are ready, when called `count` times."""
     calls = iter(range(count - 1))
 
     def ready() -> None:
@@ -131,18 +131,18 @@ def barrier(count: int) -> Any:
 
 
 class Host(Protocol):
-    """Plays rounds with its agents; `endpoint` is where they connect to."""
+    """Play rounds with its agents; `endpoint` is where they connect to."""
 
     endpoint: str
 
     async def open(self, config: BusConfig, agents: int, sizes: Sizes) -> None:
-        """Declares everything."""
+        """Declare everything."""
 
     async def play(self, number: int) -> None:
-        """One round: all observations out, all replies in."""
+        """Play one round: all observations out, all replies in."""
 
     async def close(self) -> None:
-        """Closes the session."""
+        """Close the session."""
 
 
 class BusHost(Host):
@@ -213,12 +213,12 @@ class BareHost(RawHost):
         self.head, self.missing = number.to_bytes(HEAD_BYTES), len(self.publishers)
         for publisher in self.publishers:
             publisher.put(self.head + self.body)
-        if not self.done.wait(1.0):  # blocking is what is measured here
+        if not self.done.wait(1.0):  # the measured behaviour: blocking
             raise TimeoutError
 
 
 def locator(session: zenoh.Session) -> str:
-    """The endpoint behind port 0."""
+    """Return the endpoint behind port 0."""
     reply = next(iter(session.get(f"@/{session.zid()}/router", timeout=1.0)))
     assert reply.ok is not None
     return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
@@ -232,7 +232,7 @@ WORKERS = {"bus": work_bus, "raw": work_raw, "bare": work_bare}
 
 
 async def measure(agents: int, *, separate: bool, workers: int, sizes: Sizes, rounds: int) -> dict[str, list[float]]:
-    """Milliseconds of each round, by kind."""
+    """Return the milliseconds of each round, by kind."""
     async with AsyncExitStack() as stack:
         hosts: dict[str, Host] = {}
         for kind, make in HOSTS.items():
@@ -260,7 +260,7 @@ async def play(host: Host, number: int) -> float:
 
 
 async def warm_up(host: Host) -> None:
-    """Plays until every subscription is known everywhere: the first samples of raw publishers get lost."""
+    """Play until every subscription is known everywhere: the first samples of raw publishers get lost."""
     done = 0
     while done < WARM_UP_ROUNDS:
         try:
@@ -272,7 +272,7 @@ async def warm_up(host: Host) -> None:
 
 
 async def start(stack: AsyncExitStack, *arguments: str) -> str:
-    """Starts this file as another process; returns its first line."""
+    """Start this file as another process; return its first line."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, __file__, "--process", *arguments, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
     )
@@ -337,7 +337,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes that the agents are spread over")
     parser.add_argument("--observation-bytes", type=int, default=20_000)
     parser.add_argument("--reply-bytes", type=int, default=2_000)
-    parser.add_argument("--scale", type=float, default=1.0, help="of the number of rounds")
+    parser.add_argument("--scale", type=float, default=1.0, help="factor on the number of rounds")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     parser.add_argument("--process", nargs="+", help=argparse.SUPPRESS)
     arguments = parser.parse_args()

@@ -1,7 +1,7 @@
 """Coverage per package as a small table: `python -m bench.coverage .coverage.json --at-least 90 protocol agents`.
 
-Reads the JSON report of coverage.py; `make cover` makes and shows it. A package's figure is the share of its lines and
-of its branches together, as coverage.py counts them. Fails if a named package has less than it should.
+It reads the JSON report of coverage.py; `make cover` makes and shows it. A package's figure is the share of its lines
+and of its branches together, as coverage.py counts them. It fails if a named package has less than it should.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ COUNTED = ("num_statements", "covered_lines", "num_branches", "covered_branches"
 
 
 def by_package(report: Path) -> dict[str, Counter[str]]:
-    """What was counted in the files of each package."""
+    """Return the counts of the files of each package."""
     found: dict[str, Counter[str]] = {}
     for name, file in json.loads(report.read_text(encoding="utf-8"))["files"].items():
         counts = {count: file["summary"][count] for count in COUNTED}
@@ -24,16 +24,16 @@ def by_package(report: Path) -> dict[str, Counter[str]]:
 
 
 def share(counts: Counter[str]) -> float:
-    """Per cent of lines and branches."""
+    """Return the per cent of lines and branches."""
     there = counts["num_statements"] + counts["num_branches"]
     return 100 * (counts["covered_lines"] + counts["covered_branches"]) / there if there else 100.0
 
 
 def main() -> None:
-    """Prints the table; ends with 1 if a package is below the threshold."""
+    """Print the table; end with 1 if a package is below the threshold."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("report", type=Path)
-    parser.add_argument("packages", nargs="*", help="those that have to be covered")
+    parser.add_argument("packages", nargs="*", help="packages that have to be covered")
     parser.add_argument("--at-least", type=float, default=0.0, metavar="PER_CENT")
     options = parser.parse_intermixed_args()
     found = by_package(options.report)

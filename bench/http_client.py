@@ -1,9 +1,9 @@
-"""What a request to a model costs this machine: many at once on one loop, each over a client of its own.
+"""The cost of a request to a model on this machine: many at once on one loop, each over its own client.
 
     python bench/http_client.py                 a table
     python bench/http_client.py --json          one JSON object on stdout
 
-The endpoint is `khala llm` in a process of its own, on the same cores. Compared are a plain `httpx.AsyncClient`, one
+The endpoint is `khala llm` in its own process, on the same cores. It compares a plain `httpx.AsyncClient`, one
 over the transport that agents use, and an agent's whole client (prompt to bytes, bytes to completion). Medians of the
 rounds after the first; CPU time is that of this process alone.
 """

@@ -1,13 +1,13 @@
-"""Draws pictures of battles on the simulator and says what one costs, from a snapshot to bytes.
+"""Draw pictures of battles on the simulator, and measure the cost of one, from a snapshot to bytes.
 
     python -m bench.image            a table
     python -m bench.image --json     one JSON object on stdout
 
 A game is played for 40 decisions, all units attacking; then each picture is made of each of its snapshots, 512 pixels
-large, with marks. `ms` is the median and `p95 ms` the 95th percentile of the time until one is there, with everything
-that is new in a snapshot, and `cpu ms` the median of what the thread worked for it, which says more on a machine that
-has other things to do. `first ms` is the first one of the map, whose ground is painted once. `units` are those on the
-screen at most. The aim is 5 ms.
+large, with marks. `ms` is the median and `p95 ms` the 95th percentile of the time for one picture, with everything
+that is new in a snapshot. `cpu ms` is the median of the thread's processor time, which is more reliable on a busy
+machine. `first ms` is the first one of the map, whose ground is painted once. `units` is the largest number on the
+screen. The aim is 5 ms.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ ATTACK = 3674
 
 
 def play(map_name: str) -> list[Snapshot]:
-    """A game, decision by decision: everybody attacks where the enemies are."""
+    """Play a game in which all units attack the enemies, and return a snapshot per decision."""
     client = Client()
     seen = client.play(map_name, interface(), seed=1)
     info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info)
@@ -64,7 +64,7 @@ def play(map_name: str) -> list[Snapshot]:
 
 
 def task_of(shown: Snapshot, spec: ImageSpec) -> TaskConfig:
-    """One agent with all units that fight, and one picture."""
+    """Return a task with one agent of all units that fight, and one picture."""
     types = tuple(dict.fromkeys(unit_name(unit.unit_type) for unit in shown.own))
     moves = {name: ("Move_Screen",) for name in types if catalogue()["Move_Screen"].fits(name)}
     team = TeamConfig(name="A", unit_types=tuple(moves), kind="select_all_type")

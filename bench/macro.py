@@ -1,10 +1,10 @@
-"""Asks the rules of `khala_bridge.auto` in the middle of a game on the simulator and says what an answer costs.
+"""Ask the rules of `khala_bridge.auto` in the middle of a game on the simulator, and measure the cost of an answer.
 
     python -m bench.macro            a table
     python -m bench.macro --json     one JSON object on stdout
 
-A base, an army of 40 and an enemy are put on the map of a melee game. Every action is asked 40 times with a snapshot of
-its own (`new ms`: the land of that moment is made first) and once more with the same one (`ms`). Medians of the
+A base, an army of 40 and an enemy are put on the map of a melee game. Every action is asked 40 times with its own
+snapshot (`new ms`: the land of that moment is made first) and once more with the same one (`ms`). Medians of the
 processor's time, so that a busy machine does not count. The aim is 1 ms.
 """
 
@@ -44,7 +44,7 @@ TIMES = 40
 
 
 def scene(map_name: str) -> Snapshot:
-    """The middle of a game, all of it paid for."""
+    """Return the middle of a game, in which everything can be paid."""
     client = Client()
     client.play(map_name, interface(screen=0), seed=1)
     info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info)
@@ -67,7 +67,7 @@ def look(client: Client, info: EpisodeInfo) -> Snapshot:
 
 
 def ask(action: str, snapshot: Snapshot) -> tuple[float, str]:
-    """What an answer took, in milliseconds, and whether it was orders."""
+    """Return the time of an answer, in milliseconds, and whether it was orders."""
     found = catalogue()[action]
     assert found.rule is not None
     asked = RuleRequest(found, snapshot, ledger_of(snapshot))

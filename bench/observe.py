@@ -1,4 +1,4 @@
-"""Makes observations and joint actions of armies, and says what a turn costs between PySC2 and the bus.
+"""Make observations and joint actions of armies, and measure the cost of a turn between PySC2 and the bus.
 
     python bench/observe.py            a table
     python bench/observe.py --json     one JSON object on stdout
@@ -8,7 +8,7 @@ teams, half of them hurt since the turn before. `act` is everything from the tex
 each team, to commands. No game runs; the snapshots are made here.
 
 The last rows are a full game's twelve agents with 15 teams and 100 units, half of them enemies: in one place, where
-every team sees all of them, and at four places, which is what a fight of many fronts looks like. The aim is 8 ms.
+every team sees all of them, and at four places, as in a fight of many fronts. The aim is 8 ms.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def messages(
 
 
 def full_game() -> TaskConfig:
-    """The agents of a full game with standard control: Commander, Developer and ten combat groups."""
+    """Return the agents of a full game with standard control: Commander, Developer and ten combat groups."""
     leaders = [
         AgentConfig(name=name, role=name, kind=kind, teams=(TeamConfig(name="Empty", kind="side", actions=actions),))
         for name, kind, actions in (
@@ -123,7 +123,7 @@ def full_game() -> TaskConfig:
 
 
 def crowd(places: int, loop: int) -> Snapshot:
-    """100 units at some places, those of a type spread over all of them, with the abilities that they would have."""
+    """Return 100 units at some places, those of a type spread over all of them, with their usual abilities."""
     response, info = messages(*FULL_GAME, loop, size=128)
     for index, unit in enumerate(response.observation.raw_data.units):
         place = index % places
@@ -135,7 +135,7 @@ def crowd(places: int, loop: int) -> Snapshot:
 
 
 def measure_full_game(places: int) -> dict[str, Any]:
-    """What one observation of all twelve agents costs."""
+    """Return the cost of one observation of all twelve agents."""
     observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
     observe_ms = []
     sight = observer.observe(snapshots[1])

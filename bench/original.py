@@ -1,8 +1,8 @@
-"""How the first implementation asks its agents, as a stand-in to compare with: threads that poll.
+"""How the first implementation asks its agents, as a baseline: threads that poll.
 
-It starts a thread per agent; in it, a second thread makes a blocking HTTP request, and its result is looked for
+It starts a thread per agent; in it, a second thread makes a blocking HTTP request, and the first looks for its result
 every 50 ms (the original: every 100 ms). The main loop looks for finished agents every millisecond. No bus, no
-other process: what this costs is what threads and polling cost. What agents see and what their words do is ours.
+other process: it measures the cost of threads and polling. Observations and the handling of replies are ours.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ HOST_POLL_S = 0.001
 
 
 class _Agent:
-    """One agent of the original: a flag that says whether it waits, and a text that appears some day."""
+    """One agent of the original: a flag that says whether it waits, and a text that appears at some time."""
 
     def __init__(self, base_url: str, model: str) -> None:
         self._url = urlsplit(base_url)
@@ -53,13 +53,13 @@ class _Agent:
 def step_s(
     base_url: str, model: str, build: Callable[[], Iterable[str]], act: Callable[[list[str]], object], steps: int
 ) -> list[float]:
-    """Wall time of each step, in seconds.
+    """Return the wall time of each step, in seconds.
 
     Args:
         base_url: of the endpoint.
         model: its model.
         build: makes the text of one agent after the other, as the original does before it starts the agent's thread.
-        act: takes all replies.
+        act: gets all replies.
         steps: how many to measure.
     """
     agents: list[_Agent] = []

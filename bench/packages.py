@@ -1,4 +1,4 @@
-"""What an installation of each part takes: megabytes and packages, from wheels, in fresh environments.
+"""The size of an installation of each part: megabytes and packages, from wheels, in fresh environments.
 
     python -m bench.packages
 
@@ -19,12 +19,12 @@ PARTS = {"agents only": "khala-agents", "simulator only": "khala-simulator", "ev
 
 
 def run(*command: object, cwd: Path) -> str:
-    """What a command prints."""
+    """Return the output of a command."""
     return subprocess.run([*map(str, command)], check=True, capture_output=True, text=True, cwd=cwd).stdout
 
 
 def measure(distribution: str, wheels: Path, directory: Path) -> tuple[float, list[str]]:
-    """Megabytes and names of all that one distribution brings."""
+    """Return the megabytes and names of everything that one distribution brings."""
     target = directory / distribution
     run(UV, "venv", "--quiet", "--python", sys.executable, target, cwd=directory)
     run(UV, "pip", "install", "--quiet", "--python", target, "--find-links", wheels, distribution, cwd=directory)
@@ -35,7 +35,7 @@ def measure(distribution: str, wheels: Path, directory: Path) -> tuple[float, li
 
 
 def main() -> None:
-    """Build the wheels, install each part, and print what came."""
+    """Build the wheels, install each part, and print the sizes."""
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         run(UV, "build", "--quiet", "--all-packages", "--wheel", "--out-dir", directory / "wheels", cwd=ROOT)

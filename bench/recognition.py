@@ -1,13 +1,13 @@
-"""Reads the corpus of replies and says how much of what they mean is understood.
+"""Read the corpus of replies, and measure how much of their meaning is understood.
 
     python -m bench.recognition            a table
     python -m bench.recognition --misses   and every reply that is not read as a person would read it
     python -m bench.recognition --json     one JSON object on stdout
 
 The corpus (`tests/bridge/corpus/*.yaml`) holds replies as models write them, and what a reasonable person would
-understand: calls with team, name and arguments, messages, channels, and what has to be said back. It was written by
+understand: calls with team, name and arguments, messages, channels, and the rejections. It was written by
 hand, before the reader was measured with it. `found` is the share of the meant calls and words that are read exactly;
-`invented` is what was read and not meant, calls that are only mentioned, negated or taken back among it.
+`invented` is what was read and not meant, including calls that are only mentioned, negated or taken back.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ BLINKS = ("Ability_Blink_Screen", "Select_Unit_Blink_Screen")
 
 
 class Entry(BaseModel):
-    """One reply, and what it means."""
+    """One reply, and its meaning."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -74,12 +74,12 @@ class Entry(BaseModel):
     rejections: tuple[str, ...] = ()
     """Reason and words: `malformed <Stop(`."""
     not_meant: tuple[str, ...] = ()
-    """What stands there and nobody wants to be done."""
+    """Calls in the text that are not orders."""
 
 
 @dataclass
 class Reading:
-    """What was made of a reply."""
+    """The reader's result for a reply."""
 
     calls: list[str]
     messages: list[str]
@@ -97,7 +97,7 @@ class Score:
     found: int = 0
     invented: int = 0
     rejections: int = 0
-    """Things that have to be said back."""
+    """Rejections that the replies require."""
     rejected: int = 0
     exact: int = 0
     """Replies that are read exactly as they are meant, with the right rejections."""
@@ -105,7 +105,7 @@ class Score:
     misses: list[str] = field(default_factory=list)
 
     def add(self, entry: Entry, reading: Reading) -> None:
-        """Counts one reply."""
+        """Count one reply."""
         self.replies += 1
         self.not_meant += len(entry.not_meant)
         pairs = (entry.calls, reading.calls), (entry.messages, reading.messages), (entry.listens, reading.listens)
@@ -126,7 +126,7 @@ class Score:
 
 
 def corpus() -> dict[str, list[Entry]]:
-    """The replies by the name of their file."""
+    """Return the replies by the name of their file."""
     return {
         file.stem: [Entry.model_validate(entry) for entry in yaml.safe_load(file.read_text("utf-8"))]
         for file in sorted(CORPUS.glob("*.yaml"))
@@ -134,7 +134,7 @@ def corpus() -> dict[str, list[Entry]]:
 
 
 def read(entry: Entry) -> Reading:
-    """What a reply is taken to mean."""
+    """Return the reader's result for a reply."""
     actor, sight = _scene(entry.roster)
     speech = parse(entry.reply)
     joint = actor.joint(sight, {AGENT: speech})
@@ -147,7 +147,7 @@ def read(entry: Entry) -> Reading:
 
 
 def scores(files: Iterable[tuple[str, list[Entry]]]) -> dict[str, Score]:
-    """How well the replies of each file were read."""
+    """Return how well the replies of each file were read."""
     found = {name: Score() for name, _ in files}
     for name, entries in files:
         for entry in entries:
@@ -201,10 +201,10 @@ def _snapshot() -> Snapshot:
 
 
 def main() -> None:
-    """Prints the figures."""
+    """Print the figures."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    options.add_argument("--misses", action="store_true", help="show what is not read as it is meant")
+    options.add_argument("--misses", action="store_true", help="show replies that are not read as meant")
     chosen = options.parse_args()
     found = scores(list(corpus().items()))
     columns = ("replies", "exact", "meant", "found", "invented", "rejections", "rejected", "not_meant")

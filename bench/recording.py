@@ -1,11 +1,11 @@
-"""Writes and reads a recording of a match of eight agents, and says what that costs.
+"""Write and read a recording of a match of eight agents, and measure the cost.
 
     python bench/recording.py            a table
     python bench/recording.py --json     one JSON object on stdout
 
-A step is what an agent's turn leaves behind, times eight: an observation (about 20 kB of text, 40 kB with its
+A step is the traffic of an agent's turn, times eight: an observation (about 20 kB of text, 40 kB with its
 view), an exchange with the model (the same text again, and the completion), a reply; then one report and a
-flush. The texts are words drawn anew for each step, which zstd compresses about as well as real observations;
+flush. The texts are words drawn again for each step, which zstd compresses about as well as real observations;
 views repeat their field names and compress better.
 """
 

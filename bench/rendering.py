@@ -1,10 +1,10 @@
-"""What rendered images cost: milliseconds of CPU per frame of the screen and of the minimap, while two armies fight.
+"""The cost of rendered images: milliseconds of CPU per frame of the screen and of the minimap, while two armies fight.
 
     python -m bench.rendering                a table
     python -m bench.rendering --json         one JSON object on stdout
 
 Two armies of several types meet in the middle of an open map, all of them in the camera's view; each loop is painted.
-The first frame, in which the ground and every look are painted for the first time, is told apart.
+The first frame, in which the ground and every look are painted for the first time, is reported separately.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ ARMY = ("Marine", "Marauder", "Stalker", "Zealot", "Roach", "Zergling", "Hydrali
 
 
 def stage(screen: int, units: int) -> tuple[HostedGame, PlayerSeat]:
-    """A game in which `units` units face each other in view."""
+    """Return a game in which `units` units face each other in view."""
     players = (sc.PlayerSetup(type=sc.Participant, race=common_pb2.Protoss), sc.PlayerSetup(type=sc.Computer))
     game = HostedGame(
         Setup(load_map("llm_smac/3s_vs_3z"), b"", "bench", players, 1, disable_fog=False, realtime=False), "4.10"
@@ -56,14 +56,14 @@ def stage(screen: int, units: int) -> tuple[HostedGame, PlayerSeat]:
 
 
 def frame(game: HostedGame, seat: PlayerSeat) -> Frame:
-    """What the seat is to be shown now."""
+    """Return what the seat sees now."""
     sight = seat.look()
     chosen = seat.selection.rows(sight)
     return Frame(game.world, game.types, 1, sight, chosen, seat.camera, sight.pos[:0], game.world.fog)
 
 
 def measure(screen: int, units: int) -> dict[str, float]:
-    """Milliseconds of CPU per frame."""
+    """Return the milliseconds of CPU per frame."""
     game, seat = stage(screen, units)
     assert seat.renders is not None
     spent: dict[str, list[float]] = {"screen": [], "minimap": []}
@@ -89,7 +89,7 @@ def measure(screen: int, units: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Prints the figures."""
+    """Print the figures."""
     parser = argparse.ArgumentParser(description="Measure rendered images.")
     parser.add_argument("--units", type=int, default=80, help="units at the start; some die")
     parser.add_argument("--json", action="store_true")

@@ -1,12 +1,12 @@
-"""Plays every scenario of the paper with scripted players, through `khala run`, and says what came of it.
+"""Play every scenario of the paper with scripted players, through `khala run`, and tabulate the results.
 
     python -m bench.scenarios                              all 33 maps, skilled and focus-fire, one episode each
     python -m bench.scenarios --tasks 'pvz_task1*' --episodes 5 --players skilled
     python -m bench.scenarios --json                       one JSON object on stdout
 
 Host, agents and the scripted model are processes that talk over the bus, as in any other run. The table goes to
-`<out>/scenarios.md` as well, a recording of every run lies beside it. The end code is 1 if a run failed, or if a player
-said something that is no action (class `malformed` or `unknown_action`): a scripted player reads its actions.
+`<out>/scenarios.md` as well, with a recording of every run next to it. The exit code is 1 if a run failed, or if a
+player's reply had no valid action (class `malformed` or `unknown_action`): a scripted player reads its actions.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
 PLAYERS = ("skilled", "focus-fire")
 FAMILIES = ("llm_smac/", "llm_pysc2/pvz_")
-"""Where the paper's 33 maps are."""
+"""The directory of the paper's 33 maps."""
 SHAME = ("malformed", "unknown_action")
 COLUMNS = ("task", "player", "won", "drawn", "lost", "KD", "steps", "accepted", "rejections", "wall s", "recording")
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What a player made of a task in some episodes."""
+    """The results of a player in some episodes of a task."""
 
     task: str
     player: str
@@ -49,11 +49,11 @@ class Row:
     wall_s: float = 0.0
     recording: str = ""
     fault: str = ""
-    """What the run ended with, if it failed."""
+    """The error of the run, if it failed."""
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The row as it is printed."""
+        """The printed cells of the row."""
         if self.fault:
             return (self.task, self.player, *["-"] * 7, f"{self.wall_s:.0f}", self.fault)
         count = sum(self.outcomes.values())
@@ -65,13 +65,13 @@ class Row:
 
 
 def scenarios(pattern: str = "*") -> list[str]:
-    """Names of the tasks of the paper's maps that fit a pattern, maps in the order of their names."""
+    """Return the names of the tasks of the paper's maps that fit a pattern, maps in the order of their names."""
     found = (task for task in all_tasks() if task.map == task.name and task.map_spec.file.startswith(FAMILIES))
     return sorted(task.name for task in found if fnmatch.fnmatch(task.name, pattern))
 
 
 def play(task: str, player: str, *, episodes: int, seed: int, out: Path) -> Row:
-    """One run of a task with a scripted player; a run that fails is a row that says so."""
+    """Run a task with a scripted player and return its row; the row of a run that fails says so."""
     command = [sys.executable, "-m", "khala", "run", task, "--model-name", player, "--latency", "0", "--json"]
     command += ["--episodes", str(episodes), "--seed", str(seed), "--out", str(out), "--max-wait", "60"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -95,19 +95,19 @@ def play(task: str, player: str, *, episodes: int, seed: int, out: Path) -> Row:
 
 
 def table(rows: Iterable[Row]) -> Iterator[str]:
-    """The rows as lines of a Markdown table."""
+    """Yield the rows as lines of a Markdown table."""
     yield f"| {' | '.join(COLUMNS)} |"
     yield f"|{'---|' * len(COLUMNS)}"
     yield from (f"| {' | '.join(row.cells)} |" for row in rows)
 
 
 def main() -> int:
-    """Plays what the options name; prints and writes the table."""
+    """Play the tasks that the options name; print and write the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--tasks", default="*", metavar="PATTERN", help="only tasks whose names fit, such as 'pvz_*'")
     options.add_argument("--players", default=",".join(PLAYERS), help="scripted players, with commas between them")
-    options.add_argument("--episodes", type=int, default=1, help="of each task, with seeds one after the other")
-    options.add_argument("--seed", type=int, default=1, help="of the first episode")
+    options.add_argument("--episodes", type=int, default=1, help="episodes of each task, with consecutive seeds")
+    options.add_argument("--seed", type=int, default=1, help="seed of the first episode")
     options.add_argument("--out", type=Path, default=Path("runs/scenarios"), help="directory for table and recordings")
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = options.parse_args()

@@ -1,8 +1,8 @@
 """How many game loops per second the simulator's engine plays, without the SC2 API around it.
 
 Some shipped maps are played with both sides on attack-move, restarted with the next seed when they end; then armies of
-10 to 400 units meet on an open map, which shows how the cost grows: `us per unit` is the time of a loop by the units
-that live in it, in the mean. `MB` is what the process holds at the end of a row. Run
+10 to 400 units meet on an open map, which shows how the cost grows: `us per unit` is the mean time of a loop per
+unit alive in it. `MB` is the memory of the process at the end of a row. Run
 ``python -m bench.simulator_engine``, with ``--json`` for one JSON object.
 """
 
@@ -39,7 +39,7 @@ MAPS = (
 
 
 def battle(name: str, seed: int) -> World:
-    """A game on a shipped map in which player 1 attacks too."""
+    """Return a game on a shipped map in which player 1 attacks too."""
     world = new_game(load_map(name), seed=seed)
     x, y = world.pos[world.units_of(2)].mean(axis=0)
     commands.attack_move(world, world.units_of(1).tolist(), (float(x), float(y)))
@@ -47,7 +47,7 @@ def battle(name: str, seed: int) -> World:
 
 
 def armies(units: int, seed: int) -> World:
-    """Two armies of Marines, Zealots and Stalkers on an open map, each on attack-move to the other's place."""
+    """Return two armies of Marines, Zealots and Stalkers on an open map, each on attack-move to the other's place."""
     field = load_map("llm_smac/3s_vs_3z")
     world = World(field, players_of(field), seed=seed)  # without the map's own script, which would end it
     homes = {1: (9.0, 16.0), 2: (23.0, 16.0)}
@@ -64,7 +64,7 @@ def armies(units: int, seed: int) -> World:
 
 
 def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440) -> dict[str, float]:
-    """Play fresh games until enough CPU time is used; the making of worlds is timed apart."""
+    """Play fresh games until enough CPU time is used; the making of worlds is timed separately."""
     loops = seed = lived = 0
     playing = making = 0.0
     units: list[int] = []
@@ -93,7 +93,7 @@ def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440)
 
 
 def resident_mb() -> float:
-    """Resident memory of this process."""
+    """Return the resident memory of this process."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 

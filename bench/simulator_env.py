@@ -1,16 +1,16 @@
-"""Plays battles on the simulator through PySC2, and says what a step costs and who spends it.
+"""Play battles on the simulator through PySC2, and measure the cost of a step and of its parts.
 
     python -m bench.simulator_env                     a table
     python -m bench.simulator_env --json              one JSON object on stdout
     python -m bench.simulator_env layers:2s3z:8       one row: interface, map and game loops per step
 
 With `layers` it is `SC2Env` with feature layers of 128 and 64 pixels, raw units and feature units, as LLM-PySC2 plays.
-With `raw` it is PySC2's controller with the raw interface alone, as SMAC plays; what SMAC then makes of the units is
-its own. Every step all own units are told to attack the first enemy, and a new episode begins when one ends (not
+With `raw` it is PySC2's controller with the raw interface alone, as SMAC plays; SMAC's own work on the units is not
+included. In every step all own units attack the first enemy, and a new episode begins when one ends (not
 counted). The parts of the server are measured in this process on the same battle: `tick` is the loops, `observe` the
 observation as bytes, `act` the action. The rest is the client: parsing, PySC2's own transformation, and the socket.
-`cpu` is the processor time of both processes, resets included; on a machine that does other things too it says more
-than the clock on the wall.
+`cpu` is the processor time of both processes, including resets; on a busy machine it is more reliable than wall
+time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ SIZES = {"layers": (128, 64), "raw": (0, 0)}
 
 @dataclass(frozen=True)
 class Setting:
-    """One row: the interface, the map, the game loops per step, and the steps per second it is meant to make."""
+    """One row: the interface, the map, the game loops per step, and the target of steps per second."""
 
     interface: str
     map: str
@@ -69,17 +69,17 @@ SETTINGS = (
 
 
 def directory_of(name: str) -> str:
-    """The folder below the install's Maps directory in which a map lies."""
+    """Return the folder of a map below the install's Maps directory."""
     return "llm_pysc2" if name.startswith("pvz_") else "llm_smac"
 
 
 def map_of(name: str) -> Any:
-    """A map as PySC2 has to be told of it."""
+    """Return a map in PySC2's form."""
     return type(f"Bench_{name}", (maps.Map,), {"directory": directory_of(name), "filename": name, "players": 2})()
 
 
 def make_env(name: str, step_mul: int = 8) -> Any:
-    """PySC2's environment on a map, with all feature layers."""
+    """Return PySC2's environment on a map, with all feature layers."""
     layers = sc2_env.AgentInterfaceFormat(
         feature_dimensions=sc2_env.Dimensions(screen=128, minimap=64),
         use_feature_units=True,
@@ -106,12 +106,12 @@ class LayersGame:
 
     @property
     def pid(self) -> int:
-        """Of the game process."""
+        """Id of the game process."""
         pid: int = self._env._sc2_procs[0].pid  # noqa: SLF001  # PySC2 tells the process nowhere else
         return pid
 
     def prepare(self) -> sc.Action:
-        """The next action, after a reset if the episode is over."""
+        """Return the next action, after a reset if the episode is over."""
         if self._seen.last():
             self._seen = self._env.reset()[0]
         unit = features.FeatureUnit
@@ -121,11 +121,11 @@ class LayersGame:
         return attack(own, foes)
 
     def step(self, action: sc.Action) -> None:
-        """One step of the environment."""
+        """Make one step of the environment."""
         self._seen = self._env.step([action])[0]
 
     def close(self) -> None:
-        """Ends the process."""
+        """End the process."""
         self._env.close()
 
 
@@ -140,7 +140,7 @@ class RawGame:
 
     @property
     def pid(self) -> int:
-        """Of the game process."""
+        """Id of the game process."""
         pid: int = self._process.pid
         return pid
 
@@ -159,31 +159,31 @@ class RawGame:
         self._seen = self._controller.observe()
 
     def prepare(self) -> sc.Action:
-        """The next action, in a new game if this one is over."""
+        """Return the next action, in a new game if this one is over."""
         if self._seen.player_result:
             self._begin()
         return attack_of(self._seen)
 
     def step(self, action: sc.Action) -> None:
-        """Acts, steps, and observes."""
+        """Act, step, and observe."""
         self._controller.actions(sc.RequestAction(actions=[action]))
         self._controller.step(self._step_mul)
         self._seen = self._controller.observe()
 
     def close(self) -> None:
-        """Ends the process."""
+        """End the process."""
         self._process.close()
 
 
 def attack_of(seen: sc.ResponseObservation) -> sc.Action:
-    """All own units on the first enemy."""
+    """Return an attack of all own units on the first enemy."""
     units = seen.observation.raw_data.units
     own, foes = ([unit.tag for unit in units if unit.alliance == side] for side in (1, 4))
     return attack(own, foes)
 
 
 def attack(own: list[int], foes: list[int]) -> sc.Action:
-    """All units on the first enemy, both as tags."""
+    """Return an attack of all units on the first enemy, both as tags."""
     return command(GENERAL_ATTACK, own, target=foes[0]) if own and foes else sc.Action()
 
 
@@ -209,7 +209,7 @@ class CpuTime:
 
 
 def measure_env(setting: Setting, steps: int) -> tuple[list[float], float, float]:
-    """Durations of environment steps, their mean of processor time in both processes, and the start-up, in ms."""
+    """Return durations of environment steps, their mean processor time in both processes, and the start-up, in ms."""
     started_s = time.perf_counter()
     game = (LayersGame if setting.interface == "layers" else RawGame)(setting.map, setting.step_mul)
     try:
@@ -227,7 +227,7 @@ def measure_env(setting: Setting, steps: int) -> tuple[list[float], float, float
 
 
 def measure_server(setting: Setting, steps: int) -> dict[str, float]:
-    """Processor time of the server's parts of a step, in ms."""
+    """Return the processor time of the server's parts of a step, in ms."""
     client = Client()
     spent_s = dict.fromkeys(("act", "tick", "observe"), 0.0)
     step = sc.Request(step=sc.RequestStep(count=setting.step_mul)).SerializeToString()
@@ -250,7 +250,7 @@ def measure_server(setting: Setting, steps: int) -> dict[str, float]:
 
 
 def measure(setting: Setting, steps: int) -> dict[str, float | None]:
-    """One row of the table."""
+    """Return one row of the table."""
     durations_ms, cpu_ms, start_ms = measure_env(setting, steps)
     server = measure_server(setting, steps)
     step_ms = statistics.fmean(durations_ms)
@@ -269,7 +269,7 @@ def measure(setting: Setting, steps: int) -> dict[str, float | None]:
 
 
 def setting_of(text: str) -> Setting:
-    """A setting written as interface:map:loops."""
+    """Return the setting written as interface:map:loops."""
     kind, name, step_mul = text.split(":")
     if kind not in SIZES:
         raise argparse.ArgumentTypeError(f"the interface is one of {', '.join(SIZES)}, not {kind!r}")
@@ -277,7 +277,7 @@ def setting_of(text: str) -> Setting:
 
 
 def main() -> None:
-    """Prints one line per setting."""
+    """Print one line per setting."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     parser.add_argument("--steps", type=int, default=300, help="steps per row")

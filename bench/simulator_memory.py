@@ -1,12 +1,12 @@
-"""How much memory a game process holds, from its start over many games, and how soon it gives its first observation.
+"""How much memory a game process holds, from its start over many games, and how soon it returns its first observation.
 
     python -m bench.simulator_memory                a table
     python -m bench.simulator_memory --games 20     fewer games
 
-Each game is begun anew by PySC2 (`SC2Env.reset`) and played for some steps with all feature layers; then the resident
-memory of the game process is read. `growth` is what it holds at the end more than after the tenth game: caches have
-filled by then. `start` is from launching the process to the first observation at the client, PySC2's own wait for a
-connection included.
+PySC2 restarts each game (`SC2Env.reset`) and plays it for some steps with all feature layers; then the resident
+memory of the game process is read. `growth` is the difference between the end and the tenth game: caches have
+filled by then. `start` is from launching the process to the first observation at the client, including PySC2's own
+wait for a connection.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ STEPS = 20
 
 
 def resident_mb(env: Any) -> float:
-    """Resident memory of the game process."""
+    """Return the resident memory of the game process."""
     pid = env._sc2_procs[0].pid  # noqa: SLF001  # PySC2 tells the process nowhere else
     status = Path(f"/proc/{pid}/status").read_text()
     return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 
 
 def measure(name: str, games: int) -> tuple[float, list[float]]:
-    """Seconds to the first observation, and MB after each game."""
+    """Return the seconds to the first observation, and MB after each game."""
     begun_s = time.perf_counter()
     env = make_env(name)
     try:
@@ -55,7 +55,7 @@ def measure(name: str, games: int) -> tuple[float, list[float]]:
 
 
 def main() -> None:
-    """Prints one line per map."""
+    """Print one line per map."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--games", type=int, default=100, help="how many games each process plays")
     parser.add_argument("--maps", nargs="+", default=["2s3z", "2c_vs_64zg"], help="maps of llm_smac")

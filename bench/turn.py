@@ -1,7 +1,7 @@
-"""What a turn costs besides the model: wall time of a step for 1 to 128 agents at an endpoint of fixed latency.
+"""The cost of a turn without the model: wall time of a step for 1 to 128 agents at an endpoint of fixed latency.
 
 Host, agents (in two processes) and endpoint share this machine; observations are those of a real battle, 2s3z in its
-sixth second, and every agent has all of the units. Beside it, in the same run, stands the way of the
+sixth second, and every agent has all of the units. The same run also measures the
 first implementation: threads that poll (`bench.original`). The parts are those of the agent whose reply came last:
 
     before    until its observation was made and published       http     the request beyond the endpoint's latency
@@ -77,7 +77,7 @@ class Measured:
     observation_bytes: int = 0
 
     def row(self, latency_s: float) -> dict[str, float]:
-        """Medians, in milliseconds, without the endpoint's latency."""
+        """Return medians, in milliseconds, without the endpoint's latency."""
         row = {"agents": self.agents, "over": 1000 * (statistics.median(self.step_s) - latency_s)}
         row |= {part: 1000 * statistics.median(values) for part, values in self.parts_s.items()}
         row["original"] = 1000 * (statistics.median(self.original_s) - latency_s) if self.original_s else 0.0
@@ -85,7 +85,7 @@ class Measured:
 
 
 class Bench:
-    """Host's side of a turn, with the real parts around a snapshot that stays."""
+    """The host's side of a turn, with the real parts around a constant snapshot."""
 
     def __init__(self, bus: Bus, run: str, task: TaskConfig, snapshot: Snapshot, agents: int) -> None:
         self.bus, self.run, self.snapshot = bus, run, snapshot
@@ -96,7 +96,7 @@ class Bench:
         self.arrived = asyncio.Event()
 
     async def measure(self, steps: int, children: Children, options: list[str]) -> Measured:
-        """Starts the agents, plays `steps` steps and one to warm up."""
+        """Start the agents, and play `steps` steps and one to warm up."""
         names = [seat.agent for seat in self.seats]
         for number, share in enumerate(shares(names, AGENT_PROCESSES)):
             await children.start(f"{self.run}-{number}", "agent", *share, "--run", self.run, *options)
@@ -135,7 +135,7 @@ class Bench:
         measured.parts_s["merge"].append(ended - asked)
 
     def original_s(self, base_url: str, steps: int) -> list[float]:
-        """Durations of the same steps in the way of the original."""
+        """Return the durations of the same steps in the way of the original."""
         seen = self.observer.observe(self.snapshot)
 
         def build() -> Iterator[str]:
@@ -150,7 +150,7 @@ class Bench:
         return step_s(base_url, "silent", build, act, steps)
 
     def _last(self, answers: Answers, ask_s: float) -> dict[str, float]:
-        """The parts of the agent whose reply came last."""
+        """Return the parts of the agent whose reply came last."""
 
         def arrival(item: tuple[Seat, Answer]) -> float:
             return item[1].latency_s or 0.0
@@ -180,7 +180,7 @@ class Bench:
             self.arrived.set()
 
     async def _told(self) -> None:
-        """Waits until the exchanges of the step are here; they may be a moment later than the replies."""
+        """Wait until the exchanges of the step are here; they may be a moment later than the replies."""
         while len(self.exchanges) < len(self.seats):
             self.arrived.clear()
             async with asyncio.timeout(10):
@@ -188,7 +188,7 @@ class Bench:
 
 
 class Everybodys(TeamRoster):
-    """Gives the first agent's units to every agent: as many agents as one likes, each with a whole battle to see."""
+    """Give the first agent's units to every agent: any number of agents, each with a whole battle to see."""
 
     def __init__(self, agents: Sequence[AgentConfig]) -> None:
         super().__init__(agents[:1])
@@ -202,7 +202,7 @@ class Everybodys(TeamRoster):
 
 
 def crowd(task: TaskConfig, agents: int) -> TaskConfig:
-    """The task with copies of its agent."""
+    """Return the task with copies of its agent."""
     (first,) = task.agents
     copies = (first.model_copy(update={"name": f"Agent{number}"}) for number in range(agents))
     return task.model_copy(update={"agents": tuple(copies), "communication": False})
@@ -216,7 +216,7 @@ def _card(run: str, task: TaskConfig) -> Run:
 
 
 async def battle(task: TaskConfig) -> Snapshot:
-    """A snapshot from the middle of a battle."""
+    """Return a snapshot from the middle of a battle."""
     sc2path, _ = games.find("simulator")
     async with one_side(MatchConfig(task=task, run="bench"), sc2path) as game:
         snapshot = await game.reset()
@@ -226,7 +226,7 @@ async def battle(task: TaskConfig) -> Snapshot:
 
 
 async def measure(agents: list[int], steps: int, original_steps: int) -> list[Measured]:
-    """Measures every number of agents, ours and the original's way."""
+    """Measure every number of agents, ours and the original's way."""
     task = load_task("2s3z")
     snapshot = await battle(task)
     found = []
@@ -247,7 +247,7 @@ async def measure(agents: list[int], steps: int, original_steps: int) -> list[Me
 
 
 def table(rows: list[dict[str, float]]) -> Table:
-    """The figures, in milliseconds over the endpoint's latency."""
+    """Return the figures, in milliseconds over the endpoint's latency."""
     shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms", box=None)
     for column in ("agents", "over", "goal", *PARTS, "original"):
         shown.add_column(column, justify="right", no_wrap=True)
@@ -258,7 +258,7 @@ def table(rows: list[dict[str, float]]) -> Table:
 
 
 def main() -> None:
-    """Measures, and prints a table or a JSON object."""
+    """Measure, and print a table or a JSON object."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--agents", type=int, nargs="+", default=list(GOALS_MS))
     parser.add_argument("--steps", type=int, default=10)

@@ -1,7 +1,7 @@
 """How plain the language is: archaic and private words in docstrings, comments and pages, by word and by place.
 
     python -m bench.words                  counts of this tree
-    python -m bench.words --places whom    every place of one word, to mend it
+    python -m bench.words --places whom    every place of one word, to correct it
     python -m bench.words --tree OTHER     counts of another checkout
 
 `Returns`, `Raises` and the like count where they begin a docstring, which should be in the imperative: "Return …".
@@ -49,7 +49,7 @@ FIRST_VERBS = {
 
 
 def passages(path: Path) -> Iterator[tuple[int, str, bool]]:
-    """Line, text, and whether it is a function's docstring, of everything that a file says to people."""
+    """Yield line, text, and whether it is a function's docstring, of all text for people in a file."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         for number, line in enumerate(text.splitlines(), start=1):
@@ -68,7 +68,7 @@ def passages(path: Path) -> Iterator[tuple[int, str, bool]]:
 
 
 def found(tree: Path) -> Iterator[tuple[str, str]]:
-    """Every counted word and its place, `path:line`."""
+    """Yield every counted word and its place, `path:line`."""
     listed = subprocess.run(["git", "ls-files", "*.py", "*.md"], cwd=tree, capture_output=True, text=True, check=True)
     for name in listed.stdout.split():
         if name == "bench/words.py" or "corpus" in name:

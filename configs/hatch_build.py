@@ -10,9 +10,9 @@ FOLDERS = ("agents", "models", "tasks")
 
 
 class ConfigFiles(BuildHookInterface):
-    """Add the folders beside the package to the package in the wheel."""
+    """Add the folders next to the package to the package in the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Name the folders that a wheel carries, by where they stand in it."""
+        """Name the folders that a wheel carries, by their places in it."""
         if version != "editable":
             build_data["force_include"].update({folder: f"khala_configs/{folder}" for folder in FOLDERS})

@@ -1,7 +1,7 @@
-"""Writes docs/reference: `python -m docs.generate`, and with `--check` says which pages are out of date.
+"""Write docs/reference: `python -m docs.generate`, and with `--check` list the pages that are out of date.
 
-A page is a function in `docs.pages` that returns its text; here is only which function makes which page. Nothing in
-docs/reference is written by hand: a fact is changed where it is used, and its page follows.
+A page is a function in `docs.pages` that returns its text; this module only maps pages to functions. Nothing in
+docs/reference is written by hand: change a fact where it is used, and its page follows.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ PAGES: dict[str, Callable[[], str]] = {
 
 
 def outdated(directory: Path = REFERENCE) -> list[str]:
-    """Names of pages that are missing, differ from what would be written, or are made by nobody."""
+    """Return the names of pages that are missing, differ from what would be written, or that no function makes."""
     made = {name: page() for name, page in PAGES.items()}
     found = {path.name: path.read_text(encoding="utf-8") for path in directory.glob("*.md")}
     return sorted(name for name in made.keys() | found.keys() if made.get(name) != found.get(name))
 
 
 def write(directory: Path = REFERENCE) -> None:
-    """Writes every page."""
+    """Write every page."""
     directory.mkdir(parents=True, exist_ok=True)
     for name, page in PAGES.items():
         (directory / name).write_text(page(), encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line; the exit code is 1 if pages are out of date."""
+    """Run the command line; the exit code is 1 if pages are out of date."""
     parser = argparse.ArgumentParser(prog="python -m docs.generate", description="Write the pages of docs/reference.")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if a page is out of date")
     if not parser.parse_args(arguments).check:

@@ -1,7 +1,7 @@
-"""Takes pictures of six moments as a client sees them: `python -m docs.moments [NAME ...]`.
+"""Take pictures of six moments as a client sees them: `python -m docs.moments [NAME ...]`.
 
-Each is a battle on the simulator with a fixed seed, led by a few lines of script, up to a chosen loop; what is shown
-is `render_data` of the observation there, the screen beside the minimap, and how the sides fare. Written to
+Each is a battle on the simulator with a fixed seed, led by a short script, up to a chosen loop. The picture shows
+`render_data` of the observation there, the screen beside the minimap, and the strength of the sides. Written to
 docs/images/moments, and docs/design/rendering.md shows them.
 """
 
@@ -46,7 +46,7 @@ GALLERY, GALLERY_COLUMNS, GALLERY_SCALE, CELL = "looks", 4, 20.0, (256, 60)
 """Name, columns, pixels per world unit and size of a cell of the picture of all looks."""
 LOOPS_PER_SECOND = 22.4
 REACH = 9.0
-"""World units around own units within which somebody belongs to the fight."""
+"""World units around own units within which a unit belongs to the fight."""
 DECISION = 8
 """Loops from one decision to the next."""
 ATTACK, MOVE, STORM, FORCE_FIELD, GUARDIAN_SHIELD = 3674, 3794, 1036, 1526, 76
@@ -67,32 +67,32 @@ class Stage:
         self._targets: dict[int, int] = {}
 
     def step(self, loops: int) -> None:
-        """Plays on."""
+        """Play on."""
         self.seen = self._client.step(loops)
 
     def units(self, side: str, *names: str) -> list[raw_pb2.Unit]:
-        """Units of a side, of these types or of all."""
+        """Return units of a side, of these types or of all."""
         rows = [unit for unit in self.seen.observation.raw_data.units if unit.alliance == SIDES[side]]
         return [unit for unit in rows if not names or self.name(unit) in names]
 
     def name(self, unit: raw_pb2.Unit) -> str:
-        """Its type's name."""
+        """Return its type's name."""
         row = self._catalog.row_of_id.get(unit.unit_type)
         return "" if row is None else self._catalog.units[row].name
 
     def order(self, ability: int, units: list[raw_pb2.Unit], point: Point | None = None) -> None:
-        """Orders own units."""
+        """Give own units an order."""
         self._client.act(command(ability, [unit.tag for unit in units], point=point))
 
     def look(self, point: Point) -> None:
-        """Points the camera."""
+        """Point the camera."""
         action = sc.Action()
         centre = action.action_raw.camera_move.center_world_space
         centre.x, centre.y = point
         self._client.act(action)
 
     def watch(self) -> None:
-        """Points the camera at the fight."""
+        """Point the camera at the fight."""
         army = [unit for side in SIDES for unit in self.units(side) if self._fights(unit)]
         own = [unit for unit in army if unit.alliance == SIDES["own"]]
         near = [u for u in army if own and min(np.hypot(u.pos.x - o.pos.x, u.pos.y - o.pos.y) for o in own) < REACH]
@@ -101,17 +101,17 @@ class Stage:
 
     @staticmethod
     def middle(units: list[raw_pb2.Unit]) -> Point:
-        """The mean of the places of units."""
+        """Return the mean of the places of units."""
         x, y = np.mean([(unit.pos.x, unit.pos.y) for unit in units], axis=0).tolist()
         return x, y
 
     @staticmethod
     def distance(some: list[raw_pb2.Unit], others: list[raw_pb2.Unit]) -> float:
-        """Between the nearest two of two groups."""
+        """Return the distance between the nearest two of two groups."""
         return min(float(np.hypot(a.pos.x - b.pos.x, a.pos.y - b.pos.y)) for a in some for b in others)
 
     def attack(self, loops: int) -> None:
-        """Lets every own fighter attack the enemy nearest to it until that one is dead, for so long."""
+        """Have every own fighter attack its nearest enemy until that one is dead, for this many loops."""
         for _ in range(0, loops, DECISION):
             enemies = {unit.tag: unit for unit in self.units("enemy")}
             for unit in self.units("own"):
@@ -123,7 +123,7 @@ class Stage:
             self.step(DECISION)
 
     def picture(self, title: str) -> Image:
-        """The screen, beside it the minimap and how the sides fare."""
+        """Draw the screen, the minimap beside it, and the strength of the sides."""
         sent = self.seen.observation.render_data
         image = np.full((SCREEN, SCREEN + GAP + MINIMAP, 3), GROUND, np.uint8)
         image[:, :SCREEN] = _pixels(sent.map)
@@ -137,7 +137,7 @@ class Stage:
         return image
 
     def _strength(self, image: Image, side: str, at: Point) -> int:
-        """A side's fighters by type, and what is left of them; returns the last line."""
+        """Draw a side's fighters by type, and what is left of them; return the last line."""
         units = [unit for unit in self.units(side) if self._fights(unit)]
         counts = Counter(self.name(unit).removesuffix("_RL").removesuffix("Burrowed") for unit in units)
         vigour = round(sum(unit.health + unit.shield for unit in units))
@@ -158,7 +158,7 @@ class Stage:
 
 
 def _pixels(image: common_pb2.ImageData) -> Image:
-    """A picture as OpenCV writes files: blue, green, red."""
+    """Return a picture as OpenCV writes files: blue, green, red."""
     return np.frombuffer(image.data, np.uint8).reshape(image.size.y, image.size.x, 3)[..., ::-1]
 
 
@@ -170,12 +170,12 @@ def _write(image: Image, text: str, at: tuple[int, int], colour: tuple[int, int,
 
 
 def clash(stage: Stage) -> None:
-    """Both sides run into each other."""
+    """Send both sides into each other."""
     stage.attack(96)
 
 
 def cliff(stage: Stage) -> None:
-    """Colossi step down the cliff; the swarm has to run round by the ramps."""
+    """Walk Colossi down the cliff; the swarm has to run round by the ramps."""
     stage.attack(72)
     stage.order(MOVE, stage.units("own"), (16, 9.5))
     stage.step(40)
@@ -183,25 +183,25 @@ def cliff(stage: Stage) -> None:
 
 
 def marauders(stage: Stage) -> None:
-    """Medivacs fly behind the infantry."""
+    """Fly Medivacs behind the infantry."""
     stage.attack(128)
 
 
 def roaches(stage: Stage) -> None:
-    """Marines open fire as soon as they can."""
+    """Have Marines open fire as soon as they can."""
     stage.attack(96)
     stage.watch()
 
 
 def base(stage: Stage) -> None:
-    """The enemy is at the gates."""
+    """Bring the enemy to the gates."""
     stage.step(200)
     stage.attack(160)
     stage.watch()
 
 
 def storm(stage: Stage) -> None:
-    """Force fields cut the swarm in two, and storms fall on the half that is in front of them."""
+    """Cut the swarm in two with force fields, and storm the half in front of them."""
     stage.step(160)
     while stage.distance(stage.units("own", "Stalker"), stage.units("enemy", "Zergling")) > 2:
         stage.step(4)
@@ -218,7 +218,7 @@ def storm(stage: Stage) -> None:
 
 @dataclass(frozen=True)
 class Moment:
-    """One picture: where, what happens, and from which seed."""
+    """One picture: its map, its script, and its seed."""
 
     map_name: str
     script: Callable[[Stage], None]
@@ -236,7 +236,7 @@ MOMENTS = {
 
 
 def gallery() -> Image:
-    """Every type with an outline of its own, on both sides."""
+    """Draw every type with its own outline, on both sides."""
     catalog = load_catalog()
     sprites = wardrobe(catalog.version, GALLERY_SCALE)
     names = [name for name in OUTLINES if not name.endswith(("Phased", "Burrowed"))]
@@ -253,14 +253,14 @@ def gallery() -> Image:
 
 
 def take(moment: Moment) -> Image:
-    """Plays up to a moment and takes its picture."""
+    """Play up to a moment and take its picture."""
     stage = Stage(moment.map_name, moment.seed)
     moment.script(stage)
     return stage.picture(moment.map_name.partition("/")[2])
 
 
 def main() -> None:
-    """Takes the pictures that are named, or all."""
+    """Take the pictures that are named, or all."""
     OUT.mkdir(parents=True, exist_ok=True)
     for name in sys.argv[1:] or (*MOMENTS, GALLERY):
         path = OUT / f"{name}.webp"

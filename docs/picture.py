@@ -1,7 +1,7 @@
-"""Draws a recorded battle as a moving picture: `python -m docs.picture [RECORDING]`, which plays one if none is given.
+"""Draw a recorded battle as a moving picture: `python -m docs.picture [RECORDING]`, which plays one if none is given.
 
-Everything on it comes out of the recording: where units stood and how they fared from the views, what the agents
-said from their replies, what came of it from the reports. Left the battlefield, right what the agents say.
+Everything in it comes from the recording: places and health of units from the views, the agents' words
+from their replies, the results from the reports. The battlefield is on the left, the agents' words on the right.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Battle:
 
 
 def load(path: Path) -> Battle:
-    """Reads what is needed of a recording."""
+    """Read the needed parts of a recording."""
     run: Run | None = None
     result: Result | None = None
     moments: dict[int, Moment] = {}
@@ -114,7 +114,7 @@ def _note_reply(moment: Moment, reply: Reply) -> None:
 
 
 class Painter:
-    """Turns moments into pictures."""
+    """Turn moments into pictures."""
 
     def __init__(self, battle: Battle) -> None:
         self._battle = battle
@@ -125,7 +125,7 @@ class Painter:
         self._agents = [card.name for card in battle.run.agents]
 
     def pictures(self) -> Iterator[Image]:
-        """Every picture of the battle, in order."""
+        """Yield every picture of the battle, in order."""
         moments = self._battle.moments
         for now, after in zip(moments, [*moments[1:], moments[-1]], strict=True):
             for part in range(BETWEEN):
@@ -230,7 +230,7 @@ def _wrap(text: str, width: int) -> Iterator[str]:
 
 
 def save(pictures: list[Image], path: Path) -> None:
-    """Writes the pictures as a WebP that runs for ever; a GIF of them is forty times as large."""
+    """Write the pictures as an endless WebP; a GIF of them is forty times as large."""
     animation = cv2.Animation(0, (0, 0, 0, 0))
     animation.frames = pictures
     animation.durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
@@ -239,14 +239,14 @@ def save(pictures: list[Image], path: Path) -> None:
 
 
 def play(task: str) -> Path:
-    """Plays a task and returns its recording."""
+    """Play a task and return its recording."""
     command = [sys.executable, "-m", "khala", "run", task, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True)  # noqa: S603  # our own command line
     return Path(json.loads(done.stdout)["recording"])
 
 
 def main() -> None:
-    """Draws the recording that is named, or one of a match that is played for it."""
+    """Draw the recording that is named, or one of a match that is played for it."""
     recording = Path(sys.argv[1]) if len(sys.argv) > 1 else play(TASK)
     pictures = list(Painter(load(recording)).pictures())
     OUT.parent.mkdir(parents=True, exist_ok=True)

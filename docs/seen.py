@@ -1,4 +1,4 @@
-"""Writes down what one agent of each kind sees at a moment of a game: `python -m docs.seen`.
+"""Write down what one agent of each kind sees at a moment of a game: `python -m docs.seen`.
 
 Two games on the simulator from a fixed seed, played by the scripted player `skilled` from the texts alone; at a chosen
 decision the observations are kept as they go over the bus. Pictures go to docs/images/seen, and they and the texts to
@@ -41,15 +41,15 @@ PREFACE = """# Four observations, with their pictures
 
 What one agent of each kind is sent at one moment of a game, word for word, with the pictures that the paper gives to
 the kind. `python -m docs.seen` makes this page from two games on the simulator, which the scripted player `skilled`
-plays from these texts alone. How texts are composed is told in [what an agent sees](observation.md), how pictures are
-switched on and what is on them in [images](../how-to/images.md). Sizes are of the bytes that go over the bus; tokens
-are estimates, for Anthropic's and for OpenAI's models.
+plays from these texts alone. [What an agent sees](observation.md) explains how texts are composed,
+[images](../how-to/images.md) how pictures are switched on and what they show. Sizes are of the bytes that go over the
+bus; tokens are estimates, for Anthropic's and for OpenAI's models.
 """
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One observation: whose it is."""
+    """One observation, with its agent."""
 
     game: str
     agent: str
@@ -89,18 +89,18 @@ SCENES = {
 
 
 class Stop(Exception):  # no error
-    """The moment has come."""
+    """Stop at the chosen step."""
 
 
 class Played:
-    """Agents that answer at once, by a script; at a chosen step what they are asked is kept."""
+    """Answer at once, by a script; keep the questions of a chosen step."""
 
     def __init__(self, step: int) -> None:
         self.questions: dict[str, Question] = {}
         self._step = step
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """The answers of one step."""
+        """Return the answers of one step."""
         asked = list(questions)
         self.questions = {question.observation.agent: question for question in asked}
         if asked[0].observation.step >= self._step:
@@ -114,10 +114,10 @@ class Played:
 
 
 async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Question]:
-    """What each agent of a task is asked at a step, by its name.
+    """Return the question to each agent of a task at a step, by the agent's name.
 
     Args:
-        task: what is played.
+        task: the task to play.
         step: a number of decisions.
         sc2path: where the simulator is.
     """
@@ -133,7 +133,7 @@ async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Quest
 
 
 def task_of(game: str) -> TaskConfig:
-    """The task of a game, with the pictures of its scenes; a Builder joins the one that has none."""
+    """Return the task of a game, with the pictures of its scenes; a Builder joins the one that has none."""
     task = load_task(game)
     agents = {agent.name: agent for agent in task.agents}
     for kind, scene in SCENES.items():
@@ -145,7 +145,7 @@ def task_of(game: str) -> TaskConfig:
 
 
 def page(questions: Mapping[str, Question]) -> Iterator[str]:
-    """The page of what agents were asked, by scene, line by line."""
+    """Yield the page of the agents' questions, by scene, line by line."""
     yield PREFACE
     for kind, scene in SCENES.items():
         seen = questions[kind].observation
@@ -163,7 +163,7 @@ def _size(image: ImageRef) -> str:
 
 
 def main() -> None:
-    """Plays both games and writes the page with its pictures."""
+    """Play both games and write the page with its pictures."""
     questions: dict[str, Question] = {}
     with tempfile.TemporaryDirectory() as directory:
         sc2path = install(Path(directory) / "sc2")

@@ -1,4 +1,4 @@
-"""Hooks of MkDocs: what the pages say to GitHub and to the tests, in the form that the site understands.
+"""Hooks of MkDocs: turn what the pages say to GitHub and to the tests into the form of the site.
 
 A link to a file outside of docs/ becomes the path of that file in the repository. A fence keeps only the language, of
 `yaml task` the word `yaml`; the second word is for `tests/project/test_docs.py`.
@@ -19,7 +19,7 @@ FENCE = re.compile(r"^```(?P<language>\w+) \w+$", re.MULTILINE)
 
 
 def on_page_markdown(markdown: str, *, page: Page, **_: Any) -> str:
-    """Return a page as the site understands it."""
+    """Return a page in the form of the site."""
     folder = posixpath.dirname(page.file.src_uri)
 
     def inside_or_path(link: re.Match[str]) -> str:

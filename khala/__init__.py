@@ -1,3 +1,3 @@
-"""The front door: the command line, and the one place that knows how all parts fit on one machine."""
+"""The front door: the command line, and the one place that knows how all parts fit together on one machine."""
 
 __version__ = "0.1.0"

@@ -1,6 +1,6 @@
-"""The command `khala actions`: what agents can say, who carries it out, and which of PySC2's functions it ends in.
+"""The command `khala actions`: what agents can say, which units carry it out, and which PySC2 function it calls.
 
-It loads no PySC2. What is wrong on the user's side is raised as a `ConfigError` of one sentence, as in the other
+It loads no PySC2. A mistake of the user is raised as a `ConfigError` of one sentence, as in the other
 commands; `khala.cli` prints it.
 """
 
@@ -33,9 +33,9 @@ Examples:\n
 """
 INDENT = " " * 4
 FEW = 20
-"""Names that an error can tell all of."""
+"""Number of names up to which an error lists all of them."""
 MANY = 9
-"""Unit types that are named one by one; of more, the first ones are."""
+"""Number of unit types that are listed; of more, the first ones."""
 
 
 def actions(
@@ -43,13 +43,13 @@ def actions(
     race: Annotated[
         Literal["protoss", "terran", "zerg"] | None, typer.Option(help="Only of this race, or of every race.")
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="Only what units of this type can be told.", metavar="TYPE")] = None,
+    unit: Annotated[str | None, typer.Option(help="Only orders for units of this type.", metavar="TYPE")] = None,
     group: Annotated[str | None, typer.Option(help="Only of this group: basic, skill, build, …")] = None,
     name: Annotated[str | None, typer.Option(help="Only with this in the name or an alias.", metavar="TEXT")] = None,
     function: Annotated[
-        str | None, typer.Option(help="Only what ends in this function of PySC2, by name or number.")
+        str | None, typer.Option(help="Only actions that call this function of PySC2, by name or number.")
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All, where else only the groups would be listed.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="List all actions instead of only the groups.")] = False,
     as_json: Json = False,
 ) -> None:
     """List what agents can say, with arguments, meaning and an example call.
@@ -58,7 +58,7 @@ def actions(
     groups, as `group:skill` or, for the actions of a side, `group:train/protoss`.
 
     `generated` are those that follow from PySC2's functions: one for every function that no other action stands for,
-    and `Select_Unit_<name>` for what a whole team can be told, to tell it to one unit.
+    and `Select_Unit_<name>`, which gives one unit an order that a whole team can get.
     """
     known = sorted(catalogue().values(), key=_place)
     _check(unit, knowledge(), "unit type")
@@ -85,7 +85,7 @@ def actions(
 
 
 def _place(action: Action) -> tuple[int, str]:
-    """Where it is shown: by group, and in a group what every race has before what is of one."""
+    """Return its place in the list: by group, and within a group what every race has first."""
     return list(GROUPS).index(action.group), action.race or ""
 
 
@@ -99,7 +99,7 @@ def _check(given: str | None, known: Iterable[str], what: str) -> None:
 
 
 def _function(given: str | None) -> str | None:
-    """The name of a function that is given by name or number."""
+    """Return the name of a function that is given by name or number."""
     if given is not None and given.isdecimal():
         given = next((each.name for each in functions().values() if each.id == int(given)), given)
     _check(given, functions(), "function of PySC2")
@@ -124,12 +124,12 @@ def _groups(known: Iterable[Action]) -> Table:
 
 
 def _is_for(action: Action, unit: str) -> bool:
-    """Whether units of a type carry it out; what the side is told without saying who is for none in particular."""
+    """Return whether units of a type carry it out; false for orders to the whole side that name no unit."""
     return action.fits(unit) and (action.subject != "side" or bool(action.units))
 
 
 def _listed(found: list[Action], width: int) -> Iterator[Text]:
-    """Lines for each action, under headings of group and race; names and calls are never broken."""
+    """Yield lines for each action, under headings of group and race; names and calls are never broken."""
     for (group, race), members in itertools.groupby(found, key=lambda action: (action.group, action.race)):
         yield Text(f"\n{group}, {race or 'every race'}", style="bold underline")
         for action in members:

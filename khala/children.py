@@ -1,7 +1,7 @@
-"""Processes that a match on one machine needs beside its host: started, watched, and ended with it.
+"""The processes that a match on one machine needs next to its host: started, watched, and ended with it.
 
-Each child leads a session of its own, so that Ctrl-C reaches the host alone, which ends the others in order. What a
-child prints goes to its log file; its last lines are quoted when it ends before its time.
+Each child leads its own session, so that Ctrl-C reaches the host alone, which ends the others in order. The output of
+a child goes to its log file; its last lines are quoted when it ends too early.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 END_S = 3.0
-"""What a child gets to end after SIGTERM."""
+"""Time that a child gets to end after SIGTERM."""
 QUOTED_LINES = 3
 
 
 class ChildDied(KhalaError):
-    """A process that the match needs ended, or did not begin."""
+    """A process that the match needs has ended, or did not start."""
 
 
 class Children:
@@ -49,14 +49,14 @@ class Children:
         await asyncio.gather(*(_ended(process) for process in self._processes.values()))
 
     async def start(self, name: str, *arguments: str) -> None:
-        """Starts `khala <arguments>`; `name` is that of its log."""
+        """Start `khala <arguments>`; `name` is that of its log."""
         await self._start(name, arguments, subprocess.DEVNULL)
 
     async def start_ready(self, name: str, *arguments: str, within_s: float = 30.0) -> Any:
-        """Starts `khala <arguments>`, and returns what its first line on stdout says as JSON.
+        """Start `khala <arguments>`, and return its first line on stdout, read as JSON.
 
         Raises:
-            ChildDied: it ended, or said nothing in time.
+            ChildDied: it ended, or printed nothing in time.
         """
         process = await self._start(name, arguments, subprocess.PIPE)
         assert process.stdout is not None
@@ -70,7 +70,7 @@ class Children:
         return json.loads(line)
 
     async def first_failure(self) -> ChildDied:
-        """Waits until a child ends with an error, and says which; for ever, if none does."""
+        """Wait until a child ends with an error, and return that error; wait for ever if none does."""
         failed: asyncio.Future[ChildDied] = asyncio.get_running_loop().create_future()
 
         async def follow(name: str, process: asyncio.subprocess.Process) -> None:

@@ -1,4 +1,4 @@
-"""The command line: mounts what the packages define, adds what needs all of them, and prints errors as one sentence."""
+"""The command line: mount the packages' commands, add those that need all packages, print errors as one sentence."""
 
 import asyncio
 import itertools
@@ -65,17 +65,17 @@ Examples:\n
 Task = Annotated[str, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")]
 Game = Annotated[
     str,
-    typer.Option(help="What plays: simulator, starcraft2 (by SC2PATH), or a directory of either.", metavar="GAME"),
+    typer.Option(help="Game to use: simulator, starcraft2 (at SC2PATH), or a directory of either.", metavar="GAME"),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Of the first episode; each further one adds 1.")]
-Episodes = Annotated[int, typer.Option(min=1, help="How many are played.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; each further one adds 1.")]
+Episodes = Annotated[int, typer.Option(min=1, help="Number of episodes.")]
 RunName = Annotated[
     str | None,
     typer.Option(envvar="KHALA_RUN", help="Name of the run.", show_default="task, time, digits", metavar="NAME"),
 ]
 MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
 StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
-MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after so many steps.")]
+MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after this many steps.")]
 ExecutorName = Annotated[
     str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
 ]
@@ -88,7 +88,7 @@ Images = Annotated[
     ),
 ]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
-Out = Annotated[Path, typer.Option(help="Directory that gets a directory for the run.", metavar="DIR")]
+Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 
 
 def run(
@@ -99,13 +99,13 @@ def run(
     ] = "scripted",
     model_name: Annotated[
         str | None,
-        typer.Option(help="Another model there; scripted has skilled, focus-fire, random-legal, silent."),
+        typer.Option(help="Another model of the endpoint; scripted has skilled, focus-fire, random-legal, silent."),
     ] = None,
     base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
     policy: Annotated[
-        str | None, typer.Option(help="Decide without a model, by your own code.", metavar="MODULE:NAME")
+        str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
     ] = None,
-    budget_usd: Annotated[float | None, typer.Option(min=0, help="What all agents together may spend.")] = None,
+    budget_usd: Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")] = None,
     latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
     game: Game = "simulator",
     seed: Seed = 1,
@@ -122,8 +122,8 @@ def run(
 ) -> None:
     """Play a task on this machine: game, host, agents and, if need be, the scripted model.
 
-    Agents are processes of their own and talk to the host over the bus, as they would from other machines. Everything
-    that is said goes into a recording, see `khala replay`.
+    Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
+    messages go into a recording, see `khala replay`.
     """
     from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
 
@@ -190,7 +190,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 def version(value: bool) -> None:  # typer calls it with the flag
-    """Prints the version and ends."""
+    """Print the version and end."""
     if value:
         typer.echo(f"khala {__version__}")
         raise typer.Exit
@@ -204,7 +204,7 @@ def front_door(
     ] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log what happens, on stderr.")] = False,
 ) -> None:
-    """Sets up logging before any command."""
+    """Set up logging before any command."""
     logging.basicConfig(
         level=logging.INFO if verbose else logging.ERROR,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
@@ -230,23 +230,23 @@ app.add_typer(knowledge, name="knowledge")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; what the user can mend is one sentence on stderr, and an exit code that is not 0."""
+    """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
     run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
 
 
 def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
-    """The match that the options describe; its recording is in a directory of its own below `out`."""
+    """Return the match that the options describe; its recording is in its own directory below `out`."""
     from khala_bridge.observe import Observer  # noqa: PLC0415  # half a second that other commands do without
 
     match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
     loaded = change(load_task(task), **given)
-    Observer(loaded)  # a section that does not exist is told before a game is started
+    Observer(loaded)  # report an unknown section before a game is started
     name = check_name(run or new_run_name(loaded.name), "run")
     return MatchConfig(task=loaded, run=name, record=_free_recording(out / name), **match)
 
 
 def _free_recording(directory: Path) -> Path:
-    """A file for the recording that is not there yet: a run may be begun anew under its name, as containers do it."""
+    """Return an unused file for the recording: containers, for example, start a run again under its name."""
     names = itertools.chain(["recording"], (f"recording-{number}" for number in itertools.count(2)))
     paths = (directory / f"{name}.mcap" for name in names)
     return next(path for path in paths if not os.path.exists(path))  # noqa: PTH110  # Path.exists raises where it may not look
@@ -262,7 +262,7 @@ def _bus(connect: list[str] | None, listen: list[str] | None, *, insecure: bool)
 def _until_interrupted(
     config: MatchConfig, as_json: bool, play: Callable[[Callable[[Wire], None]], Coroutine[Any, Any, list[Result]]]
 ) -> None:
-    """Plays with a live picture, prints the results, and ends in order on SIGINT and SIGTERM."""
+    """Play with a live picture, print the results, and end in order on SIGINT and SIGTERM."""
     screen = stderr_console()
     with Progress(screen, config.task.max_steps) as progress:
         results = asyncio.run(_cancelled_by_signals(play(progress)))
@@ -276,7 +276,7 @@ def _until_interrupted(
 
 
 async def _cancelled_by_signals(work: Coroutine[Any, Any, T]) -> T | None:
-    """What `work` returns, or None if a signal ended it."""
+    """Return the result of `work`, or None if a signal ended it."""
     task = asyncio.ensure_future(work)
     told = asyncio.Event()
 

@@ -1,4 +1,4 @@
-"""Looks at this machine as a match would, and says what to do about what it finds.
+"""Look at this machine as a match would, and say how to fix what is wrong.
 
 Each check is a function that returns a `Finding`; none changes anything or needs a network beyond this machine.
 """
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 State = Literal["ok", "note", "wrong"]
 
 KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "DEEPSEEK_API_KEY")
-"""Variables that the shipped model files read; each may also be given as a file, `<NAME>_FILE`."""
+"""Variables that the shipped model files read; each may also name a file, `<NAME>_FILE`."""
 PORTS = {7447: "the router of `khala router`"}
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one check found.
+    """The result of one check.
 
     Attributes:
         state: `wrong` keeps a match from starting; a `note` is worth knowing.
@@ -38,12 +38,12 @@ class Finding:
     advice: str = ""
 
     def as_dict(self) -> dict[str, str]:
-        """For JSON."""
+        """Return it as data for JSON."""
         return asdict(self)
 
 
 def examine() -> Iterator[Finding]:
-    """Runs every check, in the order in which a newcomer would ask."""
+    """Run every check, in the order in which a newcomer would ask."""
     for check in CHECKS:
         try:
             yield from check()

@@ -1,4 +1,4 @@
-"""Which game plays: the simulator, laid out where a user keeps caches, or the StarCraft II of this machine."""
+"""Which game plays: the simulator, unpacked into the user's cache, or the StarCraft II of this machine."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from khala_simulator.process.install import InstallError, install, is_installed
 
 
 def cache() -> Path:
-    """Where the simulator is laid out: `$KHALA_CACHE`, or the user's cache directory."""
+    """Return where the simulator is unpacked: `$KHALA_CACHE`, or the user's cache directory."""
     if given := os.environ.get("KHALA_CACHE"):
         return Path(given).expanduser()
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "khala"
 
 
 def find(source: str) -> tuple[Path, str]:
-    """The directory for SC2PATH, and the name for the run card.
+    """Return the directory for SC2PATH, and the name for the run card.
 
     Args:
-        source: `simulator`, `starcraft2`, or a directory with either in it.
+        source: `simulator`, `starcraft2`, or a directory that holds either of them.
 
     Raises:
-        GameMissing: it is not there, or the simulator cannot be laid out; the text says what to do.
+        GameMissing: it is not there, or the simulator cannot be unpacked; the text says what to do.
     """
     if source == "simulator":
         try:

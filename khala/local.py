@@ -1,7 +1,7 @@
-"""Everything of a match on this machine: the one place that knows all packages.
+"""Everything of a match on this machine: the one module that knows all packages.
 
-The host runs in this process, in a thread of it the game's PySC2, and it is its own router. Agents are processes of
-their own, joined to it over Zenoh, as they would be from another machine; so is the scripted model's endpoint.
+The host runs in this process, with the game's PySC2 in one of its threads, and it is its own router. Agents run in
+their own processes and join over Zenoh, as they would from another machine; so does the scripted model's endpoint.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
 MAX_PROCESSES = 4
-"""Agents get a process each up to here, and share them beyond: a Python process costs half a second and 60 MB."""
+"""Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ class Minds:
     policy: str | None = None
     budget_usd: float | None = None
     latency_s: float = 0.0
-    """Of the scripted endpoint, if it is started."""
+    """Latency of the scripted endpoint, if it is started."""
 
     def check(self) -> None:
-        """Makes sure that an agent could decide so, before anything is started.
+        """Check that an agent could decide this way, before anything is started.
 
         Raises:
             ConfigError: a model file, a key or a policy is missing or wrong.
@@ -63,24 +63,24 @@ class Minds:
 
     @property
     def needs_endpoint(self) -> bool:
-        """Whether the scripted endpoint has to be started."""
+        """Whether the scripted endpoint is needed."""
         return self.policy is None and self.base_url is None and self.model == SCRIPTED
 
 
 async def play(
     config: MatchConfig, minds: Minds, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
 ) -> list[Result]:
-    """Plays a match with everything it needs on this machine.
+    """Play a match with everything it needs on this machine.
 
     Args:
-        config: what is played.
+        config: the match to play.
         minds: how its agents decide.
-        directory: is made, and gets the logs of the processes.
+        directory: is created, and gets the logs of the processes.
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
 
     Raises:
-        KhalaError: something the user can mend; the text says what.
+        KhalaError: the user can fix something; the text says what.
     """
     minds.check()
     config, sc2path = _prepared(config, directory, game)
@@ -103,7 +103,7 @@ async def play(
 async def play_hosted(
     config: MatchConfig, bus: BusConfig, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
 ) -> list[Result]:
-    """Plays a match whose agents come over the bus; arguments and errors as in `play`."""
+    """Play a match whose agents come over the bus; arguments and errors as in `play`."""
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         session = await open_bus(bus)
@@ -113,14 +113,14 @@ async def play_hosted(
 
 
 def one_side(config: MatchConfig, sc2path: Path) -> OneSide:
-    """The game of a match, not started yet."""
+    """Return the game of a match, not started yet."""
     task = config.task
     started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed, render_px=task.render_px)
     return OneSide(GameThread(lambda: PySC2Game(started)), executor_of(task), step_loops=task.clock.step_loops)
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:
-    """Which agents share a process: as evenly as their number allows, neighbours apart."""
+    """Return which agents share a process: as evenly as their number allows, neighbours apart."""
     return [list(agents[first::processes]) for first in range(min(processes, len(agents)))]
 
 
@@ -142,7 +142,7 @@ async def _start_agents(children: Children, config: MatchConfig, minds: Minds, b
 async def _unless_one_dies(
     match: Coroutine[Any, Any, list[Result]], children: Children, begun: asyncio.Event
 ) -> list[Result]:
-    """The results of the match; a child that fails before the first step ends it, a later one is the match's affair."""
+    """Return the results of the match. A child's failure before the first step ends it; the match handles others."""
     playing = asyncio.create_task(match)
     failing = asyncio.create_task(children.first_failure())
     beginning = asyncio.create_task(begun.wait())
@@ -158,7 +158,7 @@ async def _unless_one_dies(
 
 
 def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
-    """The match with the name of its game, and where that is; the directory is there then."""
+    """Return the match with the name of its game, and the path of the game; create the directory."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Fixtures for everybody who has Khala installed; pytest loads this module by itself.
+"""Fixtures for every project that has Khala installed; pytest loads this module by itself.
 
     async def test_my_prompt_still_plays_the_same(replay_agents):
         assert await replay_agents("golden.mcap") == []
@@ -6,7 +6,7 @@
     async def test_my_rules_still_show_the_same(replay_host):
         assert await replay_host("golden.mcap") == []
 
-They are `khala.testing.replay_agents` and `khala.testing.replay_host`, imported when they are used only.
+They are `khala.testing.replay_agents` and `khala.testing.replay_host`, imported only when used.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def replay_host() -> Callable[..., Awaitable[list[Difference]]]:
-    """Recorded replies through host, bridge and game: what observations are not the recorded ones?"""
+    """Replay recorded replies through host, bridge and game, and return the observations that differ."""
     from khala import testing  # noqa: PLC0415  # it imports PySC2
 
     return testing.replay_host
@@ -31,7 +31,7 @@ def replay_host() -> Callable[..., Awaitable[list[Difference]]]:
 
 @pytest.fixture
 def replay_agents() -> Callable[..., Awaitable[list[Difference]]]:
-    """Recorded observations through workers and prompts: what replies are not the recorded ones?"""
+    """Replay recorded observations through workers and prompts, and return the replies that differ."""
     from khala import testing  # noqa: PLC0415
 
     return testing.replay_agents

@@ -3,7 +3,7 @@
     differences = await replay_host("golden.mcap")      recorded replies → host, bridge and game
     differences = await replay_agents("golden.mcap")    recorded observations → workers and prompts
 
-Both return what was sent otherwise than recorded: nothing, if nothing changed.
+Both return what differs from the recording: nothing, if nothing changed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["replay_agents", "replay_host"]
 
 
 async def replay_host(path: Path | str, *, game: str = "simulator") -> list[Difference]:
-    """Plays a recording again with its replies: the host must publish the recorded observations, byte for byte.
+    """Play a recording again with its replies: the host must publish the recorded observations, byte for byte.
 
     Args:
         path: a recording.
@@ -44,7 +44,7 @@ async def replay_agents(path: Path | str, policies: Mapping[str, object] | None 
 
     Args:
         path: a recording.
-        policies: by agent, a policy or what `khala_agents.policy.as_policy` makes one of; the others decide with their
+        policies: by agent, a policy or what `khala_agents.policy.as_policy` accepts; other agents decide with their
             recorded completions.
     """
     recording = Recording.open(path)

@@ -1,4 +1,4 @@
-"""Workers: from an `Observation` on the bus to a `Reply`, with an LLM, a function or a script in between.
+"""Workers: they answer each `Observation` on the bus with a `Reply`, using an LLM, a function or a script.
 
 An agent sees text and images only. This package knows neither PySC2 nor the simulator.
 """

@@ -9,18 +9,18 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Briefing
 
 GRACE_S = 0.25
-"""Briefing and observation of a new episode travel on different topics: the briefing may come a moment later."""
+"""Briefing and observation of a new episode travel on different topics: the briefing may arrive a moment later."""
 
 
 class Briefings:
-    """Holds one agent's newest briefing."""
+    """Hold one agent's newest briefing."""
 
     def __init__(self) -> None:
         self._newest: Briefing | None = None
         self._changed = asyncio.Condition()
 
     async def put(self, briefing: Briefing) -> bool:
-        """Takes a briefing; False if it says nothing new."""
+        """Store a briefing; return False if it says nothing new."""
         if briefing == self._newest:
             return False
         async with self._changed:
@@ -29,7 +29,7 @@ class Briefings:
         return True
 
     async def of(self, episode: int) -> Briefing:
-        """The briefing of an episode; the newest there is, if that one does not come in a moment."""
+        """Return the briefing of an episode, or the newest one if that does not arrive in a moment."""
         if self._newest is None or self._newest.episode != episode:
             async with self._changed:
                 try:

@@ -1,7 +1,7 @@
-"""Configuration → clients and policies: the place of this package that knows all its parts.
+"""Configuration → clients and policies: the one module of this package that knows all its parts.
 
-What is shared within a process is shared here: the limits of an endpoint by all agents that use the same model
-file, the budget by all. Each agent has a client, and so a connection, of its own.
+What a process shares is shared here: agents with the same model file share the limits of its endpoint, and all
+agents share the budget. Each agent has its own client, and so its own connection.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 
 
 def client_for(config: ModelConfig) -> LLMClient:
-    """A client for one agent.
+    """Return a client for one agent.
 
     Raises:
-        ConfigError: the key that the model file names is not there.
+        ConfigError: the key that the model file names is missing.
     """
     key = read_key(config.api_key_env) if config.api_key_env else None
     if config.profile == "anthropic":
@@ -68,11 +68,11 @@ def client_for(config: ModelConfig) -> LLMClient:
 
 
 class Workshop:
-    """Makes the policies of one process.
+    """Make the policies of one process.
 
     Args:
-        budget_usd: what all agents of the process together may spend.
-        overrides: fields of every model file that are given on the command line.
+        budget_usd: what all agents of the process may spend together.
+        overrides: fields given on the command line; they replace those of every model file.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Workshop:
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
-        """The policy of one agent.
+        """Return the policy of one agent.
 
         Raises:
             ConfigError: a file, a key or a module is missing or wrong.
@@ -112,7 +112,7 @@ class Workshop:
 
 
 def _located(config: ModelConfig) -> ModelConfig:
-    """The model at the address that the environment says, if it says one."""
+    """Return the model, at the address from the environment if there is one."""
     variable = config.base_url_env
     address = os.environ.get(variable) if variable else None
     return _changed(config, {"base_url": address}, source=variable) if address else config
@@ -128,7 +128,7 @@ def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, 
 
 
 def replay_policies(exchanges: Iterable[ModelCall], *, memory: int = 0) -> dict[str, LLMPolicy]:
-    """A policy for each agent that made the recorded requests; it gets the recorded answers, and waits for none.
+    """Return a policy for each agent that made the recorded requests; it gets the recorded answers without waiting.
 
     Args:
         exchanges: of one run, in any order.
@@ -147,18 +147,18 @@ def replay_policies(exchanges: Iterable[ModelCall], *, memory: int = 0) -> dict[
 
 
 def _vision_of(exchanges: Iterable[ModelCall]) -> Vision | None:
-    """Whether the model of these requests was shown pictures."""
+    """Return how the model of these requests saw pictures; None if it was shown none."""
     shown = [len(message.images) for exchange in exchanges for message in exchange.prompt]
     return Vision(max_images=max(shown)) if any(shown) else None
 
 
 def load_policy(name: str) -> Policy:
-    """The policy called `silent`, or the function, class or policy at `module:name`.
+    """Return the policy called `silent`, or the function, class or policy at `module:name`.
 
-    Modules are looked for in the current directory, too.
+    Modules are also looked for in the current directory.
 
     Raises:
-        ConfigError: there is none, or importing it failed.
+        ConfigError: there is no such policy, or importing it failed.
     """
     if name == "silent":
         return Silent()

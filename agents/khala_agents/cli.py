@@ -2,8 +2,8 @@
 
 Where only this package is installed they are `khala-agent` and `khala-llm`.
 
-They read options, put things together and run until they are told to end. What goes wrong on the user's side is
-raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the front door's part.
+They read options, put things together and run until they are stopped. A mistake of the user is raised
+as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` or `run_command` prints it.
 """
 
 from collections.abc import Callable
@@ -59,11 +59,12 @@ def agent(
     ] = None,
     base_url: Annotated[str | None, typer.Option(help="Use the model at this address instead of its file's.")] = None,
     model_name: Annotated[str | None, typer.Option(help="Use this model instead of its file's.")] = None,
-    memory: Annotated[int, typer.Option(min=0, help="Past steps that stand in the prompt, word for word.")] = 0,
+    memory: Annotated[int, typer.Option(min=0, help="Past steps that the prompt repeats, word for word.")] = 0,
     budget_usd: Annotated[
-        float | None, typer.Option(min=0.0, help="What this process may spend; then its agents hold still.")
+        float | None,
+        typer.Option(min=0.0, help="Limit of this process in US dollars; beyond it, its agents do nothing."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was done as one JSON object.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
     """Play one or more agents of a run.
 
@@ -88,20 +89,20 @@ def agent(
 def llm(
     *,
     host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes a free one.")] = (
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = (
         DEFAULT_LLM_PORT
     ),
     latency: Annotated[float, typer.Option(min=0.0, help="Seconds until a request is answered.")] = 0.0,
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            help="Part of the requests that goes wrong: an HTTP status, or quota, garbage, nonsense, half, reset, "
+            help="Part of the requests that fail: an HTTP status, or quota, garbage, nonsense, half, reset, "
             "drip, stall. May be given several times.",
             metavar="KIND=RATE",
         ),
     ] = None,
     retry_after: Annotated[float, typer.Option(min=0.0, help="Seconds in Retry-After of 429 and 503.")] = 1.0,
-    seed: Annotated[int, typer.Option(help="Of faults and of players that roll dice.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of faults and of random players.")] = 0,
     ready_file: Annotated[
         Path | None, typer.Option(help="File to write the base URL to, as JSON, once it listens.")
     ] = None,

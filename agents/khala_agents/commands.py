@@ -1,7 +1,7 @@
-"""What `khala agent` and `khala llm` do: put things together and run until the run or a signal ends them.
+"""The work of `khala agent` and `khala llm`: put things together and run until the run or a signal ends them.
 
-`khala_agents.cli` above has the options; it imports this module only when a command is run, since HTTP clients and
-servers take half a second that `--help` need not wait for.
+`khala_agents.cli` above has the options. It imports this module only to run a command: HTTP clients and
+servers take half a second to import, and `--help` need not wait for that.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def play(
     overrides: Mapping[str, str | float | None],
     as_json: bool,
 ) -> None:
-    """Plays the agents of a file until the run is over or a signal comes, and prints what they did."""
+    """Play the agents of a file until the run is over or a signal arrives, and print what they did."""
     budget = budget_usd if budget_usd is not None else file.budget_usd
     workshop = Workshop(budget_usd=budget, overrides=overrides)
     check_name(run, "run")
@@ -73,7 +73,7 @@ def serve(
     ready_file: Path | None,
     as_json: bool,
 ) -> None:
-    """Serves the scripted model until a signal comes."""
+    """Serve the scripted model until a signal arrives."""
     dice = Faults(parse_faults(faults), seed=seed)
     behaviour = Behaviour(latency_s=latency_s, faults=dice, retry_after_s=retry_after_s, seed=seed)
     _until_signal(lambda stop: _serve(Endpoint(behaviour, host=host, port=port), stop, ready_file, as_json=as_json))
@@ -83,10 +83,10 @@ def serve(
 
 
 def specs(names: Sequence[str], *, model: str | None, policy: str | None, memory: int, path: Path | None) -> AgentsFile:
-    """The agents that the command line describes, by a file or one by one.
+    """Return the agents that the command line describes, by a file or one by one.
 
     Raises:
-        ConfigError: it says both, or nothing, or the file is wrong.
+        ConfigError: the command line says both, or nothing, or the file is wrong.
     """
     if path is not None:
         if names or model or policy:
@@ -101,7 +101,7 @@ def specs(names: Sequence[str], *, model: str | None, policy: str | None, memory
 
 
 def _settle_memory() -> None:
-    """Takes what was imported out of garbage collection: going through it stops every agent for 40 ms."""
+    """Exclude imported objects from garbage collection: scanning them stops every agent for 40 ms."""
     gc.collect()
     gc.freeze()
 
@@ -122,7 +122,7 @@ async def _play(
 
 
 async def _check(policies: Iterable[Policy]) -> None:
-    """Let policies look for what is wrong with them, before a host counts on them."""
+    """Have each policy check itself before a host counts on it."""
     async with asyncio.TaskGroup() as group:
         for policy in policies:
             group.create_task(policy.check())
@@ -168,7 +168,7 @@ async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | Non
 
 
 def _write_whole(path: Path, text: str) -> None:
-    """Writes a file that nobody can see half of."""
+    """Write a file so that no reader sees half of it."""
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         part.write_text(text + "\n", encoding="utf-8")
@@ -181,7 +181,7 @@ def _write_whole(path: Path, text: str) -> None:
 
 
 def _until_signal(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
-    """Runs `work` with an event that SIGINT and SIGTERM set; a second signal ends the process at once."""
+    """Run `work` with an event that SIGINT and SIGTERM set; a second signal ends the process at once."""
 
     async def main() -> T:
         stop = asyncio.Event()

@@ -1,7 +1,7 @@
-"""What agents are configured with: model files, and files that say which agent uses which model or policy.
+"""The configuration of agents: model files, and files that say which agent uses which model or policy.
 
-Model files are found by their name below `configs/models/`, or by a path. Keys never stand in a file: a file
-names the environment variable that holds one. `khala_agents.build` makes clients and policies of what is read here.
+Model files are found by name in `configs/models/`, or by path. A file never holds a key: it names
+the environment variable that does. `khala_agents.build` makes clients and policies of what is read here.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class ModelConfig(Frozen):
     """One model at one endpoint."""
 
     profile: ProfileName | Literal["anthropic"]
-    """What kind of endpoint it is; `compatible` for one that speaks OpenAI's chat completions and has no row."""
+    """The kind of endpoint; `compatible` for one that speaks OpenAI's chat completions and has no row."""
     model: str = Field(min_length=1)
     """As the endpoint calls it."""
     base_url: str
     """Usually ends in `/v1`."""
     base_url_env: str | None = None
-    """Name of the environment variable whose value takes the place of `base_url` where it is set."""
+    """Name of the environment variable that replaces `base_url` where it is set."""
     api_key_env: str | None = None
-    """Name of the environment variable with the key; with `_FILE` appended, of one with the path of a file."""
+    """Name of the environment variable with the key; with `_FILE` appended, of the variable with the path of a file."""
     max_tokens: int | None = Field(default=None, ge=1)
     """Limit of generated tokens."""
     temperature: float | None = Field(default=None, ge=0)
@@ -54,8 +54,8 @@ class ModelConfig(Frozen):
     limits: LimitRules = LimitRules()
     prices: Prices = Prices()
     images: Vision | None = None
-    """Whether the model sees: `true`, or how finely it looks and how its pictures are counted. A model that does not is
-    sent no pictures."""
+    """Whether the model sees: `true`, or how finely it looks and how its pictures are counted. A model that does not
+    see is sent no pictures."""
 
     @field_validator("images", mode="before")
     @classmethod
@@ -98,20 +98,20 @@ class ModelConfig(Frozen):
 
     @property
     def vision(self) -> Vision | None:
-        """How the model sees, with a rule to count by; None if it does not."""
+        """How the model sees, with a rule to count pictures by; None if it does not see."""
         rule = ANTHROPIC if self.profile == "anthropic" else PROFILES[self.profile].image_tokens
         return self.images.counted_by(rule) if self.images else None
 
 
 class WorkerSpec(Frozen):
-    """How one agent decides: with a model, or with a policy."""
+    """How one agent decides: with a model or with a policy."""
 
     model: str | None = None
-    """Name of a shipped model file, or path of one, relative to the file that it stands in."""
+    """Name of a shipped model file, or path of a model file, relative to the file that names it."""
     policy: str | None = None
     """`module:name` of a function or a policy, or `silent`."""
     memory: int = Field(default=0, ge=0)
-    """Steps that stand in the prompt beside the observation, word for word; with a model only."""
+    """Number of past steps that the prompt repeats word for word before the observation; with a model only."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
@@ -121,14 +121,14 @@ class WorkerSpec(Frozen):
 
 
 class AgentsFile(Frozen):
-    """A file that says how each of several agents decides."""
+    """A file that says how each of its agents decides."""
 
     ELSEWHERE: ClassVar[dict[str, str]] = {"default_reply": "belongs in the task file: the host says it for all agents"}
 
     agents: dict[str, WorkerSpec] = Field(min_length=1)
     """By name of the agent."""
     budget_usd: float | None = Field(default=None, gt=0)
-    """What all of them together may spend; then the host takes the default reply of the task for them."""
+    """What all of them may spend together; after that, the host takes the default reply of the task for them."""
 
     @field_validator("agents")
     @classmethod
@@ -142,15 +142,15 @@ class AgentsFile(Frozen):
 
 
 def model_files() -> dict[str, Path]:
-    """The shipped model files by name."""
+    """Return the shipped model files by name."""
     return {path.stem: path for path in sorted((CONFIGS / "models").glob("*.yaml"))}
 
 
 def load_model(name: str, *, relative_to: Path | None = None) -> ModelConfig:
-    """The model file of this name, or at this path.
+    """Return the model file of this name, or at this path.
 
     Raises:
-        ConfigError: there is none, or it is wrong; the text says what and where.
+        ConfigError: there is no such file, or it is wrong; the text says what and where.
     """
     if name.endswith((".yaml", ".yml")):
         return load((relative_to or Path()) / name, ModelConfig)
@@ -163,10 +163,10 @@ def load_model(name: str, *, relative_to: Path | None = None) -> ModelConfig:
 
 
 def load_agents(path: Path) -> AgentsFile:
-    """The file at `path`, with the paths of its model files made relative to where we are.
+    """Return the file at `path`, with the paths of its model files made relative to the current directory.
 
     Raises:
-        ConfigError: there is none, or it is wrong; the text says what and where.
+        ConfigError: there is no such file, or it is wrong; the text says what and where.
     """
     file = load(path, AgentsFile)
     specs = {

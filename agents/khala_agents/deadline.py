@@ -1,4 +1,4 @@
-"""How much of the time to answer is for deciding, and how much is kept for sending the answer."""
+"""How much of the time to answer is for deciding, and how much is reserved for sending the answer."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ MARGIN_MAX_S = 0.5
 
 
 def time_to_decide_s(answer_within_s: float | None) -> float | None:
-    """Seconds a policy may take, from the arrival of an observation; None is as long as it likes.
+    """Return the seconds a policy may take from the arrival of an observation; None for no limit.
 
-    At most half of a very short time is kept back.
+    At most half of a very short time is reserved.
     """
     if answer_within_s is None:
         return None

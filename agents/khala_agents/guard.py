@@ -1,7 +1,7 @@
-"""Ask a policy, and have a reply in time whatever the policy does.
+"""Ask a policy, and return a reply in time whatever the policy does.
 
-A policy is somebody else's code: it may raise, return nonsense, take too long, or not care that it is cancelled.
-Each of these is a `Decision` with status `fallback` and no words here; the host then takes the default reply of the
+A policy is the user's code: it may raise, return nonsense, take too long, or ignore its cancellation.
+Each of these becomes a `Decision` with status `fallback` and no text; the host then takes the default reply of the
 task. Above it: `khala_agents.worker`.
 """
 
@@ -24,13 +24,13 @@ P = ParamSpec("P")
 log = logging.getLogger(__name__)
 
 UNWIND_S = 0.02
-"""A policy that is cancelled gets so long to tell what it has spent, before the fallback is sent."""
+"""Time that a cancelled policy has to report its spending, before the fallback is sent."""
 MAX_REPLY_CHARACTERS = 65_536
-"""Longer replies are cut: a model that repeats itself without end must not fill the bus."""
+"""Longer replies are cut: a model that repeats itself endlessly must not fill the bus."""
 
 
 class Guard:
-    """Stands between a worker and the policy of one agent.
+    """Stand between a worker and the policy of one agent.
 
     Args:
         agent: name of the agent, for the log.
@@ -42,7 +42,7 @@ class Guard:
         self._abandoned: set[asyncio.Task[Said]] = set()
 
     async def within(self, time_s: float | None, deciding: Coroutine[Any, Any, Said]) -> Decision:
-        """The decision, or a fallback after `time_s` seconds. Raises only what a cancelled or ending process raises."""
+        """Return the decision, or a fallback after `time_s` seconds. Raise only if cancelled or if the process ends."""
         task = asyncio.create_task(deciding, name=f"decide {self._agent}")
         try:
             done, _ = await asyncio.wait({task}, timeout=time_s)
@@ -57,18 +57,18 @@ class Guard:
     async def safely(
         self, what: str, function: Callable[P, Awaitable[None]], *args: P.args, **kwargs: P.kwargs
     ) -> None:
-        """Runs a part of a policy that need not succeed."""
+        """Run an optional part of a policy; log its failure."""
         try:
             await function(*args, **kwargs)
         except Exception as error:  # noqa: BLE001 - a policy is the user's code; it is logged, and the agent lives on
             self._complain(f"{what} failed", error)
 
     async def settle(self, timeout_s: float) -> None:
-        """Waits until cancelled decisions have ended, or gives them up."""
+        """Wait until cancelled decisions have ended, or give up on them."""
         if self._abandoned:
             _, pending = await asyncio.wait(self._abandoned, timeout=timeout_s)
             if pending:
-                log.warning("agent %s: %d decision(s) ignored that they were cancelled", self._agent, len(pending))
+                log.warning("agent %s: %d decision(s) ignored their cancellation", self._agent, len(pending))
 
     def _outcome(self, task: asyncio.Task[Said]) -> Decision:
         if task.cancelled():
@@ -103,7 +103,7 @@ class Guard:
     def _forget(self, task: asyncio.Task[Said]) -> None:
         self._abandoned.discard(task)
         if not task.cancelled():
-            task.exception()  # asked for, so that asyncio does not report it as never retrieved
+            task.exception()  # retrieved here, so that asyncio does not report it as never retrieved
 
     def _complain_of_model(self, error: LLMError) -> None:
         self._once(f"no reply of the model: {error} (further errors '{error.status}' are not logged)")

@@ -1,7 +1,7 @@
-"""What an agent's requests to its model took: summed up for its replies, and published for the recording.
+"""The usage of an agent's requests to its model: summed up for its replies, and published for the recording.
 
-A policy tells of each request as soon as it is over; that must cost it nothing, so exchanges wait here until there is
-time to send them. Only `khala_agents.worker` uses it.
+A policy reports each request as soon as it is over. That must cost the policy nothing, so exchanges wait here until
+there is time to send them. Only `khala_agents.worker` uses this module.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class UsageLedger:
     """The exchanges of one agent.
 
     Attributes:
-        usage: of all of them.
+        usage: of all exchanges.
     """
 
     def __init__(self, agent: str) -> None:
@@ -37,27 +37,27 @@ class UsageLedger:
         self._waiting: asyncio.Queue[ModelCall] = asyncio.Queue()
 
     def open(self, step: Step) -> None:
-        """Begins the account of a step, given as episode and number."""
+        """Open the account of a step, given as episode and number."""
         self._step, self._spent = step, []
 
     def note(self, exchange: ModelCall) -> None:
-        """Takes an exchange. What belongs to an older step is published, and not on the account of this one."""
+        """Note an exchange; one of an older step is published, but not counted for this step."""
         if (exchange.episode, exchange.step) == self._step:
             self._spent.append(exchange.usage)
         self.usage += exchange.usage
         self._waiting.put_nowait(exchange)
 
     def account(self) -> tuple[int, Usage]:
-        """Requests of the open step, and what they took."""
+        """Return the number of requests of the open step, and their usage."""
         return len(self._spent), sum(self._spent, Usage())
 
     async def publish(self, publisher: Publisher) -> None:
-        """Publishes exchanges as they come, until it is cancelled."""
+        """Publish exchanges as they arrive, until cancelled."""
         while True:
             await self._put(await self._waiting.get(), publisher)
 
     async def flush(self, publisher: Publisher) -> None:
-        """Publishes what is still waiting."""
+        """Publish the exchanges that still wait."""
         try:
             while not self._waiting.empty():
                 await self._put(self._waiting.get_nowait(), publisher)

@@ -1,4 +1,4 @@
-"""What one agent hears and says: its subscriptions, its publishers and its liveliness token.
+"""The topics of one agent: its subscriptions, its publishers and its liveliness token.
 
 Only `khala_agents.worker` uses it. Nothing is decoded here.
 """
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 IMAGES = 64
-"""Pictures that wait to be taken."""
+"""Number of pictures that may wait to be read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Links:
     """The topics of one agent.
 
-    Of what it hears the newest sample waits, of pictures those of some observations; of what it says nothing.
+    Of each subscription the newest sample waits, of pictures those of some observations; what it says does not wait.
     """
 
     briefings: Subscription[Sample]
@@ -39,7 +39,7 @@ class Links:
 
 
 async def join(stack: AsyncExitStack, bus: Bus, run: str, side: str, agent: str) -> Links:
-    """Declares all of it, and says that the agent is there once it can hear; `stack` takes it back.
+    """Declare all topics, and announce the agent once it can hear; `stack` undoes it.
 
     Raises:
         BusClosed: the bus is closed.

@@ -1,7 +1,7 @@
 """The policy that asks a language model: prompt → tries within limits → the model's words.
 
 Above it: the worker, which cancels it at the deadline. Below it: `khala_agents.prompt`, `khala_agents.memory` and
-`khala_agents.llm`. It knows no bus; each try, also one that failed or was cancelled, goes to the trace of its context.
+`khala_agents.llm`. It knows no bus. Each try, even a failed or cancelled one, goes to the trace of its context.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ UNKNOWN = Usage(requests=1, unknown_requests=1)
 
 
 class LLMPolicy(Policy):
-    """Decides by asking a language model.
+    """Decide by asking a language model.
 
-    One request with `try_timeout_s` for it, repeated as `retry` says, never past the deadline.
+    One request of at most `try_timeout_s`, repeated as `retry` says, never past the deadline.
 
     Args:
         client: the model; closed with the policy.
@@ -51,7 +51,7 @@ class LLMPolicy(Policy):
         retry: how often a failed try is repeated.
         limits: shared with other agents of the process.
         try_timeout_s: time for one try; the time to the deadline if that is shorter.
-        vision: what the model sees; None if it sees nothing, and pictures are left out.
+        vision: how the model sees; None if it does not see, and pictures are left out.
         rng: jitter of the waits between tries.
     """
 
@@ -77,14 +77,14 @@ class LLMPolicy(Policy):
         self._prompt: tuple[Briefing, Prompt] | None = None
 
     async def check(self) -> None:
-        """Makes sure that the endpoint takes the key; leaves no connection open, since nobody may come to close it."""
+        """Check that the endpoint accepts the key; leave no connection open, because nothing may close it later."""
         try:
             await self.client.check()
         finally:
             await self.client.close()
 
     async def prepare(self, briefing: Briefing) -> None:
-        """Begins an episode: builds the prompt, forgets the last one, opens a fresh connection."""
+        """Begin an episode: build the prompt, forget the last episode, open a fresh connection."""
         self._prompt_for(briefing)
         self._memory.clear()
         await self.client.refresh()
@@ -93,7 +93,7 @@ class LLMPolicy(Policy):
         """Return the model's words.
 
         Raises:
-            LLMError: there are none; the error of the last try.
+            LLMError: the last try failed; its error.
         """
         observation = context.observation
         pictures = await self._look(context)
@@ -110,11 +110,11 @@ class LLMPolicy(Policy):
         return completion.text
 
     async def close(self) -> None:
-        """Closes the client."""
+        """Close the client."""
         await self.client.close()
 
     async def _look(self, context: Context) -> Mapping[str, bytes]:
-        """The pictures of an observation that are there, or come in a moment; none for a model that does not see."""
+        """Return an observation's pictures that arrived, or arrive in a moment; none for a model that does not see."""
         observation = context.observation
         if not observation.images:
             return {}
@@ -162,7 +162,7 @@ class _Tries:
         self._clock = asyncio.get_running_loop().time
 
     async def once(self) -> Completion:
-        """Makes one try, as soon as the limits let it."""
+        """Make one try, as soon as the limits allow it."""
         async with self._policy.limits.admit(tokens=self._tokens, deadline=self._context.deadline) as ticket:
             self._made += 1
             began = self._clock()

@@ -1,7 +1,7 @@
-"""What an agent carries from one step to the next, within its prompt.
+"""What an agent carries from one step to the next in its prompt.
 
-An observation already tells what became of the last actions and which messages came, so that no memory is a
-good default; what is here adds earlier steps word for word. Any object with these three methods will do.
+An observation already reports the results of the last actions and the new messages, so no memory is a
+good default; the memories here add earlier steps word for word. Any object with these three methods works.
 """
 
 from __future__ import annotations
@@ -19,44 +19,44 @@ class Memory(Protocol):
     """The memory of one agent."""
 
     def remember(self, observation: Observation, reply: str) -> None:
-        """Takes note of a step that was answered."""
+        """Note a step that was answered."""
         ...
 
     def recall(self) -> tuple[ChatMessage, ...]:
-        """What stands in the prompt between the example and the new observation."""
+        """Return the messages of the prompt between the example and the new observation."""
         ...
 
     def clear(self) -> None:
-        """Forgets everything, at the beginning of an episode."""
+        """Forget everything, at the beginning of an episode."""
         ...
 
 
 class NoMemory:
-    """Remembers nothing."""
+    """Remember nothing."""
 
     def remember(self, observation: Observation, reply: str) -> None:
-        """Does nothing."""
+        """Do nothing."""
 
     def recall(self) -> tuple[ChatMessage, ...]:
-        """Nothing."""
+        """Return nothing."""
         return ()
 
     def clear(self) -> None:
-        """Does nothing."""
+        """Do nothing."""
 
 
 class LastSteps:
-    """Remembers observations and replies of the last `count` steps as they were, without their pictures."""
+    """Remember observations and replies of the last `count` steps unchanged, without their pictures."""
 
     def __init__(self, count: int) -> None:
         self._steps: deque[tuple[str, str]] = deque(maxlen=count)
 
     def remember(self, observation: Observation, reply: str) -> None:
-        """Takes note of a step, and forgets the oldest if there are too many."""
+        """Note a step, and forget the oldest if there are too many."""
         self._steps.append((observation.text, reply))
 
     def recall(self) -> tuple[ChatMessage, ...]:
-        """A user and an assistant message a step, the oldest first."""
+        """Return a user and an assistant message per step, the oldest first."""
         return tuple(
             message
             for seen, said in self._steps
@@ -64,5 +64,5 @@ class LastSteps:
         )
 
     def clear(self) -> None:
-        """Forgets everything."""
+        """Forget everything."""
         self._steps.clear()

@@ -1,8 +1,8 @@
 """The pictures that arrived lately, found by the hash under which observations name them.
 
-A picture travels on a topic of its own and is put before the observation that names it, but nothing promises that it
-arrives before, or at all: a policy that wants pictures waits for a moment, and goes on with those that are there. Only
-`khala_agents.worker` puts some in; policies find them in their `khala_agents.policy.Context`.
+A picture travels on its own topic and is sent before the observation that names it, but nothing promises that it
+arrives before it, or at all: a policy that wants pictures waits for a moment, and goes on with those it has. Only
+`khala_agents.worker` stores pictures; policies find them in their `khala_agents.policy.Context`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from khala_protocol.messages import ImageRef
 
 MOST_BYTES = 32 * 2**20
-"""What is kept; older pictures are forgotten. An observation with three pictures has about 100 kB."""
+"""Size of the store; older pictures are forgotten. An observation with three pictures has about 100 kB."""
 PATIENCE_S = 0.5
-"""How long a picture is waited for that is not there yet."""
+"""How long to wait for a missing picture."""
 
 
 class PictureStore:
-    """Holds the newest pictures of one agent."""
+    """Hold the newest pictures of one agent."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes
@@ -33,9 +33,9 @@ class PictureStore:
         self._arrived = asyncio.Condition()
 
     async def put(self, data: bytes) -> None:
-        """Takes a picture."""
+        """Store a picture."""
         digest = hashlib.sha256(data).hexdigest()
-        if digest in self._kept:  # the same picture again: it is new once more
+        if digest in self._kept:  # the same picture again: it becomes the newest
             self._kept.move_to_end(digest)
         else:
             self._kept[digest] = data
@@ -47,7 +47,7 @@ class PictureStore:
             self._arrived.notify_all()
 
     async def get(self, refs: Sequence[ImageRef], within_s: float = PATIENCE_S) -> Mapping[str, bytes]:
-        """The bytes of these pictures by their hashes, without those that did not come within so many seconds."""
+        """Return the bytes of these pictures by their hashes, without those that do not arrive within this time."""
         wanted = {ref.sha256 for ref in refs}
         if not wanted <= self._kept.keys():
             try:

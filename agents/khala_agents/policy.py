@@ -5,7 +5,7 @@
         async def decide(self, context) -> str: ...         with pictures, the deadline and a trace of requests
 
 The worker (`khala_agents.worker`) is above: it owns the bus and the deadline, and cancels a decision that is late. A
-policy that raises, or answers nothing in time, costs its agent that step and no more. The policy that asks a language
+policy that raises, or answers too late, costs its agent that step and no more. The policy that asks a language
 model is `khala_agents.llm_policy.LLMPolicy`; shipped doubles are in `khala_agents.scripted`.
 """
 
@@ -36,13 +36,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """A reply with what is to be known about it; a policy may return one in place of the bare text.
+    """A reply with information about it; a policy may return one instead of the bare text.
 
     Attributes:
         text: the reply.
         status: `fallback` if the policy knows that it failed.
         detail: why it is a fallback, in a few words.
-        attempts, usage: what it took; requests that a policy traces (`Context.trace`) are counted by the worker.
+        attempts, usage: its cost; the worker counts requests that a policy traces (`Context.trace`).
     """
 
     text: str
@@ -53,7 +53,7 @@ class Decision:
 
 
 Said: TypeAlias = str | Decision
-"""What `decide` returns: a reply, or a reply with what is to be known about it."""
+"""What `decide` returns: a reply, or a reply with information about it."""
 
 
 def _untraced(exchange: ModelCall) -> None:
@@ -66,12 +66,12 @@ def _now() -> float:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a policy has for one decision. The worker makes it; a test can: `Context(briefing, observation)`.
+    """The context of one decision. The worker makes it; a test can: `Context(briefing, observation)`.
 
     Attributes:
         briefing: who the agent is and what it may do, in this episode.
-        observation: what it answers.
-        pictures: where the pictures of the observation are found.
+        observation: the observation to answer.
+        pictures: the store of the observation's pictures.
         trace: call it with each request to a model as soon as the request is over; it is published, recorded and
             counted in the reply.
         arrived: when the observation arrived, on the clock of the event loop.
@@ -85,7 +85,7 @@ class Context:
 
     @property
     def time_s(self) -> float | None:
-        """Seconds that the decision may take in all; None for as long as it likes."""
+        """Seconds that the decision may take in all; None for no limit."""
         return time_to_decide_s(self.observation.answer_within_s)
 
     @property
@@ -95,18 +95,18 @@ class Context:
 
     @property
     def time_left_s(self) -> float | None:
-        """Seconds until the deadline, not below 0; None if there is none."""
+        """Seconds until the deadline, not below 0; None if there is no deadline."""
         return None if self.deadline is None else max(self.deadline - _now(), 0.0)
 
 
 class Policy(ABC):
-    """Decides for one agent: the base class of policies. Only `decide` has to be written."""
+    """Decide for one agent: the base class of policies. Only `decide` is required."""
 
     async def check(self) -> None:  # noqa: B027  # a hook, not a duty
         """Look for what is wrong, before the agent joins a run.
 
         Raises:
-            KhalaError: something that the user has to mend.
+            KhalaError: the user has to correct something.
         """
 
     async def prepare(self, briefing: Briefing) -> None:  # noqa: B027  # a hook
@@ -116,18 +116,18 @@ class Policy(ABC):
     async def decide(self, context: Context) -> Said:
         """Return the reply to an observation: free text with calls in it, see `khala_protocol.speech`.
 
-        It may be cancelled at any moment, when its time is over or a newer observation is there.
+        It may be cancelled at any moment: when its time is over or a newer observation arrives.
         """
 
     async def close(self) -> None:  # noqa: B027  # a hook
-        """Release what is held open, when the worker ends."""
+        """Release all resources, when the worker ends."""
 
 
 class FunctionPolicy(Policy):
-    """Decides with a function of briefing and observation.
+    """Decide with a function of briefing and observation.
 
-    One that is not `async` runs in a thread, where it may block. A thread cannot be cancelled: what it still does after
-    the deadline is thrown away. An `async` function runs on the loop of all agents of the process, and must not block.
+    A function that is not `async` runs in a thread, where it may block. A thread cannot be cancelled: its result after
+    the deadline is discarded. An `async` function runs on the loop of all agents of the process, and must not block.
     """
 
     def __init__(self, function: Callable[[Briefing, Observation], Said | Awaitable[Said]]) -> None:
@@ -144,7 +144,7 @@ class FunctionPolicy(Policy):
 
 
 class ObjectPolicy(FunctionPolicy):
-    """Decides with any object that has `decide(briefing, observation)`, and calls its `prepare` and `close` if any.
+    """Decide with any object that has `decide(briefing, observation)`; call its `prepare` and `close` if it has them.
 
     Attributes:
         thing: the object.
@@ -171,7 +171,7 @@ class ObjectPolicy(FunctionPolicy):
 
 
 def as_policy(thing: object) -> Policy:
-    """Return a policy as it is, and a function or an object with a method `decide` as a policy.
+    """Return a policy unchanged; wrap a function or an object with a method `decide` in a policy.
 
     Raises:
         TypeError: it is none of these.
@@ -186,9 +186,9 @@ def as_policy(thing: object) -> Policy:
 
 
 async def _in_thread(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """What `function` returns, from a thread that does not keep the process from ending."""
+    """Return the result of `function`, from a thread that does not keep the process from ending."""
     future: Future[T] = Future()
-    future.set_running_or_notify_cancel()  # from now on it cannot be cancelled, as the thread cannot
+    future.set_running_or_notify_cancel()  # from now on it cannot be cancelled, just as the thread cannot
     context = contextvars.copy_context()
 
     def run() -> None:

@@ -1,9 +1,9 @@
 """A briefing and an observation → the messages of a prompt.
 
 All that stays the same during an episode is put together once and stands at the front, word for word the
-same in each step, so that a provider can cache it: who the agent is, what it has to do, its teams, what it
-may do and how, how to answer, and an example made of the agent's own teams and actions. Then come
-what the memory recalls, and the observation as the host wrote it.
+same in each step, so that a provider can cache it: the agent's role, its task, its teams, its actions
+and their form, how to answer, and an example made of the agent's own teams and actions. The messages
+that the memory recalls follow, and the observation as the host wrote it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import ActionSpec, Briefing, Clock, Contact, Frames, ImageRef, TeamSpec
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
-"""Tags of the example; a game's own tags are longer, so that one that was copied is seen at once."""
+"""Tags of the example; a game's own tags are longer, so that a copied one is noticed at once."""
 _EXAMPLE_VALUES = {"screen": "[14.5, 9]", "minimap": "[31, 22]"}
 
 
@@ -39,13 +39,13 @@ class Prompt:
         images: tuple[ImageRef, ...] = (),
         missing: Sequence[ImageRef] = (),
     ) -> tuple[ChatMessage, ...]:
-        """System message, example, what the memory recalls, and at the end the observation behind its pictures.
+        """Return the system message, the example, what the memory recalls, and the observation behind its pictures.
 
         Args:
             observation_text: as the host wrote it.
-            recalled: of earlier steps.
-            images: are shown, each with its title before it.
-            missing: should be there and are not; the model is told.
+            recalled: messages of earlier steps.
+            images: pictures to show, each with its title before it.
+            missing: pictures that did not arrive; the prompt says so.
         """
         lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
         seen = ChatMessage(
@@ -59,7 +59,7 @@ def _line(text: str) -> str:
 
 
 def system_text(briefing: Briefing) -> str:
-    """The part of a prompt that says everything but what is seen."""
+    """Return the part of a prompt that says everything except what the agent sees."""
     sections = (
         ("Who you are", _identity(briefing)),
         ("Your task", briefing.task),
@@ -121,7 +121,7 @@ def _actions(actions: Iterable[ActionSpec]) -> str:
 
 
 def signature(action: ActionSpec) -> str:
-    """An action as it is listed: `<Attack_Unit(tag)>`."""
+    """Return an action as it is listed: `<Attack_Unit(tag)>`."""
     return f"<{action.name}({', '.join(action.args)})>"
 
 
@@ -184,7 +184,7 @@ def _example_reply(briefing: Briefing) -> str:
 
 
 def _example_teams(briefing: Briefing) -> dict[str, list[ActionSpec]]:
-    """Up to two teams, with up to two actions each, that show as many kinds of arguments as there are."""
+    """Return up to two teams, with up to two actions each, that show as many kinds of arguments as possible."""
     teams = [team.name for team in briefing.teams[:2]] or [briefing.agent]
     kinds: dict[tuple[str, ...], ActionSpec] = {}
     for action in briefing.actions:

@@ -1,8 +1,8 @@
-"""Show recorded observations to an agent again, and compare what it says with what it said.
+"""Show recorded observations to an agent again, and compare its replies with the recorded ones.
 
-Worker and prompt are the real ones, on a bus in memory; the model is replaced by its recorded completions,
-or the whole policy by one of the caller's. Observations that were not answered in time then are left out: what an
-agent does when it is cut off depends on the clock.
+Worker and prompt are the real ones, on a bus in memory. The recorded completions replace the model, or the caller's
+policy replaces the whole policy. Observations that were not answered in time in the recording are left out: the
+behaviour of an agent that is cut off depends on the clock.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from khala_protocol.recording import Recording
 
 PATIENCE_S = 30.0
-"""How long a reply may take that waits for no model."""
+"""How long a reply that waits for no model may take."""
 
 
 async def replay_agent(recording: Recording, agent: str, policy: Policy | None = None) -> list[Difference]:
-    """Replays one agent of a recording.
+    """Replay one agent of a recording.
 
     Args:
         recording: of a run.
@@ -41,10 +41,10 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
         policy: decides; by default the language model policy with the recorded completions.
 
     Returns:
-        every reply that is not the recorded one.
+        every reply that differs from the recorded one.
 
     Raises:
-        RecordingError: the recording has no such agent, or no requests of it and no policy is given.
+        RecordingError: the recording has no such agent, or none of its requests and no policy is given.
     """
     run = recording.run
     card = next((card for card in run.agents if card.name == agent), None) if run else None
@@ -71,14 +71,14 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
 
 
 class _Scene:
-    """One observation with what was said to it."""
+    """One observation and the reply to it."""
 
     def __init__(self, observation: Observation, reply: Reply) -> None:
         self.observation, self.reply = observation, reply
 
 
 class _Image(NamedTuple):
-    """A picture, and the place that it was published under."""
+    """A picture, and the key that it was published under."""
 
     place: int
     data: bytes
@@ -88,7 +88,7 @@ _Part = Briefing | _Image | _Scene
 
 
 def _script(recording: Recording, agent: str) -> Iterator[_Part]:
-    """Briefings, pictures, and the observations that were answered, in their order."""
+    """Return briefings, pictures, and the observations that were answered, in their order."""
     replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
     for sample in recording:
         address = sample.address
@@ -156,5 +156,5 @@ class _Stage:
 
 
 def _words(reply: Reply) -> str:
-    """What a reply says, without how long it took."""
+    """Return the words of a reply, without its times."""
     return reply.model_dump_json(exclude={"latency_s", "usage"})

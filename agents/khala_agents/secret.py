@@ -1,8 +1,8 @@
-"""Keys of model providers: read from the environment, and nowhere else to be seen.
+"""Keys of model providers: read from the environment, and never shown anywhere else.
 
-A key is a `pydantic.SecretStr` from the moment it is read, so that neither `repr` nor a log line shows it. What
-a server says can still echo it; every text that comes from outside on its way to a log, a message or a
-recording goes through `scrub`, which knows all keys that this process has read.
+A key is a `pydantic.SecretStr` from the moment it is read, so that neither `repr` nor a log line shows it. A
+server may still echo it: every text from outside passes through `scrub`, which knows all keys that this process
+has read, before it goes to a log, a message or a recording.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _read: set[str] = set()
 
 
 def read_key(variable: str, environ: Mapping[str, str] | None = None) -> SecretStr:
-    """The key in the environment variable `variable`, or in the file that `<variable>_FILE` names.
+    """Return the key in the environment variable `variable`, or in the file that `<variable>_FILE` names.
 
     Raises:
-        ConfigError: there is none, or it cannot be one; the text does not show it.
+        ConfigError: there is no key, or it cannot be one; the text does not show it.
     """
     environ = os.environ if environ is None else environ
     file = environ.get(f"{variable}_FILE")
@@ -53,7 +53,7 @@ def read_key(variable: str, environ: Mapping[str, str] | None = None) -> SecretS
 
 
 def scrub(text: str) -> str:
-    """`text` with every key that was read replaced by a mask."""
+    """Return `text` with a mask in place of every key that was read."""
     for value in _read:
         if value in text:
             text = text.replace(value, MASK)

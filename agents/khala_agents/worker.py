@@ -1,11 +1,11 @@
 """One agent on the bus: an observation in, one reply out.
 
-The worker owns what a policy must not care about: the bus, the deadline, and that every step is answered once
-and only once. It announces the agent's liveliness, hears briefings and observations (the newest supersedes
-the older ones, and cancels a decision that is still being made for one of them), has a policy decide under
-`khala_agents.guard`, and sends what was said and what it took. It does not read the reply: the host does.
+The worker owns everything that a policy need not know: the bus, the deadline, and that every step is answered
+exactly once. It announces the agent's liveliness and receives briefings and observations (the newest supersedes
+the older ones, and cancels a decision that is still being made for one of them). It has a policy decide under
+`khala_agents.guard`, and sends the reply with its usage. It does not read the reply: the host does.
 
-It may join late or be restarted: briefing and newest observation are there as soon as it listens. Below it
+It may join late or be restarted: it gets briefing and newest observation as soon as it subscribes. Below it
 are `protocol` and a policy; above it are the command line, and tests.
 """
 
@@ -41,18 +41,18 @@ M = TypeVar("M", bound=Wire)
 Ending = Literal["result", "stopped", "bus closed"]
 
 UNWIND_S = 1.0
-"""What cancelled decisions get to end, when the worker ends."""
+"""Time that cancelled decisions get to end, when the worker ends."""
 
 
 @dataclass(slots=True)
 class WorkerTally:
-    """What a worker has done.
+    """The work of a worker so far.
 
     Attributes:
         replies: replies sent, by status.
         fallbacks: the fallbacks among them, by detail.
-        superseded: observations that were not answered, because a newer one came.
-        usage: what all requests took.
+        superseded: observations that were not answered, because a newer one arrived.
+        usage: the usage of all requests.
         ended: why the worker ended.
     """
 
@@ -72,14 +72,14 @@ async def run_worker(
     *,
     stop: asyncio.Event | None = None,
 ) -> WorkerTally:
-    """Plays one agent until the run's last result, or until `stop` is set or the bus is closed.
+    """Play one agent until the run's last result, or until `stop` is set or the bus is closed.
 
     Args:
         bus: stays open afterwards.
         run: name of the run.
         side: side of the agent.
         name: name of the agent.
-        policy: decides; closed afterwards. If it says nothing in time, an empty reply is sent as a fallback.
+        policy: decides; closed afterwards. If it does not answer in time, an empty reply is sent as a fallback.
         stop: ends the worker when it is set.
     """
     return await Worker(bus, run, side, name, policy).play(stop or asyncio.Event())
@@ -93,7 +93,7 @@ async def run_workers(
     *,
     stop: asyncio.Event | None = None,
 ) -> dict[str, WorkerTally]:
-    """Plays several agents in one process, each with its own policy, until all have ended."""
+    """Play several agents in one process, each with its own policy, until all have ended."""
     stop = stop or asyncio.Event()
     async with asyncio.TaskGroup() as group:
         tasks = {
@@ -124,7 +124,7 @@ class Worker:
         self._preparing: asyncio.Task[None] | None = None
 
     async def play(self, stop: asyncio.Event) -> WorkerTally:
-        """Joins, answers, and leaves; see `run_worker`."""
+        """Join, answer, and leave; see `run_worker`."""
         async with AsyncExitStack() as stack:
             stack.push_async_callback(self._guard.safely, "closing the policy", self._policy.close)
             try:
@@ -190,7 +190,7 @@ class Worker:
         self._end("bus closed")
 
     async def _read(self, kind: type[M], samples: Subscription[Sample]) -> AsyncIterator[M]:
-        """What arrives, without what is no message of this kind."""
+        """Yield the messages of this kind, without anything else that arrives."""
         async for sample in samples:
             try:
                 yield decode_as(kind, sample.payload)
@@ -204,7 +204,7 @@ class Worker:
     # --- answering ----------------------------------------------------------------------------------
 
     async def _answer(self, observation: Observation, links: Links) -> None:
-        """One turn: decide, then send. Cancelled while deciding only."""
+        """Play one turn: decide, then send. Only deciding can be cancelled."""
         arrived = self._clock()
         self._ledger.open((observation.episode, observation.step))
         time_s = time_to_decide_s(observation.answer_within_s)
@@ -222,7 +222,7 @@ class Worker:
         return await self._policy.decide(Context(briefing, observation, self._pictures, self._ledger.note, arrived))
 
     async def _send(self, observation: Observation, decision: Decision, links: Links, *, latency_s: float) -> None:
-        attempts, usage = self._ledger.account()  # before anything is awaited, for another step may begin meanwhile
+        attempts, usage = self._ledger.account()  # before any await, because another step may begin meanwhile
         reply = Reply(
             run=self._run,
             side=self._side,

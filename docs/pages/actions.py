@@ -1,4 +1,4 @@
-"""The pages of what agents can say: every text action, and every one of PySC2's functions with the actions for it."""
+"""The pages of the text actions, and of every one of PySC2's functions with the actions for it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 RACES = {None: "Every race", "protoss": "Protoss", "terran": "Terran", "zerg": "Zerg"}
 SHOWN = 6
-"""Unit types that are listed one by one."""
+"""Number of unit types that are listed one by one."""
 SUBJECTS = {"team": "", "unit": "one unit", "two_units": "two units", "side": "the side's "}
 
 
 def actions() -> str:
-    """The catalogue of text actions."""
+    """Return the catalogue of text actions."""
     written = [action for action in catalogue().values() if action.group != GROUP]
     made = [action for action in catalogue().values() if action.group == GROUP]
     return join(
@@ -42,7 +42,7 @@ def actions() -> str:
 
 
 def functions() -> str:
-    """Every function of PySC2 and how it is reached."""
+    """Return every function of PySC2 and how it is reached."""
     rows = coverage()
     reached = [row for row in rows if row.actions]
     interface = [row for row in rows if row.function.kind == "interface"]
@@ -53,7 +53,7 @@ def functions() -> str:
         head("Functions", "`khala_bridge.catalogue.coverage`"),
         f"PySC2 has {len(rows)} functions. {len(reached)} can be reached in words. {len(interface)} are those of its "
         f"interface, {len(gone)} belong to what version 4.10 of the game does not have; both are listed first, each "
-        "with the reason. `khala actions --function NAME` tells of one.",
+        "with the reason. `khala actions --function NAME` shows one.",
         table(("kind", "functions", "reached in words", "not"), [*counts, _counts("all", list(rows))]),
         "## Not reached",
         table(("id", "function", "why"), [(r.function.id, code(r.function.name), r.reason) for r in rows if r.reason]),
@@ -124,7 +124,7 @@ def _who(action: Action) -> str:
 
 
 def _generated(made: list[Action]) -> str:
-    """A line for each function, since what the actions of one function do differs only in how the target is given."""
+    """Return a line for each function, since the actions of one function differ only in how the target is given."""
     whole = [action for action in made if action.subject != "unit"]
     rows = [
         (codes(f"{a.name}({', '.join(a.args)})" for a in group), _who(group[0]), _in_common(group))
@@ -143,7 +143,7 @@ def _generated(made: list[Action]) -> str:
 
 
 def _in_common(actions: list[Action]) -> str:
-    """The sentences that what is said of several actions begins with."""
+    """Return the sentences that the descriptions of several actions begin with."""
     sentences = [re.split(r"(?<=[.;]) ", action.about) for action in actions]
     shared = takewhile(lambda each: len(set(each)) == 1, zip(*sentences, strict=False))
     return " ".join(each[0] for each in shared) or actions[0].about

@@ -1,4 +1,4 @@
-"""The page of the command line, out of its own help."""
+"""The page of the command line, from its own help."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def page() -> str:
-    """Every command with its arguments, options and examples."""
+    """Return every command with its arguments, options and examples."""
     root: Any = typer.main.get_command(app)
     found = list(_commands(root, "khala"))
     contents = table(
@@ -48,7 +48,7 @@ def _section(path: str, command: Any) -> str:
 
 
 def _paragraphs(text: str) -> str:
-    """Help text, in which an indented paragraph is a command to type."""
+    """Return help text, in which an indented paragraph is a command to type."""
     blocks = [block for block in text.split("\n\n") if block.strip()]
     return "\n\n".join(fence(block.strip(), "bash") if block.startswith("    ") else prose(block) for block in blocks)
 
@@ -60,7 +60,7 @@ def _examples(epilog: str) -> str:
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Help, and what click adds to it in brackets: default, range, environment variable."""
+    """Return help, and what click adds to it in brackets: default, range, environment variable."""
     meaning, bracket, extras = text.rpartition("  [")
     return (meaning, extras.removesuffix("]")) if bracket else (text, "")
 

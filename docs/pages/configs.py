@@ -1,4 +1,4 @@
-"""The pages of the files that a user writes: tasks, models, agents. Out of their models and the shipped files."""
+"""The pages of the files that a user writes: tasks, models, agents. Made from their models and the shipped files."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ NAMES: dict[object, str] = {
     config.ActionName: "[action](actions.md)",
     config.MapName: "[map](maps.md)",
 }
-"""Names that are checked while a file is read; the first one may stand in a key of the bus."""
+"""Names that are checked while a file is read; the first one may be part of a key of the bus."""
 DESCRIBER = Describer(NAMES)
 
 
 def task_files() -> str:
-    """What stands in a task file."""
+    """Return the page of task files."""
     example = CONFIGS / "tasks" / "llm_smac" / "2s3z_pair.yaml"
     return join(
         head("Task files", "the models in `bridge/khala_bridge/task/config.py`"),
@@ -47,7 +47,7 @@ def task_files() -> str:
 
 
 def model_files_page() -> str:
-    """What stands in a model file and in a file of agents, which ones ship, and what profiles differ in."""
+    """Return the page of model files and files of agents, the shipped ones, and the profiles' differences."""
     return join(
         head(
             "Model files and agents files", "the models in `agents/khala_agents/config.py` and the files in `configs/`"
@@ -71,7 +71,7 @@ def model_files_page() -> str:
 
 
 def _sections(model: type[BaseModel], level: str) -> Iterator[str]:
-    """A section for a model, and one for each of its parts."""
+    """Yield a section for a model, and one for each of its parts."""
     for each in [model, *parts([model])]:
         yield join(f"{level} {each.__name__}", about(each), DESCRIBER.fields(each))
 
@@ -81,7 +81,7 @@ def _file(path: Path, language: str) -> tuple[str, str]:
 
 
 def _grouping() -> str:
-    """The rules of `khala_bridge.state.teams`, without its title and its sources."""
+    """Return the rules of `khala_bridge.state.teams`, without its title and its sources."""
     _, *paragraphs = (inspect.getdoc(teams) or "").split("\n\n")
     return prose("\n\n".join(text for text in paragraphs if not text.startswith("The head")))
 

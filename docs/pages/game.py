@@ -1,4 +1,4 @@
-"""The pages of what is played: tasks, units and maps. Out of the data of the bridge and the simulator."""
+"""The pages of tasks, units and maps, from the data of the bridge and the simulator."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AGENTS, OPPONENT = 1, 2
 
 
 def tasks() -> str:
-    """Every shipped task with its agents."""
+    """Return every shipped task with its agents."""
     found = list(all_tasks())
     written = {path.stem for path in task_files()}
     overview = [
@@ -38,7 +38,7 @@ def tasks() -> str:
 
 
 def maps() -> str:
-    """Every known map, and what stands on it in the simulator."""
+    """Return every known map, and its units in the simulator."""
     rows = [_map_row(spec) for spec in known_maps().values()]
     return join(
         head("Maps", "`bridge/khala_bridge/data/maps.yaml` and `simulator/khala_simulator/data/maps`"),
@@ -102,6 +102,6 @@ def _map_row(spec: MapSpec) -> tuple[object, ...]:
 
 
 def _army(world: World, player: int) -> str:
-    """What a player has when the game begins."""
+    """Return a player's units when the game begins."""
     names = [world.unit_type(slot).name for slot in world.units_of(player).tolist()]
     return ", ".join(f"{count} {name.removesuffix('_RL')}" for name, count in Counter(names).items())

@@ -1,4 +1,4 @@
-"""The pages of what is known of the game: unit types, abilities and upgrades, out of `khala_bridge.knowledge`."""
+"""The pages of the knowledge of the game: unit types, abilities and upgrades, from `khala_bridge.knowledge`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCE = "`bridge/khala_bridge/data/knowledge`"
 MAKING = {"train", "warp_in", "build", "build_addon", "grow", "structure_morph"}
 """Kinds of abilities that make units and structures."""
 MANY = 12
-"""Users that are named one by one."""
+"""Number of users that are listed one by one."""
 FACTS = (
     *("type", "id", "health", "shield", "energy", "armor", "speed", "sight", "detects", "supply", "worth"),
     *("made by", "time", "needs", "attributes", "weapons"),
@@ -32,7 +32,7 @@ LOOK_UP = "One entry in full, with all that it is related to:\n\n```bash\nkhala 
 
 
 def units() -> str:
-    """What agents read about unit types."""
+    """Return the page of what agents read about unit types."""
     known = knowledge().values()
     races = [_race(race, [kind for kind in known if kind.race == race and kind.melee]) for race in RACES]
     neutral: dict[str, list[str]] = {}
@@ -57,7 +57,7 @@ def units() -> str:
 
 
 def abilities_page() -> str:
-    """What is known of abilities."""
+    """Return the page of abilities."""
     known = [ability for ability in abilities().values() if ability.melee]
     special = [ability for ability in known if ability.does != "general"]
     titled = [ability for ability in special if (words := words_of(ability)) and words.title]
@@ -88,7 +88,7 @@ def abilities_page() -> str:
 
 
 def upgrades_page() -> str:
-    """What is known of upgrades."""
+    """Return the page of upgrades."""
     known = upgrades().values()
     races = [
         join(f"## {race.capitalize()}", _upgrades(u for u in known if u.race == race and u.melee)) for race in RACES

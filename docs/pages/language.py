@@ -1,4 +1,4 @@
-"""The page of the text language, out of the modules that read it."""
+"""The page of the text language, from the modules that read it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from khala_protocol.speech import arguments, headings
 
 
 def page() -> str:
-    """What a reply looks like, and the rules of tolerance."""
+    """Return the form of a reply, and the rules of tolerance."""
     _, example, *paragraphs = (inspect.getdoc(speech) or "").split("\n\n")
     return join(
         head("The text language", "the docstrings of `protocol/khala_protocol/speech`"),
@@ -28,6 +28,6 @@ def page() -> str:
 
 
 def _table(module: object) -> str:
-    """The table in the docstring of a module."""
+    """Return the table in the docstring of a module."""
     lines = (inspect.getdoc(module) or "").splitlines()
     return "\n".join(line for line in lines if line.startswith("|"))

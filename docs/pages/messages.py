@@ -1,4 +1,4 @@
-"""The page of the messages, out of their models."""
+"""The page of the messages, from their models."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 DESCRIBER = Describer()
 LITERALS = {"AgentStatus": "AgentReport.status", "RejectionReason": "Rejection.reason"}
-"""Literals of the module whose values carry remarks, and the field that holds one."""
+"""Literals of the module whose values have remarks, and the field that holds one."""
 
 
 def page() -> str:
-    """Keys, messages, their parts, and what single words mean."""
+    """Return the page of keys, messages, their parts, and single words."""
     return join(
         head("Messages", "`protocol/khala_protocol/messages.py` and `protocol/khala_protocol/keys.py`"),
         "UTF-8 JSON, one object a message, with its `kind`. Unknown fields are errors, and so is another major "
@@ -45,7 +45,7 @@ def _section(model: type[BaseModel], level: str) -> str:
 
 
 def _keys() -> str:
-    """The forms of keys as their module draws them, and what a name may be."""
+    """Return the forms of keys as their module draws them, and the allowed names."""
     _, forms, *rest = (inspect.getdoc(keys) or "").split("\n\n")
     refused = re.search(r"WrongKey: (.+)", inspect.getdoc(keys.check_name) or "")
     rule = f"A name is refused when {refused.group(1)}" if refused else ""
@@ -53,12 +53,12 @@ def _keys() -> str:
 
 
 def _first(model: type) -> str:
-    """The first paragraph of a docstring."""
+    """Return the first paragraph of a docstring."""
     return (inspect.getdoc(model) or "").split("\n\n", maxsplit=1)[0]
 
 
 def _frames() -> str:
-    """What the module says of frames and units, without its first sentence."""
+    """Return the module's text on frames and units, without its first sentence."""
     return (inspect.getdoc(messages) or "").split("\n\n", 1)[1].partition("provider is imported here. ")[2]
 
 

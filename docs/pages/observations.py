@@ -1,4 +1,4 @@
-"""The page of what an observation says: its sections by kind of agent, and in which order they are shortened."""
+"""The page of the text of an observation: its sections by kind of agent, and the order in which they are shortened."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def page() -> str:
-    """Sections, who has which, and what a short page leaves out."""
+    """Return the sections, who has which, and what a short page leaves out."""
     return join(
         head("Observations", "`bridge/khala_bridge/observe/text`"),
         "An observation is a text of sections. Which ones an agent has follows from its `kind`, unless its task names "
@@ -32,7 +32,7 @@ def page() -> str:
 
 
 def _in_order() -> list[Section]:
-    """Every shipped section, in the order in which pages have them."""
+    """Return every shipped section, in the order in which pages have them."""
     names = dict.fromkeys(name for names in SECTIONS_OF.values() for name in names)
     return list(find_sections(names))
 

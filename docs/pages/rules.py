@@ -1,6 +1,6 @@
 """The page of the rules of combat: every unit, ability and upgrade of a melee game, and how far it is modelled.
 
-Out of the tables and of what the simulator has rules for. What it calls implemented is used once by
+Made from the tables and from the simulator's rules. What it calls implemented is used once by
 `tests/simulator/engine/test_every_ability.py`, which reads the same lists.
 """
 
@@ -27,7 +27,7 @@ USERS_SHOWN = 4
 
 
 def page() -> str:
-    """The three tables, by race, with a count of each state in front."""
+    """Return the three tables, by race, after a count of each state."""
     catalog = load_catalog()
     abilities = melee_abilities(catalog)
     return join(
@@ -82,12 +82,12 @@ def _race(catalog: Catalog, race: str, abilities: list[Ability]) -> list[str]:
 
 
 def melee_units(catalog: Catalog) -> list[UnitType]:
-    """The unit types of the three races that a melee game can have, by name."""
+    """Return the unit types of the three races that a melee game can have, by name."""
     return sorted((u for u in catalog.units if u.race in RACES and not u.not_in_melee), key=lambda u: u.name)
 
 
 def unit_state(unit: UnitType) -> tuple[str, str]:
-    """How far a unit type is modelled, and what of it is an estimate."""
+    """Return how far a unit type is modelled, and what of it is an estimate."""
     estimates = [f"{weapon.id}: {field}" for weapon in unit.weapons for field in weapon.estimates]
     return (ESTIMATED if estimates else IMPLEMENTED), "; ".join(estimates)
 
@@ -102,13 +102,13 @@ def _unit_row(unit: UnitType) -> tuple[object, ...]:
 
 
 def melee_abilities(catalog: Catalog) -> list[Ability]:
-    """The abilities, other than moving and fighting, on the cards of types that a melee game can have, by id."""
+    """Return the abilities, other than moving and fighting, on the cards of types that a melee game can have, by id."""
     found = {a.id: a for unit in melee_units(catalog) for a in catalog.abilities_of(unit.row)}
     return [a for _, a in sorted(found.items()) if a.effect not in ORDINARY]
 
 
 def ability_state(ability: Ability) -> tuple[str, str]:
-    """How far an ability is modelled, and what of it is an estimate."""
+    """Return how far an ability is modelled, and what of it is an estimate."""
     if not is_modelled(ability):
         return MISSING, ""
     estimates = SKILLS[ability.effect].estimates
@@ -128,7 +128,7 @@ def _ability_row(ability: Ability, names: set[str]) -> tuple[object, ...]:
 
 
 def _rule(ability: Ability) -> str:
-    """The first sentence of the rule's own account of itself."""
+    """Return the first sentence of the rule's own docstring."""
     skill = SKILLS.get(ability.effect)
     text = inspect.getdoc(skill.give or skill.effect) if skill is not None else ""
     return (text or "").split("\n\n", maxsplit=1)[0]
@@ -138,7 +138,7 @@ def _rule(ability: Ability) -> str:
 
 
 def upgrade_state(upgrade: Upgrade) -> tuple[str, str]:
-    """Whether all that an upgrade changes has an effect, and which fields have none."""
+    """Return whether all changes of an upgrade have an effect, and which fields have none."""
     dead = sorted({f"{c.catalog} {c.field}" for c in upgrade.changes if not stats.reads(c)})
     named = {a.requires for a in load_catalog().abilities if a.requires is not None}
     unlocks = any(need.kind == "upgrade" and need.name == upgrade.name for need in named)

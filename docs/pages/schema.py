@@ -42,7 +42,7 @@ OR_NULL = " or null"
 
 
 class Describer:
-    """Says what a field holds.
+    """Describe what a field holds.
 
     Args:
         names: words for types that a reader knows by another name, such as an annotated string.
@@ -52,7 +52,7 @@ class Describer:
         self._words = {**(names or {}), **WORDS}
 
     def fields(self, model: type[BaseModel], *, without: Iterable[str] = ()) -> str:
-        """A table of the fields of a model."""
+        """Return a table of the fields of a model."""
         hints = typing.get_type_hints(model, include_extras=True)
         left_out = set(without)
         rows = [
@@ -78,7 +78,7 @@ class Describer:
         return f"{shape} {', '.join(bounds)}".rstrip() + null
 
     def shape(self, hint: object) -> str:  # noqa: PLR0911  # one answer for each kind of type
-        """What a value of this type is."""
+        """Return what a value of this type is."""
         if known := self._word(hint):
             return known
         origin, args = get_origin(hint), get_args(hint)
@@ -100,17 +100,17 @@ class Describer:
         raise TypeError(f"no words for {hint!r}")
 
     def _word(self, hint: object) -> str | None:
-        """By equality and not by hash: what annotates a type need not be hashable."""
+        """Return the word for a type. By equality and not by hash: an annotation of a type need not be hashable."""
         return next((word for known, word in self._words.items() if known == hint), None)
 
 
 def about(model: type) -> str:
-    """What the docstring of a model says, as Markdown."""
+    """Return the docstring of a model as Markdown."""
     return prose(_null(inspect.cleandoc(model.__doc__ or "")))
 
 
 def parts(models: Iterable[type[BaseModel]]) -> list[type[BaseModel]]:
-    """The models that these are made of, each once, in the order in which they are met."""
+    """Return the models that these are made of, each once, in the order in which they are met."""
     found: dict[type[BaseModel], None] = {}
 
     def visit(model: type[BaseModel]) -> None:
@@ -127,7 +127,7 @@ def parts(models: Iterable[type[BaseModel]]) -> list[type[BaseModel]]:
 
 
 def remarks(module: ModuleType, name: str) -> list[tuple[str, str]]:
-    """The values of a `Literal` in a module with the remark behind each, where a docstring cannot stand."""
+    """Return the values of a `Literal` in a module with the remark after each, where a docstring is not possible."""
     source = inspect.getsource(module)
     comments = {
         token.start[0]: token.string.lstrip("# ")
@@ -160,5 +160,5 @@ def _default(field: FieldInfo) -> str:
 
 
 def _null(text: str) -> str:
-    """What Python calls None has another name in JSON and YAML."""
+    """Return a text with the name that JSON and YAML have for Python's None."""
     return re.sub(r"\bNone\b", "null", text)

@@ -1,4 +1,4 @@
-"""The page of the simulator: what it models, what it estimates, what it refuses. Out of its own data and code."""
+"""The page of the simulator: what it models, estimates and refuses. Made from its own data and code."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 SOURCES = "SOURCES.md"
 REFUSAL = "not supported"
-"""What stands in a sentence with which the simulator refuses what the game can do."""
+"""Words of a sentence with which the simulator refuses what the game can do."""
 MOVES = {"join_lan": "`join_game` with ports"}
-"""What the table of states distinguishes and the API does not."""
+"""Names that the table of states distinguishes and the API does not."""
 SOURCED = {"catalog": "the game's data", "replay": "recorded games"}
 
 
 def page() -> str:
-    """Everything that a reader of results must know of the game that was played."""
+    """Return everything that a reader of results must know of the simulated game."""
     return join(
         head("The simulator", "`simulator/khala_simulator/data` and the simulator's own tables"),
         "How it is built: [design](../design/simulator.md). Where the data is from: "
@@ -98,7 +98,7 @@ def _abilities() -> str:
 
 
 def _states() -> str:
-    """The table by which the simulator itself goes."""
+    """Return the simulator's own table of states."""
     states = [status for status in Status if status is not Status.quit]
     moves = sorted(set().union(*LEGAL.values()), key=lambda move: ([move not in LEGAL[s] for s in states], move))
     rows = [
@@ -149,7 +149,7 @@ def _maps() -> str:
 
 
 def _short(names: list[str]) -> list[str]:
-    """Names of maps, where all with the same beginning are named as one."""
+    """Return names of maps, with one entry for all that begin the same."""
     families: dict[str, list[str]] = {}
     for name in names:
         families.setdefault(name.partition("/")[0], []).append(name)
@@ -162,7 +162,7 @@ def _short(names: list[str]) -> list[str]:
 
 
 def _chapter(title: str) -> str:
-    """A chapter of the data's own account of its sources."""
+    """Return a chapter of the data's own account of its sources."""
     text = (resources.files("khala_simulator.data") / SOURCES).read_text(encoding="utf-8")
     chapter = text.partition(f"## {title}\n")[2].partition("\n## ")[0].strip()
     return prose(chapter.replace("](../../../docs/reference/", "]("))
@@ -174,7 +174,7 @@ def _refused() -> str:
 
 
 def _refusals() -> list[str]:
-    """The sentences with which requests are refused, where the game would do what is asked."""
+    """Return the sentences that refuse a request where the game would carry it out."""
     directory = Path(next(iter(khala_simulator.api.__path__)))
     constants = (
         node.value

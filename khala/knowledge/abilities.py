@@ -1,7 +1,7 @@
-"""Facts of abilities, out of the simulator's tables.
+"""Facts of abilities, from the simulator's tables.
 
-One record per number of the API. A general ability (`Effect_Stim`) lists the special ones that it stands for, has the
-users of all, and of their facts those in which they agree.
+One record per number of the API. A general ability (`Effect_Stim`) lists the special ones that it stands for, the
+users of all of them, and the facts in which they agree.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 TARGETS: Final = {aim: name for name, aim in AIMS.items()}
 EVERYWHERE: Final = 500
-"""Range that stands for the whole map in the tables."""
+"""Range that means the whole map in the tables."""
 OWN_FIGURES: Final = frozenset({"range", "time", "unit", "units", "energy", "supply", "buff", "count"})
-"""Figures of a skill that the record says already, or in words of the tables."""
+"""Figures of a skill that the record already has, or that are words of the tables."""
 SHARED: Final = (
     *("range", "everywhere", "must", "must_not", "autocast", "energy", "life", "minerals", "vespene", "supply"),
     *("cooldown_s", "charges", "requires", "addon", "produces", "count", "researches", "time_s", "figures"),
 )
-"""What a general ability has if all its special ones agree."""
+"""Facts of a general ability if all its special ones agree."""
 
 
 class Needs(NamedTuple):
-    """What an ability asks of a player and of the unit that uses it."""
+    """What an ability requires of a player and of the unit that uses it."""
 
     names: tuple[str, ...] = ()
     """Structures and upgrades; all are needed."""
@@ -41,7 +41,7 @@ class Needs(NamedTuple):
 
 
 def ability_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
-    """One record for each ability that someone in a melee game has or PySC2 has a function for, by its number."""
+    """Return one record for each ability that a melee game's unit or a PySC2 function uses, by its number."""
     users = _users(catalog)
     special = {a.id: _special(a, users.get(a.id, []), catalog) for a in catalog.abilities if a.effect != "general"}
     special = {number: record for number, record in special.items() if record["melee"] or functions_of(number)}
@@ -54,9 +54,9 @@ def ability_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
 
 
 def needs_of(need: Need | None) -> Needs:
-    """The structures and upgrades in a condition; of alternatives the first, for which the others stand in.
+    """Return the structures and upgrades in a condition; of alternatives the first, which represents the others.
 
-    Left out are conditions on the state of the unit itself and on what is under way: the game tells of these.
+    Conditions on the state of the unit itself and on its orders are left out: the game reports these.
     """
     leaves = list(_leaves(need))
     here = [name for name, state in leaves if state.endswith("_here")]
@@ -65,9 +65,9 @@ def needs_of(need: Need | None) -> Needs:
 
 
 def research_of(upgrade: Upgrade, catalog: Catalog) -> Ability | None:
-    """The ability that researches an upgrade; of several the one that the structures of today have.
+    """Return the ability that researches an upgrade; of several, the one of a structure in the current game.
 
-    Of such pairs (an upgrade has moved to another structure) the tables keep both, and say only of some where it is.
+    When an upgrade has moved to another structure, the tables keep both, and say only of some where it is.
     """
     found = [a for a in catalog.abilities if a.effect == "research" and a.upgrade == upgrade.name]
     here = [a for a in found if set(a.users) & set(upgrade.at)]
@@ -92,7 +92,7 @@ def _named(name: str) -> str:
 
 
 def _users(catalog: Catalog) -> dict[int, list[str]]:
-    """Names of the types that can be told to use an ability, by its number."""
+    """Return the names of the types that can be ordered to use an ability, by its number."""
     found: dict[int, list[str]] = {}
     for unit in catalog.units:
         if not unit.like and unit.name in unit_names():
@@ -123,7 +123,7 @@ def _special(ability: Ability, users: list[str], catalog: Catalog) -> dict[str, 
 
 
 def _terms(ability: Ability) -> dict[str, Any]:
-    """What it costs and asks for."""
+    """Return its costs and requirements."""
     needs = needs_of(ability.requires)
     comes_back = ability.charges.loops if ability.charges else 0.0
     return {
@@ -148,7 +148,7 @@ def _filter(filters: Filter) -> dict[str, Any]:
 
 
 def _outcome(ability: Ability) -> dict[str, Any]:
-    """What comes of it, and how long that takes."""
+    """Return its results, and how long they take."""
     research = ability.effect == "research"
     count = max(ability.count, len(ability.units), ability.numbers.get("count", 1))
     return {
@@ -160,7 +160,7 @@ def _outcome(ability: Ability) -> dict[str, Any]:
 
 
 def _figures(ability: Ability) -> dict[str, Any]:
-    """The skill's own numbers; words and lists of the tables are left to what is written about it."""
+    """Return the skill's own numbers; the written words cover the tables' words and lists."""
     own = in_seconds(ability.numbers)
     return {
         key: value
@@ -170,7 +170,7 @@ def _figures(ability: Ability) -> dict[str, Any]:
 
 
 def _general(ability: Ability, special: dict[int, dict[str, Any]]) -> dict[str, Any]:
-    """A record for a general ability; where the special ones differ it says nothing."""
+    """Return a record for a general ability, without facts in which the special ones differ."""
     live = [record for record in special.values() if record["melee"]] or list(special.values())
     shared = {key: live[0][key] for key in SHARED if live and all(record[key] == live[0][key] for record in live)}
     targets = {record["target"] for record in live}

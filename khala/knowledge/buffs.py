@@ -1,4 +1,4 @@
-"""Facts of buffs, out of the simulator's tables: what lies on a unit for a time, and what it changes there."""
+"""Facts of buffs, from the simulator's tables: temporary effects on a unit, and what they change."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def buff_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
-    """One record for each buff that changes anything or that clients are told of, by the tables' name of it."""
+    """Return one record for each buff that changes anything or that clients can see, by its name in the tables."""
     found = {buff.name: sparse(_buff(buff)) for buff in sorted(catalog.buffs, key=lambda buff: buff.name)}
     return {name: record for name, record in found.items() if record}
 

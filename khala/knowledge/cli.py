@@ -1,4 +1,4 @@
-"""`khala knowledge`: look up what agents are told of the game, and make it anew from the simulator's tables."""
+"""`khala knowledge`: look up the facts that agents read of the game, and rebuild them from the simulator's tables."""
 
 import json
 from typing import Annotated, Literal
@@ -24,7 +24,7 @@ Examples:\n
 """
 
 app = typer.Typer(
-    help="What agents are told of unit types, abilities and upgrades: look it up, or make it anew.",
+    help="Look up what agents read about unit types, abilities and upgrades, or rebuild it.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -41,10 +41,10 @@ def show(
     version: Version = "4.10",
     as_json: Json = False,
 ) -> None:
-    """Tell all that is known of NAME.
+    """Show all that is known of NAME.
 
-    Names are PySC2's; upper case, blanks and underscores do not matter. What agents read of it in an observation is
-    shorter.
+    Names are PySC2's; upper case, blanks and underscores do not matter. Agents read a shorter form in their
+    observations.
     """
     found = find(name, version)
     if as_json:
@@ -61,10 +61,10 @@ def write(
     ] = None,
     check: Annotated[bool, typer.Option("--check", help="Write nothing; fail if a file is out of date.")] = False,
 ) -> None:
-    """Make the facts in bridge/khala_bridge/data/knowledge anew from the simulator's tables.
+    """Rebuild the facts in bridge/khala_bridge/data/knowledge from the simulator's tables.
 
-    To be done after a change of the tables: one line is one unit type, ability, upgrade or buff. Words about them, in
-    bridge/khala_bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts by themselves.
+    Run it after a change of the tables. Each line is one unit type, ability, upgrade or buff. Words about them, in
+    bridge/khala_bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts automatically.
     """
     from khala.knowledge import files  # noqa: PLC0415  # the tables and PySC2's names: seconds that --help need not wait
 
@@ -80,4 +80,4 @@ def write(
 
 
 class OutOfDate(KhalaError):
-    """Files of facts do not say what the tables say."""
+    """Files of facts differ from the tables."""

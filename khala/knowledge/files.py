@@ -1,6 +1,6 @@
-"""Writes what is known of the game into the data of the bridge: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
+"""Write the facts of the game into the data of the bridge: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
 
-One record per line, in a fixed order, so that a change of the tables is a small difference of the files.
+One record per line, in a fixed order, so that a change of the tables is a small diff.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def facts(version: str) -> dict[str, str]:
-    """The text of every file of facts of a game version, by file name.
+    """Return the text of every file of facts of a game version, by file name.
 
     Raises:
         CatalogError: the simulator has no tables of this version.
@@ -36,13 +36,13 @@ def facts(version: str) -> dict[str, str]:
 
 
 def outdated(version: str) -> list[str]:
-    """Names of the files of a version that do not say what would be written now."""
+    """Return the names of the files of a version that differ from what would be written now."""
     where = directory(version)
     return [n for n, text in facts(version).items() if not (where / n).exists() or (where / n).read_text() != text]
 
 
 def write(version: str) -> list[Path]:
-    """Writes every file of a version; returns their paths."""
+    """Write every file of a version; return their paths."""
     where = directory(version)
     where.mkdir(parents=True, exist_ok=True)
     made = {where / name: text for name, text in facts(version).items()}
@@ -52,7 +52,7 @@ def write(version: str) -> list[Path]:
 
 
 def directory(version: str) -> Path:
-    """Where the facts of a game version are."""
+    """Return the directory of the facts of a game version."""
     return data.path("knowledge") / version
 
 

@@ -1,4 +1,4 @@
-"""Numbers of the tables as the bridge gives them: per second of the speed "faster", rounded, without what is zero.
+"""Numbers of the tables as the bridge gives them: per second of the speed "faster", rounded, without zeros.
 
 The tables count game loops, and "normal" seconds of 16 loops; agents read seconds of 22.4 loops, as the game's own
 clock shows them.
@@ -14,38 +14,38 @@ from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 FASTER: Final = LOOPS_PER_S / LOOPS_PER_NORMAL_SECOND
 """Normal seconds in a second of the speed "faster"."""
 DIGITS: Final = 2
-"""Of what was converted; the tables' own numbers have up to four."""
+"""Digits after the point of a converted number; the tables' own numbers have up to four."""
 TABLE_DIGITS: Final = 4
 
 
 def seconds(loops: float) -> float:
-    """Game loops as seconds."""
+    """Return game loops as seconds."""
     return plain(loops / LOOPS_PER_S, DIGITS)
 
 
 def per_second(per_normal_second: float) -> float:
-    """A rate per "normal" second as one per second."""
+    """Return a rate per "normal" second as one per second."""
     return plain(per_normal_second * FASTER, DIGITS)
 
 
 def plain(value: float, digits: int = TABLE_DIGITS) -> float:
-    """A number without needless digits, a whole one without a point."""
+    """Return a number without needless digits, a whole one without a point."""
     rounded = round(value, digits)
     return int(rounded) if rounded == int(rounded) else rounded
 
 
 def sparse(record: dict[str, Any]) -> dict[str, Any]:
-    """The entries of a record that say something: not zero, not empty, not None."""
+    """Return the entries of a record that are not zero, not empty and not None."""
     return {key: value for key, value in record.items() if value or value is True}
 
 
 def in_seconds(numbers: dict[str, Any]) -> dict[str, Any]:
-    """A skill's own figures, with loops and "normal" seconds turned into seconds, in names as well as in values."""
+    """Return a skill's own figures, with loops and "normal" seconds converted to seconds, in names and values."""
     return dict(_in_seconds(key, value) for key, value in numbers.items())
 
 
 RATES: Final = (("_per_s_normal", "_per_s"), ("_per_n", "_per_s"), ("_normal", ""), ("_n", ""))
-"""Endings of figures per "normal" second, and what they are called per second."""
+"""Endings of figures per "normal" second, and their names per second."""
 
 
 def _in_seconds(key: str, value: Any) -> tuple[str, Any]:

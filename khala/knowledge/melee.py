@@ -1,7 +1,7 @@
 """Which unit types occur in melee games.
 
-The tables mark types that only campaigns, other maps or older versions have. A few of these are passed through
-nevertheless, as cocoons and eggs of what melee games do have, and by what hatches from them.
+The tables mark types that only campaigns, other maps or older versions have. A few of these count anyway: the
+cocoons and eggs of melee units, and what hatches from them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @functools.cache
 def melee_types(catalog: Catalog) -> frozenset[str]:
-    """The tables' names of the types that occur in melee games."""
+    """Return the tables' names of the types that occur in melee games."""
     marked = {unit.name for unit in catalog.units if not unit.not_in_melee}
     shells = {
         str(ability.numbers[shell])

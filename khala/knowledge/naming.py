@@ -1,7 +1,7 @@
-"""The names that the bridge uses for what the simulator's tables name otherwise: PySC2's.
+"""The names that the bridge uses where they differ from the simulator's tables: PySC2's.
 
 PySC2's numbers are those of version 4.10, so names are found by number in the tables of that version and carried over
-to other versions by the tables' own names, which stay. What PySC2 has no name for keeps the one of the tables.
+to other versions by the tables' own names, which stay. A thing without a PySC2 name keeps the one of the tables.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ PYSC2_VERSION: Final = "4.10"
 
 @functools.cache
 def unit_names() -> dict[str, str]:
-    """PySC2's name of a unit type by the tables' name; types that PySC2 does not have are left out."""
+    """Return PySC2's name of a unit type by the tables' name, without types that PySC2 does not have."""
     found = {unit.name: names.unit_name(unit.id) for unit in load_catalog(PYSC2_VERSION).units if not unit.like}
     return {own: name for own, name in found.items() if not _made_up(name)}
 
 
 @functools.cache
 def upgrade_names() -> dict[str, str]:
-    """PySC2's name of an upgrade by the tables' name; upgrades that PySC2 does not have are left out."""
+    """Return PySC2's name of an upgrade by the tables' name, without upgrades that PySC2 does not have."""
     found = {upgrade.name: names.upgrade_name(upgrade.id) for upgrade in load_catalog(PYSC2_VERSION).upgrades}
     return {own: name for own, name in found.items() if not _made_up(name)}
 
@@ -40,12 +40,12 @@ def _stems() -> dict[int, str]:
 
 
 def unit_name(name: str) -> str:
-    """What the bridge calls a type of the tables; one that is newer than PySC2 keeps its name."""
+    """Return the bridge's name for a type of the tables; one that is newer than PySC2 keeps its name."""
     return unit_names().get(name, name)
 
 
 def table_name(unit_type: str) -> str:
-    """What the tables call a unit type; the other way of `unit_name`."""
+    """Return the tables' name for a unit type; the inverse of `unit_name`."""
     return _table_names().get(unit_type, unit_type)
 
 
@@ -55,15 +55,15 @@ def _table_names() -> dict[str, str]:
 
 
 def upgrade_name(name: str) -> str:
-    """What the bridge calls an upgrade of the tables; one that is newer than PySC2 keeps its name."""
+    """Return the bridge's name for an upgrade of the tables; one that is newer than PySC2 keeps its name."""
     return upgrade_names().get(name, name)
 
 
 def ability_name(ability: Ability) -> str:
-    """What PySC2's functions call an ability, without what they take: `Effect_Blink_Stalker`."""
+    """Return the name that PySC2's functions have for an ability, without its arguments: `Effect_Blink_Stalker`."""
     return _stems().get(ability.id, ability.name.replace(" ", "_"))
 
 
 def _made_up(name: str) -> bool:
-    """Whether `khala_bridge.names` knew no name for a number and made one of it."""
+    """Return whether `khala_bridge.names` had no name for a number and made one of it."""
     return name.removeprefix("Unit").isdigit() or name.removeprefix("Upgrade").isdigit()

@@ -1,7 +1,7 @@
-"""Facts of unit types, out of the simulator's tables.
+"""Facts of unit types, from the simulator's tables.
 
-A record says what the API tells of a type, with its names, and what it does not: where a type comes from, what stands
-in for it, and the weapons that the game hides from clients (`_weapons`).
+A record has what the API says about a type, with its names, and what it does not say: where a type comes from, what
+stands in for it, and the weapons that the game hides from clients (`_weapons`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
-    """One record for each type that PySC2 has a name for, by that name, in alphabetical order."""
+    """Return one record for each type that PySC2 has a name for, by that name, in alphabetical order."""
     known = [unit for unit in catalog.units if not unit.like and unit.name in unit_names()]
     return {unit_name(unit.name): sparse(_unit(unit, catalog)) for unit in sorted(known, key=_name)}
 
@@ -76,7 +76,7 @@ def _economy(unit: UnitType) -> dict[str, Any]:
 
 
 def _origin(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
-    """Who makes it, by which abilities, how long the first way takes, and what all of it needs."""
+    """Return what makes it, by which abilities, how long the first way takes, and all its requirements."""
     ways = [way for way in unit.made_by if _counts(way, unit, catalog)]
     first = catalog.ability_of_id.get(ways[0].ability) if ways else None
     return {
@@ -89,7 +89,7 @@ def _origin(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
 
 
 def _counts(way: ProductionRecord, unit: UnitType, catalog: Catalog) -> bool:
-    """Whether someone can be told to make the type in this way: no cocoon, and not back from one of its own modes."""
+    """Return whether an order can make the type in this way: no cocoon, and not back from one of its own modes."""
     made = catalog.row_of_name.get(way.producer)
     if made is None or way.producer not in unit_names():
         return False
@@ -111,9 +111,9 @@ def _ground(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
 
 
 def _weapons(unit: UnitType, catalog: Catalog) -> Iterator[dict[str, Any]]:
-    """The weapons that a type fights with, as the API tells them; where it tells none, those that it hides.
+    """Yield the weapons that a type fights with, as the API lists them; if it lists none, the hidden ones.
 
-    Weapons that have to be switched on are left out: until then the type is unarmed.
+    Weapons that have to be switched on are left out: before that, the type is unarmed.
     """
     usable = [weapon for weapon in unit.weapons if weapon.works and not weapon.disabled]
     shown = [weapon for weapon in usable if not weapon.hidden]
@@ -130,9 +130,9 @@ def _shown(weapon: Weapon) -> dict[str, Any]:
 
 
 def _hidden(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
-    """A weapon of which the API says nothing: what is launched, a burst, or one hit for each plane.
+    """Yield a weapon that the API does not list: what is launched, a burst, or one hit for each plane.
 
-    What a Brood Lord drops counts as the Brood Lord's, and a Locust's leap ends its flight: neither is told again.
+    What a Brood Lord drops counts as the Brood Lord's, and a Locust's leap ends its flight: neither is listed again.
     """
     if weapon.launches:
         yield from _launched(unit, weapon, catalog)

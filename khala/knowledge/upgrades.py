@@ -1,4 +1,4 @@
-"""Facts of upgrades, out of the simulator's tables: price, place, time, and what each changes on which type."""
+"""Facts of upgrades, from the simulator's tables: price, place, time, and what each changes on which type."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ UNIT_FIELDS: Final = {
     "ShieldArmor": ("shield_armor", "shield_armor"),
     "EnergyStart": ("energy_start", "energy_start"),
 }
-"""Fields of a type that upgrades change: our name, and the field of the record that has its value before."""
+"""Fields of a type that upgrades change: our name, and the record's field with the value before the upgrade."""
 WEAPON_FIELDS: Final = {"Range": "range", "RateMultiplier": "attack_speed"}
-"""Fields of a weapon that upgrades change; the speed of attacks is a share of what it is without."""
+"""Fields of a weapon that upgrades change; the speed of attacks is a share of the original speed."""
 BONUS: Final = "AttributeBonus["
 
 
 def upgrade_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
-    """One record for each upgrade that PySC2 has a name for or a player can research, by its name."""
+    """Return one record for each upgrade that PySC2 has a name for or a player can research, by its name."""
     known = [u for u in catalog.upgrades if u.name in upgrade_names() or u.researchable]
     return {upgrade_name(u.name): sparse(_upgrade(u, catalog)) for u in sorted(known, key=_name)}
 
@@ -36,7 +36,7 @@ def _name(upgrade: Upgrade) -> str:
 
 
 def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:
-    """One record; price, time and place are those of its research, where there is one."""
+    """Return one record; price, time and place are those of its research, if there is one."""
     research = research_of(upgrade, catalog)
     minerals, vespene = (research.minerals, research.vespene) if research else upgrade.cost
     changes = _changes(upgrade, catalog)
@@ -60,14 +60,14 @@ def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:
 
 
 def _changes(upgrade: Upgrade, catalog: Catalog) -> dict[str, dict[str, float]]:
-    """By type and field, how much is added; types that PySC2 has no name for are left out."""
+    """Return, by type and field, how much is added; without types that PySC2 has no name for."""
     known = [unit for unit in catalog.units if not unit.like and unit.name in unit_names()]
     found = {unit_name(unit.name): _on(unit, upgrade.changes) for unit in known}
     return {name: own for name, own in sorted(found.items()) if own}
 
 
 def _on(unit: UnitType, changes: tuple[Change, ...]) -> dict[str, float]:
-    """What an upgrade adds to one type, by our names of the fields."""
+    """Return what an upgrade adds to one type, by our names of the fields."""
     own: dict[str, float] = {}
     hits: dict[tuple[str, str], float] = {}
     for change in changes:
@@ -93,9 +93,9 @@ def _field(unit: UnitType, change: Change) -> str:
 
 
 def _damage(unit: UnitType, changes: dict[tuple[str, str], float]) -> dict[str, float]:
-    """What is added to the strongest hit: by plane, if the type has different weapons for the ground and the air.
+    """Return the bonus to the strongest hit: by plane, if the type has different weapons for the ground and the air.
 
-    Left out are hits of one's own units, and weapons that clients are not told of where there are others.
+    Hits of one's own units are left out, and weapons that clients cannot see, if there are others.
     """
     own: dict[str, float] = {}
     weapons = [weapon for weapon in unit.weapons if not (weapon.hidden or weapon.disabled)] or unit.weapons

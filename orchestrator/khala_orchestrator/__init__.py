@@ -1,1 +1,1 @@
-"""Runs matches: asks agents, waits no longer than the deadline, and turns their replies into one joint action."""
+"""Run matches: ask agents, wait until the deadline at most, and turn their replies into one joint action."""

@@ -1,6 +1,6 @@
-"""Publish what everybody may know: the run card, briefings, what agents write to each other, reports and results.
+"""Publish the host's public messages: the run card, briefings, messages between agents, reports and results.
 
-Below it: the bus. Above it: `khala_orchestrator.match`, which says what, and this module where.
+Below it: the bus. Above it: `khala_orchestrator.match`, which decides what is published, and this module where.
 """
 
 from __future__ import annotations
@@ -54,17 +54,17 @@ class Announcer:
         await self._topics[Topic.RUN].put(encode(card))
 
     async def brief(self, briefing: Briefing) -> None:
-        """Publish what one agent has to know."""
+        """Publish the briefing of one agent."""
         await self._briefings[Seat(briefing.side, briefing.agent)].put(encode(briefing))
 
     async def message(self, message: Message) -> None:
-        """Publish what one agent wrote to another or to a channel, under the name of the sender."""
+        """Publish a message from one agent to another or to a channel, under the name of the sender."""
         await self._messages[Seat(message.side, message.agent)].put(encode(message))
 
     async def report(self, report: Report) -> None:
-        """Publish what happened in a step."""
+        """Publish the report of a step."""
         await self._topics[Topic.REPORT].put(encode(report))
 
     async def result(self, result: Result) -> None:
-        """Publish how an episode ended."""
+        """Publish the result of an episode."""
         await self._topics[Topic.RESULT].put(encode(result))

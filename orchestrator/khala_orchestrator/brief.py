@@ -1,4 +1,4 @@
-"""What agents and everybody else are told before the first step: briefings and the run card."""
+"""What is published before the first step: a briefing for each agent, and the run card for everyone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
 
 
 def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Briefing:
-    """What one agent has to know besides its observations."""
+    """Return everything that one agent has to know, except its observations."""
     others = task.correspondents(agent)
     return Briefing(
         run=run,
@@ -38,7 +38,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Br
 
 
 def run_card(config: MatchConfig, game: GameIdentity) -> Run:
-    """All that one needs to know to repeat the run, or to trust its numbers."""
+    """Return everything that is needed to repeat the run, or to trust its numbers."""
     task = config.task
     return Run(
         run=config.run,

@@ -1,7 +1,6 @@
 """The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala.cli` mounts.
 
-What goes wrong on the user's side is raised as a `khala_protocol.errors.KhalaError` of one sentence; printing it is the
-front door's part.
+A mistake of the user is raised as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` prints it.
 """
 
 import asyncio
@@ -20,7 +19,7 @@ from khala_orchestrator.config import all_tasks
 from khala_orchestrator.console import stderr_console
 from khala_protocol.bus.config import BusConfig
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, all else on stderr.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")]
 Listen = Annotated[
     list[str] | None,
     typer.Option(help="Endpoint to listen on; may be given several times.", show_default="tcp/127.0.0.1:7447"),
@@ -55,7 +54,7 @@ def router(
 ) -> None:
     """Join hosts and agents: a Zenoh router, until Ctrl-C.
 
-    It is needed when host and agents are on several machines; `khala run` has one of its own. A zenohd of the same
+    It is needed when host and agents are on several machines; `khala run` has its own. A zenohd of the same
     version works as well.
     """
     if check:
@@ -82,7 +81,7 @@ def tasks(*, as_json: Json = False) -> None:
 
 
 def people(names: Sequence[str]) -> str:
-    """Names of agents, those that only differ by a number together: `Commander, CombatGroup1 2 5`."""
+    """Return the names of agents, grouping those that only differ by a number: `Commander, CombatGroup1 2 5`."""
     groups: dict[str, list[str]] = {}
     for name in names:
         stem = name.rstrip("0123456789")
@@ -91,17 +90,17 @@ def people(names: Sequence[str]) -> str:
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="A recording, such as `khala run` leaves behind.")],
+    file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
     *,
     agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
-    text: Annotated[bool, typer.Option("--text", help="Observations and replies word for word.")] = False,
+    text: Annotated[bool, typer.Option("--text", help="Show observations and replies word for word.")] = False,
     images: Annotated[
         Path | None, typer.Option(help="Write the pictures that agents were shown into this directory.", metavar="DIR")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Tell what was said and done in a recorded run."""
+    """Show what was said and done in a recorded run."""
     from khala_orchestrator.transcript import (  # noqa: PLC0415  # zstd is not for --help
         StepSelection,
         save_pictures,

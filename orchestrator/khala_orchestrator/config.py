@@ -1,6 +1,6 @@
-"""What a match is configured with: a task file, and what the command line changes of it.
+"""The configuration of a match: a task file, and the changes that the command line makes to it.
 
-Task files are found by their name below `configs/tasks/`, or by a path. Their model is
+Task files are found by name in `configs/tasks/`, or by path. Their model is
 `khala_bridge.task.config.TaskConfig`. A map without a task file is a task, too: `khala_bridge.task.standard` makes it.
 """
 
@@ -35,33 +35,33 @@ class MatchConfig(Frozen):
     run: str
     """Its name on the bus, in the recording and in every table."""
     game: str = "StarCraft II"
-    """What plays; the simulator speaks the game's protocol so well that only whoever starts it knows."""
+    """The game. The simulator speaks the game's protocol so well that only the process that starts it knows it."""
     seed: int = Field(default=1, ge=0, lt=2**31)
-    """Of the first episode; each further one adds 1."""
+    """Seed of the first episode; each further one adds 1."""
     episodes: int = Field(default=1, ge=1)
     assemble_s: float = Field(default=60.0, gt=0)
     """How long the host waits for its agents at the start."""
     record: Path | None = None
-    """The MCAP file that every topic is written to; None writes none."""
+    """The MCAP file that every topic is written to; None for no recording."""
 
 
 def task_files() -> Iterator[Path]:
-    """The shipped task files, in the order of their names."""
+    """Yield the shipped task files, in the order of their names."""
     yield from sorted((CONFIGS / "tasks").rglob("*.yaml"), key=lambda path: (path.parent.name, path.stem))
 
 
 def all_tasks() -> Iterator[TaskConfig]:
-    """Everything that can be played by name: the shipped task files, then the maps that have none."""
+    """Yield everything that can be played by name: the shipped task files, then the maps that have none."""
     files = {path.stem: path for path in task_files()}
     yield from (load(path, TaskConfig) for path in files.values())
     yield from (standard_task(spec) for name, spec in known_maps().items() if name not in files)
 
 
 def load_task(name: str) -> TaskConfig:
-    """The task of this name, or of the file at this path.
+    """Return the task of this name, or of the file at this path.
 
     Raises:
-        ConfigError: there is none, or the file is wrong; the text says what and where.
+        ConfigError: there is no such task, or the file is wrong; the text says what and where.
     """
     if name.endswith((".yaml", ".yml")):
         return load(name, TaskConfig)
@@ -76,9 +76,9 @@ def load_task(name: str) -> TaskConfig:
 
 
 def change(task: TaskConfig, **changes: Any) -> TaskConfig:
-    """The task with fields replaced. None changes nothing.
+    """Return the task with fields replaced. None changes nothing.
 
-    `max_wait_s` and `step_loops` are those of its clock, `images` are words for all agents, see `images_for`.
+    `max_wait_s` and `step_loops` are those of its clock, `images` are the images of all agents, see `images_for`.
 
     Raises:
         ConfigError: a value does not fit.
@@ -101,6 +101,6 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
 
 
 def new_run_name(task: str) -> str:
-    """A name for a run that no other run has: the task, the time, four random digits."""
+    """Return a unique name for a run: the task, the time, four random digits."""
     now = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
     return check_name(f"{task[:40]}-{now}-{secrets.token_hex(2)}", "run")

@@ -1,6 +1,6 @@
 """What a person sees of a match: a live line per agent while it runs, and a table at the end.
 
-It is fed with the same messages that go over the bus, and prints to stderr, so that stdout stays free for JSON.
+It gets the same messages that go over the bus, and prints to stderr, so that stdout stays free for JSON.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Progress:
         self._live.stop()
 
     def __call__(self, message: Wire) -> None:
-        """Takes a run card, a report or a result."""
+        """Show a run card, a report or a result."""
         match message:
             case Run():
                 self._run = message
@@ -104,7 +104,7 @@ class Progress:
 
 
 def card(run: Run) -> Panel:
-    """The run card."""
+    """Return a panel with the run card."""
     wait = "as long as it takes" if run.clock.max_wait_s is None else f"at most {run.clock.max_wait_s:g} s"
     rows = Table.grid(padding=(0, 2))
     rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
@@ -115,7 +115,7 @@ def card(run: Run) -> Panel:
 
 
 def table(result: Result) -> Panel:
-    """How an episode ended."""
+    """Return a panel with the result of an episode."""
     rows = Table.grid(padding=(0, 2))
     kd = "none lost" if result.kd is None else f"{result.kd:.2f}"
     rows.add_row(
@@ -153,6 +153,6 @@ def _losses(units: int, value: float) -> str:
 
 
 def clock(game_loop: int) -> str:
-    """Minutes and seconds of the game."""
+    """Return minutes and seconds of the game."""
     seconds = int(game_loop / LOOPS_PER_S)
     return f"{seconds // 60}:{seconds % 60:02d}"

@@ -1,7 +1,7 @@
-"""One host: a game, a bus and a match between them, put together and taken apart in order.
+"""One host: a game, a bus and a match, put together and taken apart in order.
 
-Above it: the command line. What it is given is open already and stays the giver's to close: the bus, because a
-host may be its own router, and the game, because its caller knows which one it is.
+Above it: the command line. The caller opens and closes the bus and the game: the bus, because a
+host may be its own router, and the game, because only its caller knows which one it is.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 async def host(
     config: MatchConfig, game: OneSide, bus: Bus, *, watch: Callable[[Wire], None] = lambda _: None
 ) -> list[Result]:
-    """Waits for the agents, plays the match with them, and returns its results.
+    """Wait for the agents, play the match with them, and return its results.
 
     Args:
-        config: what is played.
+        config: the match to play.
         game: a game that was started for this task and seed.
         bus: a session on the bus that agents join.
         watch: is called with the run card, every report and every result.
@@ -63,7 +63,7 @@ async def host(
         await announcer.run(card)
         watch(card)
         await roster.assemble(required, config.assemble_s)
-        gc.freeze()  # what was imported stays: going through it again and again stops a step for 40 ms
+        gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms
         match = assemble(config, game, turn, _PublishingObserver(announcer, watch, flush))
         return [result async for result in match.play()]
 
@@ -88,7 +88,7 @@ def assemble(config: MatchConfig, game: OneSide, agents: AgentPool, match_observ
 
 
 class _PublishingObserver:
-    """Publishes what happens, calls `watch`, and makes the recording safe up to here after each step."""
+    """Publish what happens, call `watch`, and flush the recording after each step."""
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
         self._announcer = announcer
@@ -113,4 +113,4 @@ class _PublishingObserver:
 
 
 def _nothing() -> None:
-    """There is no recording."""
+    """Flush nothing: there is no recording."""

@@ -1,8 +1,8 @@
-"""Who hears what next turn.
+"""Which messages each agent finds in its next observation.
 
-Messages that arrived in a step are put into the next observations of their recipients: an agent of the same
-side by name, or everybody on that side who listens to a channel, the sender excepted. What nobody can get
-goes back to the sender as a rejection. Listening to a channel lasts until the end of the episode.
+A message goes into the next observation of its recipients: an agent of the same side by name, or every
+agent of that side that listens to a channel, except the sender. A message without recipients
+goes back to the sender as a rejection. An agent listens to a channel until the end of the episode.
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ MAX_CHARACTERS = 4000
 
 @dataclass(frozen=True, slots=True)
 class Post:
-    """What was delivered after a step: by recipient, in order of arrival; and what could not be."""
+    """The messages of a step: those delivered, by recipient in order of arrival, and those that could not be."""
 
     received: Mapping[Seat, tuple[Received, ...]] = field(default_factory=dict)
     rejections: Mapping[Seat, tuple[Rejection, ...]] = field(default_factory=dict)
 
 
 class Mailbox:
-    """Sorts messages into boxes; knows who listens to which channel."""
+    """Sort messages into boxes; know which agent listens to which channel."""
 
     def __init__(self, reach: Mapping[Seat, Sequence[Seat]], channels: Iterable[str] = ()) -> None:
-        """Takes whom each seat may write to, and the channels that everybody may."""
+        """Set the seats that each seat may write to, and the channels that every seat may write to."""
         self._reach = dict(reach)
         self._channels = tuple(channels)
         self._listeners: dict[tuple[str, str], list[Seat]] = defaultdict(list)
 
     def clear(self) -> None:
-        """Forgets who listens, at the beginning of an episode."""
+        """Forget all listeners, at the beginning of an episode."""
         self._listeners.clear()
 
     def listen(self, seat: Seat, channel: str) -> None:
-        """From now on `seat` hears what is said on `channel`; unknown channels are heard by nobody."""
+        """Deliver what is said on `channel` to `seat` from now on; unknown channels stay silent."""
         listeners = self._listeners[seat.side, channel.casefold()]
         if seat not in listeners:
             listeners.append(seat)
 
     def deliver(self, messages: Iterable[Message]) -> Post:
-        """Sorts the messages of one step."""
+        """Sort the messages of one step."""
         boxes: dict[Seat, list[Received]] = defaultdict(list)
         returned: dict[Seat, list[Rejection]] = defaultdict(list)
         for message in messages:

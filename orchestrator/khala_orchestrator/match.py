@@ -1,9 +1,9 @@
 """The match: reset, observe, ask, act, until the episode is over.
 
-The loop reads like the turn in docs/design/turn.md. It owns nothing but the order: what agents see is
-`khala_bridge.observe`'s, who answered in time `khala_orchestrator.turn`'s, what their words do `khala_bridge.act`'s,
-who hears what
-`khala_orchestrator.mailbox`'s. It needs no bus: a recording can stand in for the agents (`AgentPool`).
+The loop reads like the turn in docs/design/turn.md. It owns only the order: `khala_bridge.observe` decides what agents
+see, `khala_orchestrator.turn` which replies are in time, `khala_bridge.act` what their words do, and
+`khala_orchestrator.mailbox` who hears which message. It needs no bus: a recording can stand in for the agents
+(`AgentPool`).
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ Phase = Literal["observe", "act", "game"]
 
 
 class MatchObserver(Protocol):
-    """What hears what happens in a match."""
+    """What is notified of events in a match."""
 
     async def brief(self, briefing: Briefing) -> None:
         """Take a briefing, before the first observation of an episode."""
         ...
 
     async def message(self, message: Message) -> None:
-        """Take what one agent wrote to another or to a channel, before the report of the step."""
+        """Take a message from one agent to another or to a channel, before the report of the step."""
         ...
 
     async def report(self, report: Report) -> None:
@@ -82,7 +82,7 @@ class StepId(NamedTuple):
 
 
 class StepOutcome(NamedTuple):
-    """What a step leads to: its report, and what the next one begins with."""
+    """The outcome of a step: its report, and what the next step begins with."""
 
     report: Report
     snapshot: Snapshot
@@ -146,7 +146,7 @@ class Match:
     def _questions(
         self, at: StepId, observation: SideObservation, feedback: Mapping[str, Feedback], watch: Stopwatch
     ) -> Iterator[Question]:
-        """One for each agent, made when it is asked for: the first agent thinks while others are looked for."""
+        """Yield a question per agent, made on demand: the first agent thinks while others' observations are made."""
         for agent in self.config.task.agents:
             with watch.phase("observe"):
                 seen, heard = observation.agents[agent.name], feedback.get(agent.name, Feedback())
@@ -173,13 +173,13 @@ class Match:
         return Question(observation, [picture.data for picture in seen.pictures])
 
     def _speeches(self, answers: Answers) -> dict[str, Speech]:
-        """What each agent says, in the order of the task: the only place where a reply is parsed."""
+        """Return what each agent says, in the order of the task: the only place where a reply is parsed."""
         default = self.config.task.default_reply
         texts = {seat.agent: answer.text or default for seat, answer in answers.by_seat.items()}
         return {agent: parse(text) for agent, text in texts.items() if text}
 
     def _messages(self, at: StepId, speeches: Mapping[str, Speech]) -> Sequence[Message]:
-        """What agents write to each other, in the order of the task and of their words."""
+        """Return the messages of agents to each other, in the order of the task and of their words."""
         return [
             Message(
                 run=self.config.run,
@@ -261,7 +261,7 @@ class Stopwatch:
 
     @contextmanager
     def phase(self, name: Phase) -> Iterator[None]:
-        """Add what happens inside to a phase."""
+        """Add the time inside to a phase."""
         began = time.perf_counter()
         try:
             yield
@@ -269,7 +269,7 @@ class Stopwatch:
             self._took_s[name] += time.perf_counter() - began
 
     def timings(self, answers: Answers) -> Timings:
-        """Return all phases of a step; asking is timed where it is done."""
+        """Return all phases of a step; `Answers` brings the time of asking."""
         return Timings(
             observe_s=self._took_s["observe"],
             publish_s=answers.publish_s,

@@ -1,8 +1,8 @@
-"""Writes down every topic of a run: a bus that records what passes through it.
+"""Record every topic of a run: a bus that records what passes through it.
 
-The host records what it sends before it is sent, and what it gets when it takes it, so that the file holds the order in
-which the host acted, and cannot lose to congestion what the host saw. Below it: a bus and a
-`khala_protocol.recording.Recorder`. Above it: `khala_orchestrator.host`, which gives the recording bus to everything
+The host records what it sends before it is sent, and what it gets when it takes it. So the file holds the order in
+which the host acted, and congestion cannot remove what the host saw. Below it: a bus and a
+`khala_protocol.recording.Recorder`. Above it: `khala_orchestrator.host`, which passes the recording bus to everything
 else.
 """
 
@@ -22,35 +22,35 @@ if TYPE_CHECKING:
 
 
 class RecordingBus:
-    """A `Bus` that writes every sample it publishes or hands out."""
+    """A `Bus` that records every sample it publishes or hands out."""
 
     def __init__(self, bus: Bus, recorder: Recorder) -> None:
         self._bus = bus
         self._recorder = recorder
 
     async def publisher(self, key: str, delivery: Delivery) -> Publisher:
-        """Declares a publisher whose samples are recorded before they are sent."""
+        """Declare a publisher whose samples are recorded before they are sent."""
         return _RecordingPublisher(await self._bus.publisher(key, delivery), self._recorder)
 
     async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
-        """Declares a subscription whose samples are recorded when they are taken."""
+        """Declare a subscription whose samples are recorded when they are taken."""
         return _RecordingSubscription(await self._bus.subscribe(key_expr, delivery, depth=depth), self._recorder)
 
     async def announce(self, key: str) -> Token:
-        """Declares a liveliness token; tokens are not recorded, reports say who was there."""
+        """Declare a liveliness token; tokens are not recorded, reports say who was there."""
         return await self._bus.announce(key)
 
     async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
-        """Reports tokens."""
+        """Report tokens."""
         return await self._bus.watch(key_expr, depth=depth)
 
     async def close(self) -> None:
-        """Closes the bus below; the recorder is its owner's."""
+        """Close the bus below; the owner of the recorder closes it."""
         await self._bus.close()
 
 
 class Listener:
-    """Takes the topics that the host itself has no use for, so that they are recorded. A context manager."""
+    """Subscribe to the topics that the host itself does not need, so that they are recorded. A context manager."""
 
     def __init__(self, bus: Bus, run: str) -> None:
         self._bus = bus

@@ -1,4 +1,4 @@
-"""Plays a recorded match again without its agents: they say what they said, and must be shown what they were shown.
+"""Play a recorded match again: the recorded replies stand in for the agents, and the observations must be the same.
 
 The match, the bridge and the game are the real ones; `RecordedTurn` takes the place of the bus. With the same map,
 seed and rules, the observations of the replay equal the recorded ones byte for byte, and every difference is returned.
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def recorded_config(recording: Recording) -> MatchConfig:
-    """The match that a recording is of.
+    """Return the match that was recorded.
 
     Raises:
         RecordingError: it has no run card.
@@ -42,14 +42,14 @@ def recorded_config(recording: Recording) -> MatchConfig:
 
 
 async def replay(recording: Recording, game: OneSide) -> list[Difference]:
-    """Plays a recording again, up to its last complete step.
+    """Play a recording again, up to its last complete step.
 
     Args:
         recording: of a match.
         game: the game of `recorded_config`, started.
 
     Returns:
-        every observation that is not the recorded one; a replay that went another way ends at its first step.
+        every observation that differs from the recorded one; a replay that diverges ends at its first step.
     """
     turn = RecordedTurn(recording)
     match = assemble(recorded_config(recording), game, turn, SilentObserver())
@@ -62,7 +62,7 @@ async def replay(recording: Recording, game: OneSide) -> list[Difference]:
 
 
 class RecordedTurn:
-    """An `AgentPool` out of a recording: what was answered in time is answered at once."""
+    """An `AgentPool` from a recording: replies that were in time then arrive at once."""
 
     def __init__(self, recording: Recording) -> None:
         self.differences: list[Difference] = []
@@ -72,7 +72,7 @@ class RecordedTurn:
             self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Compare the observations with the recorded ones, and give the recorded answers.
+        """Compare the observations with the recorded ones, and return the recorded answers.
 
         Pictures are compared by the hashes under which observations name them.
         """

@@ -1,7 +1,7 @@
-"""Who is there: agents by their liveliness tokens.
+"""Which agents are present: found by their liveliness tokens.
 
 Below it: the bus. Above it: `khala_orchestrator.match`, which starts when all required agents are there, and
-`khala_orchestrator.turn`, which stops waiting for one that went away. Two instances of the same agent (a restart
+`khala_orchestrator.turn`, which stops waiting for one that has left. Two instances of the same agent (a restart
 that overlaps, or two people with one name) are one presence here, and a warning in the log.
 """
 
@@ -71,22 +71,22 @@ class Roster:
         await self._pump
 
     def present(self, seat: Seat) -> bool:
-        """Whether at least one instance of this agent is there."""
+        """Return whether at least one instance of this agent is present."""
         return bool(self._instances[seat])
 
     def missing(self) -> tuple[Seat, ...]:
-        """The seats that nobody has taken."""
+        """Return the seats that no agent has taken."""
         return tuple(seat for seat in self.seats if not self.present(seat))
 
     def on_gone(self, callback: Callable[[Seat], None]) -> None:
-        """Calls `callback` whenever the last instance of an agent goes away."""
+        """Call `callback` whenever the last instance of an agent leaves."""
         self._on_gone = callback
 
     async def assemble(self, required: Iterable[Seat], timeout_s: float) -> None:
-        """Waits until all required seats are taken.
+        """Wait until all required seats are taken.
 
         Raises:
-            MissingAgents: some are not after `timeout_s` seconds.
+            MissingAgents: some are not taken after `timeout_s` seconds.
         """
         wanted = tuple(required)
         try:
@@ -97,7 +97,7 @@ class Roster:
 
     async def _follow(self, tokens: Subscription[Liveness]) -> None:
         async for token in tokens:
-            if token.alive or token.link_up:  # with our own link down, everybody seems to go at once
+            if token.alive or token.link_up:  # with our own link down, every agent seems to leave at once
                 self._note(token)
                 async with self._changed:
                     self._changed.notify_all()
@@ -126,4 +126,4 @@ class Roster:
 
 
 def _ignore(seat: Seat) -> None:
-    """Nobody waits yet."""
+    """Do nothing: no turn waits yet."""

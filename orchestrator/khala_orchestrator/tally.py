@@ -1,4 +1,4 @@
-"""Counts what an episode comes to: reports and snapshots in, one `Result` out."""
+"""Sum up an episode: reports and snapshots in, one `Result` out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Tally:
         self._note(snapshot)
 
     def add(self, report: Report, after: Snapshot) -> None:
-        """Counts one step, and what the game looked like after it."""
+        """Count one step, and the state of the game after it."""
         self._steps += 1
         self._env_steps += report.env_steps
         for agent in report.agents:
@@ -44,12 +44,12 @@ class Tally:
         self._note(after)
 
     def result(self, run: str, episode: int, *, wall_s: float) -> Result:
-        """The account at the end of the episode.
+        """Return the account at the end of the episode.
 
         Args:
             run: name of the run.
             episode: its number, from 0.
-            wall_s: time it took.
+            wall_s: wall time of the episode.
         """
         outcome = self._last.outcome or "draw"
         cause = CAUSES[outcome] if self._last.outcome else "step limit"

@@ -1,6 +1,6 @@
 """Turn a recording into a transcript for a person: what was seen, said and done, step by step.
 
-It reads the file once, in its order, and holds no more than one step of it.
+It reads the file once, in order, and holds at most one step of it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class StepSelection:
 
     @classmethod
     def of(cls, agent: str | None, steps: str | None) -> Self:
-        """Of what stands on the command line; `steps` is `7`, `10-20`, `10-` or `-20`.
+        """Return the selection of the command line; `steps` is `7`, `10-20`, `10-` or `-20`.
 
         Raises:
             ConfigError: `steps` is none of these.
@@ -51,21 +51,21 @@ class StepSelection:
         return cls(agent, int(first or 0), int(end) if end else None)
 
     def holds(self, step: int, agent: str | None = None) -> bool:
-        """Whether a step is in it, and an agent, if one is given."""
+        """Return whether a step belongs to it, and an agent, if one is given."""
         in_time = step >= self.first and (self.last is None or step <= self.last)
         return in_time and (agent is None or self.agent in {None, agent})
 
 
 def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> Iterator[RenderableType]:
-    """Yield what is to be printed of a recording, in its order.
+    """Yield the printed form of a recording, in its order.
 
     Args:
         path: the recording.
         selection: which part.
-        whole: observations and replies word for word, as well as what became of them.
+        whole: also show observations and replies word for word.
 
     Raises:
-        RecordingError: the file is no recording.
+        RecordingError: the file is not a recording.
     """
     for recorded in read(path):
         match recorded.message:
@@ -85,7 +85,7 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
 
 
 def summary(path: Path, selection: StepSelection) -> dict[str, Any]:
-    """The run card, the results and the reports of a recording, as JSON data."""
+    """Return the run card, the results and the reports of a recording, as JSON data."""
     found: dict[str, list[Wire]] = {"run": [], "result": [], "report": []}
     topics: Counter[str] = Counter()
     for recorded in read(path):
@@ -120,15 +120,15 @@ def _agent(agent: AgentReport) -> Iterator[Text]:
 
 
 def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list[Path]:
-    """Writes the pictures that agents were shown into a directory, and returns their files.
+    """Write the pictures that agents were shown into a directory, and return their files.
 
     Args:
         path: the recording.
         selection: which part.
-        directory: is made if it is not there; files are named after step, agent and picture.
+        directory: is created if missing; files are named after step, agent and picture.
 
     Raises:
-        RecordingError: the file is no recording, or the directory cannot be written.
+        RecordingError: the file is not a recording, or the directory cannot be written.
     """
     recording = Recording.open(path)
     pictures = dict(recording.images())

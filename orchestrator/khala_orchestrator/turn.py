@@ -1,9 +1,9 @@
 """Ask every agent at once, and wait until all have replied or the deadline has passed.
 
 Below it: publishers of observations and their pictures, and one inbox of replies. Above it: `khala_orchestrator.match`,
-which reads the text of a reply. It knows nothing of games. A reply is taken when it is the first valid one of its agent
-for the open step; all others are counted as ignored and never seen again. A wait for an agent ends early when its
-liveliness token goes, or when what it sent is no reply: it may still answer while the step is open.
+which reads the text of a reply. It knows nothing of games. A reply is accepted if it is the first valid one of its
+agent for the open step; all others are counted as ignored and dropped. The wait for an agent ends early when its
+liveliness token goes, or when what it sent is not a reply: it may still answer while the step is open.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of asking one agent.
+    """The outcome of asking one agent.
 
     Attributes:
         status: `ok` and `fallback` have a reply, the others none.
         latency_s: from the publication of the observation to the reply's arrival.
-        ignored: replies of this agent that arrived during the step and were not taken.
+        ignored: replies of this agent that arrived during the step and were not accepted.
     """
 
     status: AgentStatus
@@ -54,13 +54,13 @@ class Answer:
 
     @property
     def usage(self) -> Usage:
-        """What the reply took."""
+        """The usage of the reply."""
         return self.reply.usage if self.reply else Usage()
 
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What came of asking in one step: an answer for each seat that was asked, in the order of the questions."""
+    """The outcome of asking in one step: an answer for each seat that was asked, in the order of the questions."""
 
     by_seat: Mapping[Seat, Answer]
     publish_s: float = 0.0
@@ -68,23 +68,23 @@ class Answers:
 
 
 class Question(NamedTuple):
-    """What one agent is asked: its observation, and the pictures that the observation names, in their order."""
+    """The question to one agent: its observation, and the pictures that the observation names, in their order."""
 
     observation: Observation
     pictures: Sequence[bytes] = ()
 
 
 class AgentPool(Protocol):
-    """The agents of a match, as it asks them; a recording can stand in for live ones."""
+    """The agents of a match, as the match sees them; a recording can stand in for live ones."""
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Put one observation before each agent and return what they answered."""
+        """Publish one observation to each agent and return their answers."""
         ...
 
 
 @dataclass
 class _Step:
-    """The step that is open: who was asked, who is still waited for, what came."""
+    """The open step: the agents asked, those still awaited, and their replies."""
 
     episode: int = -1
     number: int = -1
@@ -96,19 +96,19 @@ class _Step:
     settled: asyncio.Event = field(default_factory=asyncio.Event)
 
     def open(self, seat: Seat, observation: Observation, now: float) -> Self:
-        """Begins to wait for one agent."""
+        """Begin to wait for one agent."""
         self.episode, self.number = observation.episode, observation.step
         self.asked_at[seat] = now
         self.waiting.add(seat)
         return self
 
     def all_asked(self) -> None:
-        """From now on the step is settled when nobody is waited for."""
+        """Settle the step as soon as no agent is awaited."""
         self.complete = True
         self._settle()
 
     def stop_waiting(self, seat: Seat) -> None:
-        """Waits no more for one agent; it may still answer."""
+        """Stop waiting for one agent; it may still answer."""
         self.waiting.discard(seat)
         self._settle()
 
@@ -150,11 +150,11 @@ class Turn:
             await publisher.close()
 
     async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Publish the observations, each after its pictures, and wait no longer for replies than they allow.
+        """Publish the observations, each after its pictures, and wait for replies until their deadline.
 
         Args:
-            questions: one a seat, all of the same episode and step and with the same `answer_within_s`. They may be
-                made while they are taken: each is published before the next is asked for.
+            questions: one per seat, all of the same episode and step and with the same `answer_within_s`. They may be
+                made lazily: each is published before the next is taken.
         """
         loop = asyncio.get_running_loop()
         step, within_s, publish_s = _Step(), None, 0.0

@@ -1,4 +1,4 @@
-"""Run a command line: what the user can mend is one sentence on stderr and an exit code, never a traceback.
+"""Run a command line: an error that the user can fix is one sentence on stderr and an exit code, never a traceback.
 
 Above: `khala.cli`, and the commands of packages that are installed alone. It knows no library for options.
 """
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def run_command(name: str, command: Callable[[], object], *errors: type[Exception]) -> None:
-    """Run a command and end the process with exit code 1 if it raises an error that the user can mend.
+    """Run a command and end the process with exit code 1 if it raises an error that the user can fix.
 
     Args:
         name: of the command, as the user typed it.
         command: reads the options and does the work.
-        errors: further types of such errors, besides `KhalaError`.
+        errors: further types of such errors, in addition to `KhalaError`.
     """
     user_errors: tuple[type[Exception], ...] = (KhalaError, *errors)
     faults: list[BaseException] = []
@@ -30,7 +30,7 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
         faults = list(_leaves(group))
     for fault in faults:
         sys.stderr.write(f"{name}: {fault}\n")
-    if faults:  # not within `except*`, from where early Pythons 3.11 raise an exit as a part of a group
+    if faults:  # not within `except*`: early Pythons 3.11 raise an exit there as a part of a group
         sys.exit(1)
 
 

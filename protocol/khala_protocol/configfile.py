@@ -1,10 +1,10 @@
 """A YAML file ↔ a pydantic model, with errors that name file, line and field.
 
-One page for every package that is configured by files. It is no configuration system: there are no
-defaults here (the model has them), no interpolation, no environment. A file may begin with all that another one says:
+One page for every package that is configured by files. It is no configuration system: it has no
+defaults (the model has them), no interpolation, no environment. A file may extend another file:
 
     extends: pvz_task1_level1  # the file beside this one, or a path from here that ends in .yaml
-    map: pvz_task1_level2      # a field that is given takes the place of the other file's, as a whole
+    map: pvz_task1_level2      # map: pvz_task1_level2      # a given field replaces the whole field of the other file
 
 Above it are the modules `config` of the packages; below it are PyYAML, read with its safe loader, and pydantic.
 """
@@ -30,26 +30,26 @@ Place = tuple[str | int, ...]
 """Keys and indices from the top of the document to a value."""
 
 EXTENDS = "extends"
-"""Field at the top of a file that names another one."""
+"""Field at the top of a file that names the file to extend."""
 ELSEWHERE = "ELSEWHERE"
 """Class variable of a model: fields that users look for in it, and a sentence without its subject about each."""
 _MAX_DEPTH = 32  # an alias that contains itself would be followed for ever
 
 
 def load(path: Path | str, model: type[M]) -> M:
-    """The model that the YAML file at `path` describes.
+    """Return the model that the YAML file at `path` describes.
 
     Raises:
-        ConfigError: the file cannot be read, is no YAML, or does not fit the model; the text says where.
+        ConfigError: the file cannot be read, is not YAML, or does not fit the model; the text says where.
     """
     return _fitted(_opened(Path(path)), model)
 
 
 def loads(text: str, model: type[M], *, source: str) -> M:
-    """The model that a YAML text describes; `source` is the name it has in errors.
+    """Return the model that a YAML text describes; `source` is its name in errors.
 
     Raises:
-        ConfigError: it is no YAML, or does not fit the model.
+        ConfigError: it is not YAML, or does not fit the model.
     """
     return _fitted(_Document(text, source), model)
 
@@ -62,7 +62,7 @@ def _fitted(document: _Document, model: type[M]) -> M:
 
 
 def _opened(path: Path, *users: Path) -> _Document:
-    """The document at a path, over the one that it extends; `users` are the files that extend it."""
+    """Return the document at a path, over the one that it extends; `users` are the files that extend it."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -98,23 +98,23 @@ class _Document:
         self.data = self._read()
 
     def lay_over(self, other: _Document) -> None:
-        """Takes the fields of another document that this one does not give itself."""
+        """Take the fields of another document that this one does not have."""
         if isinstance(self.data, dict) and isinstance(other.data, dict):
             self._below = other
             self.data = other.data | {key: value for key, value in self.data.items() if key != EXTENDS}
 
     def origin(self, place: Place) -> tuple[str, int | None]:
-        """File and line of the value at `place`."""
+        """Return file and line of the value at `place`."""
         if self._below is not None and place[:1] not in self.lines and self._below.knows(place[:1]):
             return self._below.origin(place)
         return self.source, self.line_of(place)
 
     def knows(self, place: Place) -> bool:
-        """Whether there is a value at `place`."""
+        """Return whether there is a value at `place`."""
         return place in self.lines or (self._below is not None and self._below.knows(place))
 
     def _read(self) -> object:
-        """The data; an empty document is an empty mapping, so that a model can say what is missing."""
+        """Return the data; an empty document is an empty mapping, so that a model can say what is missing."""
         try:
             root = self._loader.get_single_node()
             return {} if root is None else self._value(root, ())
@@ -128,7 +128,7 @@ class _Document:
             self._loader.dispose()
 
     def line_of(self, place: Place) -> int | None:
-        """Line of the value at `place`, or of the nearest one around it."""
+        """Return the line of the value at `place`, or of the nearest one around it."""
         while place not in self.lines and place:
             place = place[:-1]
         return self.lines.get(place)
@@ -171,7 +171,7 @@ class _Document:
         if node.tag == "tag:yaml.org,2002:merge":
             return "<<"
         key = self._loader.construct_object(node, deep=True)
-        # `yes`, `1.5` and dates are written as names here and read as something else by YAML 1.1
+        # `yes`, `1.5` and dates are written as names here, but YAML 1.1 reads them as something else
         return key if isinstance(key, str | int) and not isinstance(key, bool) else str(getattr(node, "value", key))
 
 
@@ -191,7 +191,7 @@ def _line(document: _Document, placed: tuple[Place, ErrorDetails]) -> int:
 
 
 def _known_place(document: _Document, fault: ErrorDetails) -> Place:
-    """The place of a fault without what pydantic adds to it: names of union members, of validators."""
+    """Return the place of a fault without pydantic's additions: names of union members, of validators."""
     place: Place = ()
     for part in fault["loc"]:
         if document.knows((*place, part)):
@@ -229,7 +229,7 @@ def _did_you_mean(word: str, known: list[str]) -> str:
 
 
 def _fields_at(model: type[BaseModel], place: Place) -> list[str]:
-    """Fields of the model at `place`, [] where the way there leads through more than plain nesting."""
+    """Return the fields of the model at `place`, [] where the way there leads through more than plain nesting."""
     for part in place:
         inner = model.model_fields.get(str(part))
         if inner is None or not (isinstance(inner.annotation, type) and issubclass(inner.annotation, BaseModel)):

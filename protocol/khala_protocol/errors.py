@@ -8,7 +8,7 @@
     │   ├── MalformedMessage
     │   ├── WrongVersion
     │   └── WrongKey
-    └── RecordingError       a file that cannot be written, or is no recording
+    └── RecordingError       a file that cannot be written, or is not a recording
 
 Each text is one sentence that says what is wrong, where, and what to do; the command line prints it
 without a traceback. A wrong action of a model is none of these: it is data (`khala_protocol.messages.Rejection`).
@@ -25,7 +25,7 @@ class ConfigError(KhalaError):
     """Something the user wrote or forgot to write.
 
     Attributes:
-        source: the file, option or variable it stands in, if known.
+        source: the file, option or variable that is wrong, if known.
         line: line in that file, counted from 1, if known.
         field: dotted path of the field, if known.
     """
@@ -52,7 +52,7 @@ class BusError(KhalaError):
 
 
 class BusClosed(BusError):
-    """The bus or the subscription was closed while somebody waited on it."""
+    """The bus or the subscription was closed during a wait on it."""
 
 
 class PeerError(KhalaError):
@@ -60,7 +60,7 @@ class PeerError(KhalaError):
 
 
 class MalformedMessage(PeerError):
-    """Bytes that are no message of this protocol."""
+    """Bytes that are not a message of this protocol."""
 
 
 class WrongVersion(PeerError):
@@ -68,7 +68,7 @@ class WrongVersion(PeerError):
 
 
 class WrongKey(PeerError):
-    """A key that is none of ours, or a message that stands under a key of somebody else."""
+    """A key that is not of this protocol, or a message under another agent's key."""
 
 
 class RecordingError(KhalaError):

@@ -5,8 +5,8 @@
     khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
     khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
 
-An agent may write only below its own name, which is what the access rules of a router enforce. Names of
-runs, sides, agents and instances are what `check_name` accepts, so that no name can widen a key expression.
+An agent may write only below its own name; the access rules of a router enforce this. Names of
+runs, sides, agents and instances must pass `check_name`, so that no name can widen a key expression.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LONGEST_SHOWN = 200
 
 
 class Topic(StrEnum):
-    """The last part of a key: what kind of message stands under it."""
+    """The last part of a key: the kind of message under it."""
 
     RUN = "run"
     REPORT = "report"
@@ -41,7 +41,7 @@ class Topic(StrEnum):
 RUN_TOPICS = frozenset({Topic.RUN, Topic.REPORT, Topic.RESULT})
 AGENT_TOPICS = frozenset(Topic) - RUN_TOPICS
 NUMBERED_TOPICS = frozenset({Topic.ALIVE, Topic.IMAGE})
-"""Those of an agent that have one more part in their keys."""
+"""Topics of an agent that have one more part in their keys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Address:
 
 
 def check_name(name: str, what: str = "name") -> str:
-    """Returns `name` if it may stand in a key.
+    """Return `name` if it may be part of a key.
 
     Raises:
         WrongKey: it is empty, longer than 64 characters, or has other characters than letters, digits, `_`, `.`, `-`.
@@ -74,36 +74,36 @@ def check_name(name: str, what: str = "name") -> str:
 
 
 def run_key(run: str, topic: Topic) -> str:
-    """Key of a topic of the whole run."""
+    """Return the key of a topic of the whole run."""
     if topic not in RUN_TOPICS:
         raise WrongKey(f"{topic} belongs to an agent, not to the run")
     return f"{ROOT}/{check_name(run, 'run')}/{topic}"
 
 
 def agent_key(run: str, side: str, agent: str, topic: Topic) -> str:
-    """Key of one agent's topic."""
+    """Return the key of one agent's topic."""
     if topic not in AGENT_TOPICS - NUMBERED_TOPICS:
         raise WrongKey(f"{topic} is no topic of an agent")
     return f"{_agent_root(run, side, agent)}/{topic}"
 
 
 def alive_key(run: str, side: str, agent: str, instance: str) -> str:
-    """Key of the liveliness token of one instance of an agent."""
+    """Return the key of the liveliness token of one instance of an agent."""
     return f"{_agent_root(run, side, agent)}/{Topic.ALIVE}/{check_name(instance, 'instance')}"
 
 
 def image_key(run: str, side: str, agent: str, place: int) -> str:
-    """Key of the picture that stands at this place, from 0, in each of an agent's observations."""
+    """Return the key of the picture at this place, from 0, in each of an agent's observations."""
     return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/{place}"
 
 
 def images_of(run: str, side: str, agent: str) -> str:
-    """Expression that matches all pictures of an agent."""
+    """Return the expression that matches all pictures of an agent."""
     return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/*"
 
 
 def every_agent(run: str, topic: Topic) -> str:
-    """Expression that matches this topic of every agent of a run, on every side."""
+    """Return the expression that matches this topic of every agent of a run, on every side."""
     if topic not in AGENT_TOPICS:
         raise WrongKey(f"{topic} belongs to the run, not to an agent")
     tail = f"{topic}/*" if topic in NUMBERED_TOPICS else str(topic)
@@ -111,15 +111,15 @@ def every_agent(run: str, topic: Topic) -> str:
 
 
 def everything(run: str) -> str:
-    """Expression that matches every topic of a run; liveliness tokens are a space of their own."""
+    """Return the expression that matches every topic of a run; liveliness tokens are a separate space."""
     return f"{ROOT}/{check_name(run, 'run')}/**"
 
 
 def parse(key: str) -> Address:
-    """Takes a key apart.
+    """Parse a key.
 
     Raises:
-        WrongKey: it is none of the forms at the top of this module.
+        WrongKey: it has none of the forms in the module's docstring.
     """
     parts = key.split("/")
     if all(_NAME.fullmatch(part) for part in parts):

@@ -1,10 +1,10 @@
 """The messages, as frozen pydantic models with a literal `kind` each.
 
-They stand alone: no game, no bus, no model provider is imported here. Positions are in one of two frames,
+They stand alone: this module imports no game, no bus, no model provider. Positions are in one of two frames,
 x right and y down in both: *screen*, `[0, 24)` cells of one world unit around the centre of a team's
 (virtual) camera, and *minimap*, `[0, 64)`. The world frame never leaves the host.
 
-Lengths are counted in game loops (22.4 a second at the speed called "faster") where a name ends in
+Lengths are counted in game loops (22.4 per second at the speed called "faster") where a name ends in
 `_loops` or is `game_loop`, in seconds where it ends in `_s`, in world units otherwise.
 """
 
@@ -15,10 +15,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 SCHEMA_VERSION: Literal[1] = 1
-"""Major version of the schema. A peer with another one is refused, not guessed at."""
+"""Major version of the schema. A peer with another one is refused."""
 
 LOOPS_PER_S = 22.4
-"""Game loops in a second at the speed called "faster", the one that ladders and the API play at."""
+"""Game loops per second at the speed called "faster", which ladders and the API use."""
 
 Point = tuple[float, float]
 Alliance = Literal["own", "ally", "enemy", "neutral"]
@@ -26,7 +26,7 @@ Outcome = Literal["win", "draw", "loss"]
 ClockRule = Literal["frozen", "budget", "token", "realtime"]
 
 RejectionReason = Literal[
-    "malformed",  # looks like a call and is none
+    "malformed",  # looks like a call, but is not one
     "unknown_action",  # no action of this name in the agent's catalogue
     "wrong_arguments",  # number or form of the arguments
     "unknown_team",  # a team that this agent does not have
@@ -47,24 +47,24 @@ AgentStatus = Literal[
     "fallback",  # the policy failed (see `Reply.detail`) and said nothing: the task's default reply counts
     "late",  # nothing arrived before the deadline
     "gone",  # its liveliness token went away while the host was waiting
-    "malformed",  # something arrived that is no valid reply
+    "malformed",  # something arrived that is not a valid reply
 ]
 
 
 class Frozen(BaseModel):
-    """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON has not) are errors."""
+    """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON lacks) are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
     def but(self, **changes: object) -> Self:
-        """A copy with some fields replaced, unchecked.
+        """Return a copy with some fields replaced, unchecked.
 
         For inner loops only: it takes 1 µs where `model_copy` takes 6, and a joint step of 128 agents makes 3500.
         """
         return self.having({**self.__dict__, **changes})
 
     def having(self, fields: dict[str, object]) -> Self:
-        """A model of the same class with all of these fields, unchecked and not copied."""
+        """Return a model of the same class with all of these fields, unchecked and not copied."""
         made = object.__new__(type(self))
         _set_fields(made, fields)
         _set_fields_set(made, self.__pydantic_fields_set__)
@@ -77,11 +77,11 @@ _set_fields, _set_fields_set, _set_extra, _set_private = (
     vars(BaseModel)[slot].__set__
     for slot in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
 )
-"""The slots of a model: set through them, a frozen one is made in half of the time that `object.__setattr__` takes."""
+"""The slots of a model: setting a frozen model's fields through them takes half the time of `object.__setattr__`."""
 
 
 class Wire(Frozen):
-    """Base of all messages: what every one of them carries."""
+    """Base of all messages: the fields that every message has."""
 
     v: Literal[1] = SCHEMA_VERSION
     """Major version of the schema."""
@@ -99,28 +99,28 @@ class Call(Frozen):
     args: tuple[str | Point, ...] = ()
     """Tags as `0x…`, points as `(x, y)` in the frame that the action's catalogue entry says, the rest as text."""
     team: str | None = None
-    """The team whose heading stands above it, as written there; None if there was no heading."""
+    """The team of the heading above it, as written there; None if there was no heading."""
     start: int = Field(ge=0)
     """Offset of `<` in the reply's text, in characters."""
     end: int = Field(ge=0)
-    """Offset behind `>`."""
+    """Offset after `>`."""
 
 
 class Rejection(Frozen):
-    """A call, or what looked like one, that was not executed. It goes back to the agent with the next observation."""
+    """A call, or text that looked like one, that was not executed. The agent gets it with the next observation."""
 
     reason: RejectionReason
     message: str
     """One sentence for the model: what was wrong, and what would be right."""
     text: str
-    """The words in question."""
+    """The rejected words."""
     start: int = Field(ge=0)
     """Offset of `text` in the reply."""
     team: str | None = None
 
 
 class ActionSpec(Frozen):
-    """One text action of the catalogue, as an agent is told of it."""
+    """One text action of the catalogue, as an agent sees it."""
 
     name: str
     args: tuple[Literal["tag", "screen", "minimap"], ...] = ()
@@ -136,31 +136,31 @@ class OrderView(Frozen):
     name: str
     """General name of what it does, `Attack`."""
     target: str | None = None
-    """Tag of the unit that it is about."""
+    """Tag of the unit that it targets."""
     minimap: Point | None = None
-    """The point that it is about."""
+    """The point that it targets."""
     progress: float | None = None
-    """How far it is, 0 to 1, of what is trained, researched or morphed; None while there is nothing to tell."""
+    """Progress, 0 to 1, of training, research or morphing; None for orders without progress."""
 
 
 class UnitDetails(Frozen):
-    """What only some units have."""
+    """Details that only some units have."""
 
     passengers: tuple[str, ...] = ()
     """Types of the units inside; own units only."""
     cargo_max: int = 0
-    """Room for passengers; 0 for those that carry none, and for others' units."""
+    """Room for passengers; 0 for units without room, and for others' units."""
     burrowed: bool = False
     unpowered: bool = False
-    """An own structure that does nothing for want of a power field."""
+    """Whether an own structure is idle because it lacks a power field."""
     contents: int | None = None
     """Minerals or vespene left in a resource."""
     harvesters: tuple[int, int] | None = None
-    """Workers that an own base or gas structure has, and how many it has work for."""
+    """Workers of an own base or gas structure, and how many it has work for."""
     ready: tuple[str, ...] = ()
     """Of the skills that the agent may use, those that a unit of its team could use now."""
     unready: tuple[str, ...] = ()
-    """Of these, the ones that only others of its team could use now."""
+    """Of these, the ones that only other units of its team could use now."""
 
 
 class UnitView(Frozen):
@@ -190,39 +190,39 @@ class UnitView(Frozen):
     hallucination: bool = False
     buffs: tuple[str, ...] = ()
     order: str | None = None
-    """Name of the order it follows; own units only."""
+    """Name of its current order; own units only."""
     orders: tuple[OrderView, ...] = ()
-    """The order that it follows, and those that wait behind it."""
+    """Its current order, and the orders queued after it."""
     details: UnitDetails | None = None
-    """What only some units have; None for all others."""
+    """Details that only some units have; None for all others."""
 
 
 class Event(Frozen):
-    """What happened to a unit between the last observation and this one."""
+    """A change of a unit between the last observation and this one."""
 
     what: Literal["hurt", "healed", "died", "joined", "appeared", "disappeared", "finished", "researched"]
     tag: str
-    """Empty for `researched`, which happens to no unit."""
+    """Empty for `researched`, which concerns no unit."""
     type: str
-    """Of the unit; the upgrade's name for `researched`."""
+    """Type of the unit; the upgrade's name for `researched`."""
     alliance: Alliance
     amount: float | None = None
     """Health and shield lost (`hurt`) or regained (`healed`)."""
 
 
 class ActionCost(Frozen):
-    """What a valid action costs."""
+    """The cost of a valid action."""
 
     action: str
     minerals: int = 0
     vespene: int = 0
     supply: float = 0.0
     times: int = Field(ge=0)
-    """How often it could be paid for now; what is researched is researched once."""
+    """How often it could be paid for now; at most 1 for research."""
     footprint: tuple[int, int] | None = None
-    """Width and height of the ground that it takes, in world units; None for what is not put on a point."""
+    """Width and height of the ground that it takes, in world units; None for actions without a point."""
     first: bool = False
-    """Whether it makes a structure of which there is none yet."""
+    """Whether it makes the first structure of its type."""
 
 
 class UnavailableAction(Frozen):
@@ -238,19 +238,19 @@ class TeamView(Frozen):
 
     name: str
     minimap: Point | None = None
-    """Centre of the team's camera; None for a team without units, which orders those of the whole side."""
+    """Centre of the team's camera; None for a team without units, which gives orders to the whole side."""
     task: str = ""
-    """What it has to do at this time."""
+    """Its current task."""
     units: tuple[UnitView, ...] = ()
     allies: tuple[UnitView, ...] = ()
     enemies: tuple[UnitView, ...] = ()
     events: tuple[Event, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
-    """What is valid for this team now."""
+    """Actions that are valid for this team now."""
     offers: tuple[ActionCost, ...] = ()
-    """Of those, the ones that cost something."""
+    """Valid actions that have a cost."""
     barred: tuple[UnavailableAction, ...] = ()
-    """What it may be told, but not now."""
+    """Actions of this team that are not valid now."""
     resources: tuple[UnitView, ...] = ()
     """Minerals and geysers on its screen; for builders only."""
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 24.0, 24.0)
@@ -265,7 +265,7 @@ class Resources(Frozen):
     supply_used: float = 0.0
     supply_cap: float = 0.0
     promised: tuple[int, int] = (0, 0)
-    """Of the minerals and the vespene, what structures will cost that workers are on their way to build."""
+    """Resources reserved for structures that workers are on their way to build, as minerals and vespene."""
 
 
 class TypeCount(Frozen):
@@ -273,25 +273,25 @@ class TypeCount(Frozen):
 
     type: str
     ready: int
-    """Finished ones."""
+    """Number of finished ones."""
     idle: int | None = None
-    """Of these, the ones without an order; None for types that neither produce nor gather."""
+    """Number of finished ones without an order; None for types that neither produce nor gather."""
     under_way: tuple[float, ...] = ()
-    """How far each is that is being built or warped in, 0 to 1, the farthest first."""
+    """Progress of each one that is being built or warped in, 0 to 1, the farthest first."""
 
 
 class Production(Frozen):
-    """What is being trained, researched or morphed, by the name of its order."""
+    """Units and upgrades in training, research or morphing, by the name of the order."""
 
     order: str
     progress: tuple[float, ...]
-    """Of each that has begun, 0 to 1, the farthest first."""
+    """Progress of each one that has begun, 0 to 1, the farthest first."""
     queued: int = 0
-    """How many more wait behind others."""
+    """How many more are queued."""
 
 
 class EnemyCount(Frozen):
-    """What was seen of an enemy's type in this episode."""
+    """How many of an enemy's type were seen in this episode."""
 
     type: str
     seen: int
@@ -299,11 +299,11 @@ class EnemyCount(Frozen):
     in_sight: int = 0
     dead: int = 0
     minimap: Point | None = None
-    """Where one of them was seen last."""
+    """Place where one of them was last seen."""
 
 
 class Counts(Frozen):
-    """What a side has, makes and knows of."""
+    """Everything that a side has, makes and knows of."""
 
     units: tuple[TypeCount, ...] = ()
     structures: tuple[TypeCount, ...] = ()
@@ -320,12 +320,12 @@ class Alert(Frozen):
     units: dict[str, int]
     """How many, by type."""
     lost: float
-    """Health and shield that they lost, without those that died."""
+    """Health and shield that they lost, without the units that died."""
     died: int = 0
 
 
 class TeamReport(Frozen):
-    """A team of another agent, as a commander hears of it."""
+    """A team of another agent, as a commander sees it."""
 
     agent: str
     name: str
@@ -333,7 +333,7 @@ class TeamReport(Frozen):
     units: dict[str, int]
     """How many, by type."""
     health: float
-    """Health and shield of all of them, 0 to 1 of what they have at their best."""
+    """Health and shield of all of them, 0 to 1 of their maximum."""
 
 
 class Landmark(Frozen):
@@ -344,9 +344,9 @@ class Landmark(Frozen):
     type: str
     minimap: Point
     screen: Point | None = None
-    """If it is on the screen of the agent's first team."""
+    """Its place, if it is on the screen of the agent's first team."""
     about: str = ""
-    """What else is to be known of it."""
+    """Further information."""
 
 
 class WarpGates(Frozen):
@@ -366,11 +366,11 @@ class View(Frozen):
     upgrades: tuple[str, ...] = ()
     teams: tuple[TeamView, ...] = ()
     counts: Counts | None = None
-    """Told to commanders, developers and builders, as all that follows."""
+    """For commanders, developers and builders, like all that follows."""
     events: tuple[Event, ...] = ()
-    """What happened to the whole side."""
+    """Events of the whole side."""
     warnings: tuple[str, ...] = ()
-    """What the game itself warns of, `NuclearLaunchDetected`."""
+    """Warnings of the game itself, `NuclearLaunchDetected`."""
     alerts: tuple[Alert, ...] = ()
     others: tuple[TeamReport, ...] = ()
     landmarks: tuple[Landmark, ...] = ()
@@ -378,19 +378,19 @@ class View(Frozen):
 
 
 class ImageRef(Frozen):
-    """A picture that belongs to an observation and travels, as nothing but its bytes, on a topic of its own."""
+    """A picture that belongs to an observation; its bytes travel on their own topic."""
 
     name: str
     media_type: Literal["image/jpeg", "image/png", "image/webp"]
     sha256: str
-    """Hash of the bytes, by which a receiver finds them among those that arrived."""
+    """Hash of the bytes, by which a receiver finds them among the pictures that arrived."""
     title: str = ""
-    """One line that tells a model what it shows."""
+    """One line that explains the picture to a model."""
     width: int = Field(ge=1)
     """In pixels."""
     height: int = Field(ge=1)
     bytes: int = Field(ge=1)
-    """How many there are."""
+    """Number of bytes."""
 
 
 class Received(Frozen):
@@ -403,7 +403,7 @@ class Received(Frozen):
 
 
 class Contact(Frozen):
-    """Somebody an agent may write to."""
+    """An agent or channel that an agent may write to."""
 
     name: str
     role: str = ""
@@ -425,24 +425,24 @@ class Frames(Frozen):
 
 
 class Clock(Frozen):
-    """How game time and thinking time hang together in this run."""
+    """How game time and thinking time relate in this run."""
 
     rule: ClockRule = "frozen"
     max_wait_s: float | None = 15.0
-    """Longest time the host waits for the agents of one step; None waits for ever."""
+    """Longest time the host waits for the agents of one step; None for no limit."""
     step_loops: int = Field(default=8, ge=1)
     """Game loops that pass between two observations."""
 
 
 class Briefing(Wire):
-    """Host → agent: all that an agent must know besides observations, so that it can join late or restart."""
+    """Host → agent: all that an agent must know, except observations, so that it can join late or restart."""
 
     kind: Literal["briefing"] = "briefing"
     agent: str
     side: str
     episode: int = Field(ge=0)
     role: str
-    """Who the agent is and what it has to do."""
+    """The agent's role and task."""
     task: str = ""
     teams: tuple[TeamSpec, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
@@ -469,12 +469,12 @@ class Observation(Wire):
     text: str
     """The observation in words."""
     view: View
-    """What the words were made from."""
+    """The data that the words were made from."""
     images: tuple[ImageRef, ...] = ()
     accepted: tuple[str, ...] = ()
     """The agent's calls of the last step that were carried out, as written."""
     rejections: tuple[Rejection, ...] = ()
-    """Those that were not."""
+    """The agent's calls of the last step that were not carried out."""
     messages: tuple[Received, ...] = ()
 
 
@@ -482,7 +482,7 @@ class Observation(Wire):
 
 
 class Usage(Frozen):
-    """What requests to a model took. Sums with `+`."""
+    """The usage of requests to a model. Sums with `+`."""
 
     requests: int = 0
     prompt_tokens: int = 0
@@ -490,15 +490,15 @@ class Usage(Frozen):
     cached_tokens: int = 0
     """The part of `prompt_tokens` that the provider had in its cache."""
     reasoning_tokens: int = 0
-    """The part of `completion_tokens` that was thought and not said."""
+    """The part of `completion_tokens` that was reasoning."""
     cost_usd: float | None = None
     """None if no price is known for the model."""
     unknown_requests: int = 0
-    """Requests that were cancelled or failed, whose tokens nobody told us."""
+    """Requests that were cancelled or failed, whose tokens are unknown."""
     images: int = 0
-    """Pictures that were sent along."""
+    """Number of pictures that were sent along."""
     image_tokens: int = 0
-    """The part of `prompt_tokens` that they took, as the model file's rule estimates it."""
+    """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
 
     def __add__(self, other: Usage) -> Usage:
         costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
@@ -524,10 +524,10 @@ class Reply(Wire):
     episode: int = Field(ge=0)
     step: int = Field(ge=0)
     text: str
-    """The reply as the model gave it. The host reads it: what the agent orders, writes to others and listens to."""
+    """The reply as the model gave it. The host reads from it the agent's orders, messages and subscriptions."""
     status: Literal["ok", "fallback"] = "ok"
     detail: str = ""
-    """Why it is a fallback: `timeout`, `http 500`, `budget`, …"""
+    """Reason for a fallback: `timeout`, `http 500`, `budget`, …"""
     latency_s: float = 0.0
     """From the arrival of the observation to this reply."""
     attempts: int = Field(default=0, ge=0)
@@ -536,12 +536,12 @@ class Reply(Wire):
     @model_validator(mode="before")
     @classmethod
     def _without_calls(cls, data: Any) -> Any:
-        """Recordings of early versions hold the calls beside the text that they stand in."""
+        """Remove the calls that recordings of early versions hold next to the text."""
         return {k: v for k, v in data.items() if k != "calls"} if isinstance(data, dict) and "calls" in data else data
 
 
 class Message(Wire):
-    """Host → all: a `MessageTo` that stood in an agent's reply; recipients find it in their next observation."""
+    """Host → all: a `MessageTo` of an agent's reply; recipients find it in their next observation."""
 
     kind: Literal["message"] = "message"
     agent: str
@@ -560,11 +560,11 @@ class ChatMessage(Frozen):
     role: Literal["system", "user", "assistant"]
     content: str
     images: tuple[ImageRef, ...] = ()
-    """Pictures that stand before the text, in their order."""
+    """Pictures before the text, in their order."""
 
 
 class ModelCall(Wire):
-    """Agent → recorder: one request to a model and what came back. Never a key."""
+    """Agent → recorder: one request to a model and its answer. Never a key."""
 
     kind: Literal["exchange"] = "exchange"
     agent: str
@@ -578,7 +578,7 @@ class ModelCall(Wire):
     prompt: tuple[ChatMessage, ...]
     params: dict[str, str | int | float | bool | None] = {}
     completion: str | None
-    """None if none came."""
+    """None if no answer came."""
     status: str
     """`ok`, `timeout`, `cancelled`, `http 429`, `connection`, `malformed`."""
     started_s: float
@@ -589,7 +589,7 @@ class ModelCall(Wire):
     usage: Usage = Usage()
 
 
-# --- what the host tells everybody -------------------------------------------------------------------
+# --- what the host publishes to all -------------------------------------------------------------------
 
 
 class AgentCard(Frozen):
@@ -602,7 +602,7 @@ class AgentCard(Frozen):
 
 
 class Run(Wire):
-    """Host → all: the run card, all that one needs to know to repeat a run or to trust its numbers."""
+    """Host → all: the run card, with everything needed to repeat a run or to trust its numbers."""
 
     kind: Literal["run"] = "run"
     task: str
@@ -611,7 +611,7 @@ class Run(Wire):
     seed: int
     episodes: int
     game: str
-    """What plays and its version, `StarCraft II 4.10.0.75689` or `Khala simulator 0.1.0, as 4.10.0.75689`."""
+    """The game and its version, `StarCraft II 4.10.0.75689` or `Khala simulator 0.1.0, as 4.10.0.75689`."""
     executor: Literal["raw", "screen"]
     clock: Clock
     agents: tuple[AgentCard, ...]
@@ -619,11 +619,11 @@ class Run(Wire):
     versions: dict[str, str]
     """Of Khala, Python, PySC2, zenoh."""
     config: dict[str, object] = {}
-    """The task file as it was resolved."""
+    """The task file with all its defaults."""
 
 
 class AgentReport(Frozen):
-    """What became of one agent's part of a step."""
+    """The result of one agent's part of a step."""
 
     agent: str
     side: str
@@ -657,12 +657,12 @@ class Report(Wire):
     game_loop: int = Field(ge=0)
     agents: tuple[AgentReport, ...]
     messages: tuple[Received, ...] = ()
-    """What the mailbox took in this step, in the order of the agents; what it could deliver is in the next
-    observations."""
+    """What the mailbox took in this step, in the order of the agents; the next observations have what it could
+    deliver."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0
-    """Calls of `SC2Env.step` that the joint action took."""
+    """Number of `SC2Env.step` calls of the joint action."""
     score: float = 0.0
     timings: Timings = Timings()
 
@@ -675,7 +675,7 @@ class Casualties(Frozen):
 
 
 class Result(Wire):
-    """Host → all: how an episode ended."""
+    """Host → all: the result of an episode."""
 
     kind: Literal["result"] = "result"
     episode: int = Field(ge=0)
@@ -683,9 +683,9 @@ class Result(Wire):
     cause: str
     """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`."""
     steps: int
-    """Decisions of the agents."""
+    """Number of decisions of the agents."""
     env_steps: int = 0
-    """Calls of `SC2Env.step` that they took: one each with the raw executor, many with the screen executor."""
+    """Number of `SC2Env.step` calls for them: one each with the raw executor, many with the screen executor."""
     game_loop: int
     game_s: float
     wall_s: float

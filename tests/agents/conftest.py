@@ -97,7 +97,7 @@ class Host:
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def listen(self) -> None:
-        """Hears replies and messages in one order, and exchanges."""
+        """Hear replies and messages in one order, and exchanges."""
         speech = (Topic.REPLY, Topic.MESSAGE)
         for topic in (*speech, Topic.EXCHANGE):
             delivery = Delivery.SPEECH if topic in speech else Delivery.LOG
@@ -106,12 +106,12 @@ class Host:
             self._tasks.append(asyncio.create_task(self._hear(subscription)))
 
     async def say(self, message: Wire, agent: str = AGENT) -> None:
-        """Publishes under the key that belongs to the kind of message."""
+        """Publish under the key that belongs to the kind of message."""
         topic = Topic(str(message.model_dump()["kind"]))
         await self._put(run_key(RUN, topic) if topic in RUN_TOPICS else agent_key(RUN, SIDE, agent, topic), message)
 
     async def raw(self, payload: bytes, topic: Topic = Topic.OBSERVATION) -> None:
-        """Publishes bytes that need not be a message."""
+        """Publish bytes that need not be a message."""
         await self._put(agent_key(RUN, SIDE, AGENT, topic), payload)
 
     async def _put(self, key: str, what: Wire | bytes) -> None:
@@ -120,14 +120,14 @@ class Host:
         await self._publishers[key].put(encode(what) if isinstance(what, Wire) else what)
 
     async def replies(self, count: int) -> list[Reply]:
-        """Waits until so many replies have been heard."""
+        """Wait until this many replies have been heard."""
         while len(found := self.of(Reply)) < count:
             self._arrived.clear()
             await self._arrived.wait()
         return found
 
     def of(self, kind: type[W]) -> list[W]:
-        """All that was heard of one kind."""
+        """Return all messages of one kind."""
         return [message for message in self.heard if isinstance(message, kind)]
 
     async def close(self) -> None:
@@ -232,7 +232,7 @@ class ListedModel:
 
     @property
     def times_s(self) -> list[float]:
-        """When the requests were made."""
+        """Times of the requests."""
         return [round(at, 6) for at, _ in self.requests]
 
 

@@ -1,4 +1,4 @@
-"""A model's address from the environment: for containers, where the endpoint has a name of its own."""
+"""A model's address from the environment: for containers, where the endpoint has its own name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FILE = f"profile: compatible\nmodel: m\nbase_url: {IN_FILE}\n"
 
 @pytest.fixture
 def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Path of a model file that names a variable, which is not set."""
+    """Return the path of a model file that names a variable, which is not set."""
     monkeypatch.delenv("MINE_BASE_URL", raising=False)
     path = tmp_path / "mine.yaml"
     path.write_text(FILE + "base_url_env: MINE_BASE_URL\n", encoding="utf-8")

@@ -90,7 +90,7 @@ def test_help_shows_examples() -> None:
 
 
 class Command:
-    """A command as a process of its own."""
+    """A command in its own process."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self.process = process
@@ -99,14 +99,14 @@ class Command:
         self.out, self.err = process.stdout, process.stderr
 
     async def until_said(self, words: str) -> str:
-        """The first line on stderr with these words."""
+        """Return the first line on stderr with these words."""
         while line := (await self.err.readline()).decode():
             if words in line:
                 return line
         raise AssertionError(f"it never said {words!r}")
 
     async def end(self, number: signal.Signals) -> tuple[int, str, str]:
-        """Exit code, and what was still said on stdout and stderr."""
+        """Return the exit code, and the rest of stdout and stderr."""
         self.process.send_signal(number)
         out, err = await self.process.communicate()
         assert self.process.returncode is not None
@@ -115,7 +115,7 @@ class Command:
 
 @pytest.fixture
 async def start() -> AsyncIterator[Callable[..., Any]]:
-    """Starts `khala <options>`; what still runs at the end of the test is killed."""
+    """Start `khala <options>`; what still runs at the end of the test is killed."""
     running: list[asyncio.subprocess.Process] = []
 
     async def started(*options: str) -> Command:

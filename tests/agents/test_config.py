@@ -1,4 +1,4 @@
-"""Model files and agent files: what ships is right, and what is wrong is said."""
+"""Model files and agent files: shipped files are right, and mistakes are reported."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_the_command_line_changes_what_a_file_says() -> None:
 
 @pytest.fixture
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A directory that we are in, with a module `my_agent` of the user's in it."""
+    """Yield the current directory, with a module `my_agent` of the user's in it."""
     (tmp_path / "my_agent.py").write_text(
         "def decide(briefing, observation):\n    return 'text'\n\n"
         "class Mine:\n    async def decide(self, briefing, observation):\n        return 'text'\n\n"

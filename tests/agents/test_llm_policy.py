@@ -1,4 +1,4 @@
-"""The policy that asks a model: tries, limits, memory, what is traced, and its replay."""
+"""The policy that asks a model: tries, limits, memory, traces, and its replay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a policy is, what is made one, and what it has for a decision; on a clock that jumps."""
+"""What a policy is, what can become one, and its context of a decision; on a clock that jumps."""
 
 from __future__ import annotations
 

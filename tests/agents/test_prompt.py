@@ -1,4 +1,4 @@
-"""What a model is told. The golden text is behaviour: a change of it changes how agents play."""
+"""The text of a prompt. The golden text is behaviour: a change of it changes how agents play."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def test_a_key_shows_itself_nowhere() -> None:
 
 @pytest.fixture
 async def echoing_server() -> AsyncIterator[str]:
-    """A server that puts the key it got into everything that it says: errors first, then completions."""
+    """Yield a server that puts its key into every answer: errors first, then completions."""
     asked = 0
 
     async def echo(request: web.Request) -> web.Response:

@@ -33,7 +33,7 @@ ATTACK = "Analysis: fire.\nActions:\n    Team Stalker-1:\n        <Attack_Unit(0
 
 
 class Players:
-    """Starts workers, each on a session of its own, and ends what is still running."""
+    """Start workers, each on its own session, and end what is still running."""
 
     def __init__(self, broker: MemoryBroker) -> None:
         self._broker = broker
@@ -62,7 +62,7 @@ async def players(broker: MemoryBroker) -> AsyncIterator[Players]:
 
 
 class Slow(Policy):
-    """A policy that takes its time, as told, and notes what becomes of it."""
+    """A policy that takes a given time, and notes its cancellation."""
 
     def __init__(self, *times_s: float, stubborn: bool = False) -> None:
         self._times_s = list(times_s)
@@ -366,7 +366,7 @@ async def test_a_text_that_cannot_travel_is_made_to(
     assert (reply.status, reply.text) == ("ok", sent)
 
 
-# --- what a model took ------------------------------------------------------------------------------------
+# --- usage of a model --------------------------------------------------------------------------------------
 
 
 async def test_exchanges_are_published_and_summed_up_in_the_reply(

@@ -38,7 +38,7 @@ class Command:
     log: Path
 
     async def line(self) -> Any:
-        """What its next line on stdout says, as JSON."""
+        """Return its next line on stdout, as JSON."""
         assert self.process.stdout is not None
         async with asyncio.timeout(READY_S):
             line = await self.process.stdout.readline()
@@ -46,7 +46,7 @@ class Command:
         return json.loads(line)
 
     async def said(self, text: str) -> None:
-        """Waits until this stands on its stderr."""
+        """Wait until this text is on its stderr."""
         assert self.process.stderr is not None
         async with asyncio.timeout(READY_S):
             async for line in self.process.stderr:
@@ -56,7 +56,7 @@ class Command:
         pytest.fail(f"it never said {text!r}: {self.log.read_text()}")
 
     async def result(self, within_s: float) -> Any:
-        """What it says as JSON when it has ended well."""
+        """Return its result as JSON when it has ended well."""
         async with asyncio.timeout(within_s):
             out, err = await self.process.communicate()
         self._keep(err)
@@ -78,7 +78,7 @@ class Machine:
     commands: list[Command] = field(default_factory=list)
 
     async def khala(self, *arguments: str) -> Command:
-        """Starts a command there."""
+        """Start a command there."""
         process = await asyncio.create_subprocess_exec(
             *("ip", "netns", "exec", self.name, sys.executable, "-m", "khala", *arguments),
             stdin=subprocess.DEVNULL,
@@ -92,11 +92,11 @@ class Machine:
         return command
 
     def ip(self, *arguments: str) -> None:
-        """Changes its network."""
+        """Change its network."""
         _ip("-n", self.name, *arguments)
 
     async def off(self) -> None:
-        """Ends all that runs there."""
+        """End all that runs there."""
         for command in self.commands:
             if command.process.returncode is None:
                 command.process.kill()
@@ -109,7 +109,7 @@ def _ip(*arguments: str) -> None:
 
 @pytest.fixture
 async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine]]:
-    """Two machines that reach each other and nobody else."""
+    """Yield two machines that reach each other and nothing else."""
     if os.geteuid() != 0 or shutil.which("ip") is None:
         pytest.skip("network namespaces need root and iproute2")
     first, second = (Machine(f"khala-{os.getpid()}-{n}", f"192.0.2.{n}", tmp_path) for n in (1, 2))
@@ -131,7 +131,7 @@ async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine]]:
 
 
 async def _router_and_agents(first: Machine, second: Machine, *, latency_s: float) -> Command:
-    """A router here, both agents and their model there, ready to play."""
+    """Start a router here, both agents and their model there, ready to play."""
     router = await first.khala("router", "--listen", ROUTER, "--insecure", "--json")
     model = await second.khala("llm", "--port", "0", "--latency", str(latency_s), "--json")
     await router.line()
@@ -166,7 +166,7 @@ async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, M
 @pytest.mark.slow
 async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tuple[Machine, Machine]) -> None:
     first, second = machines
-    agents = await _router_and_agents(first, second, latency_s=0.2)  # so that the match is young when it happens
+    agents = await _router_and_agents(first, second, latency_s=0.2)  # so that it happens early in the match
     host = await _host(first, "--max-wait", str(2 * MATCH_S))  # so that no deadline can end the wait
     await host.said("step 0, ")
     second.ip("link", "set", "cable", "down")

@@ -1,4 +1,4 @@
-"""`khala actions`: what it lists, by what, and how it answers wrong options."""
+"""`khala actions`: its lists, their order, and its answers to wrong options."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -
 
 
 class Refusing(BaseHTTPRequestHandler):
-    """A model endpoint that takes no key."""
+    """A model endpoint that accepts no key."""
 
     def do_GET(self) -> None:
         self.send_response(401)
@@ -138,7 +138,7 @@ class Refusing(BaseHTTPRequestHandler):
         self.wfile.write(b'{"error": {"message": "Incorrect API key provided", "code": "invalid_api_key"}}')
 
     def log_message(self, *_: object) -> None:
-        """Keeps quiet."""
+        """Keep quiet."""
 
 
 @pytest.mark.game
@@ -174,7 +174,7 @@ def test_a_process_killed_in_a_step_costs_its_agent_and_not_the_game(tmp_path: P
     told = json.loads(done.stdout)
     assert told["results"][0]["statuses"] == {"Stalkers": {"ok": 2, "gone": 3}, "Zealots": {"ok": 5}}
     reports = Recording.open(tmp_path / told["recording"]).of(Report)
-    assert max(report.timings.wait_s for report in reports) < 5  # far from the 20 s that it would have waited
+    assert max(report.timings.wait_s for report in reports) < 5  # far from the 20 s of the longest wait
 
 
 @pytest.mark.game
@@ -207,7 +207,7 @@ def test_ctrl_c_ends_everything_and_leaves_a_readable_recording(tmp_path: Path) 
 
 
 def _processes_of(run: str) -> list[str]:
-    """Command lines of processes that still play this run."""
+    """Return the command lines of processes that still play this run."""
     found = []
     for entry in Path("/proc").glob("[0-9]*/cmdline"):
         try:

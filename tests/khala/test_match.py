@@ -1,4 +1,4 @@
-"""Whole matches on the simulator with agents on a bus in memory: what the fault of one does to the others."""
+"""Whole matches on the simulator with agents on a bus in memory: one agent's fault and its effects on the others."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ async def test_an_agent_that_stalls_is_late_and_the_game_goes_on(game: OneSide) 
     table = Table(game, steps=4)
     result = await table.play(stall)
     assert table.statuses("Zealots") == ["ok"] * 4
-    # the worker gives up a moment before the host does, and says so
+    # the worker gives up a moment before the host does, and reports it
     assert table.statuses("Stalkers") == ["ok", "ok", "fallback", "fallback"]
     assert result.steps == 4
 
@@ -162,7 +162,7 @@ async def test_a_reply_that_comes_late_is_counted_and_never_executed(game: OneSi
     assert not any(agent.accepted for agent in stalkers)
     assert not any("Move" in function for report in table.reports for function in report.functions)
     recorded = [reply.step for reply in Recording.open(tmp_path / "late.mcap").of(Reply, agent="Stalkers")]
-    assert sorted(recorded) == [0, 0, 0, 0, 1, 1, 1, 2, 2, 3]  # what was ignored is recorded all the same
+    assert sorted(recorded) == [0, 0, 0, 0, 1, 1, 1, 2, 2, 3]  # ignored replies are recorded as well
 
 
 async def test_an_action_said_twice_is_executed_once(game: OneSide) -> None:
@@ -191,7 +191,7 @@ async def test_what_one_agent_says_the_other_reads_in_the_next_step(game: OneSid
         return f"Communications:\n<MessageTo(Stalkers, 'step {seen.step}')>\n<MessageTo(Zealots, 'go {seen.step}')>"
 
     result = await table.play(talk)
-    assert heard == []  # nobody wrote to the Stalkers but they themselves
+    assert heard == []  # only the Stalkers write to the Stalkers
     assert [m.text for report in table.reports for m in report.messages] == ["step 0", "go 0", "step 1", "go 1"]
     assert result.rejections == {"unknown_recipient": 2}
 

@@ -41,7 +41,7 @@ STEPS: tuple[list[bytes], ...] = ([b"one", BIG], [b"three", BIG], [])
 
 @pytest.fixture(params=["memory", "zenoh"])
 async def connect(request: pytest.FixtureRequest) -> AsyncIterator[Connect]:
-    """Opens sessions on one bus; the first one is the host's."""
+    """Open sessions on one bus; the first one is the host's."""
     broker, opened = MemoryBroker(), list[ZenohBus]()
 
     async def open_one() -> Bus:
@@ -57,7 +57,7 @@ async def connect(request: pytest.FixtureRequest) -> AsyncIterator[Connect]:
 
 
 class Looking(Policy):
-    """A policy that says the hashes of what it sees."""
+    """A policy that answers with the hashes of its pictures."""
 
     def __init__(self) -> None:
         self.seen: list[Mapping[str, bytes]] = []
@@ -89,7 +89,7 @@ def question(step: int) -> Question:
 
 
 async def play(connect: Connect, path: Path) -> Looking:
-    """Three steps with an agent that looks, recorded."""
+    """Record three steps with an agent that looks."""
     host = await connect()
     policy, stop = Looking(), asyncio.Event()
     with Recorder(path) as recorder:

@@ -1,4 +1,4 @@
-"""A battle on the simulator with pictures: sent, recorded, and the same again in a replay."""
+"""A battle on the simulator with pictures: sent, recorded, and repeated in a replay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run is written: beside what is there, never over it."""
+"""Where a run is recorded: next to existing files, never over them."""
 
 from __future__ import annotations
 

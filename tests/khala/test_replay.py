@@ -28,7 +28,7 @@ GOLDEN = Path(__file__).with_name("golden.mcap")
 
 
 def changed(path: Path, change: Callable[[Wire], Wire]) -> Path:
-    """A copy of the golden recording with some of its messages changed."""
+    """Return a copy of the golden recording with some of its messages changed."""
     with Recorder(path) as recorder:
         for sample in Recording.open(GOLDEN):
             assert sample.message is not None

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.game
 
 SHORT = ("3s_vs_3z", "pvz_task1_level1", "pvz_task3_level1", "pvz_task6_level1")
-"""Each is over in seconds, and won by who uses skills and keeps his distance; the first one stands for all."""
+"""Each takes seconds and is won with skills and distance; the first one represents all."""
 
 
 def played(task: str, player: str, out: Path, monkeypatch: pytest.MonkeyPatch) -> Row:

@@ -33,11 +33,11 @@ SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
 every_service = pytest.mark.parametrize("service", SERVICES)
 
 
-# --- as the specification wants it --------------------------------------------------------------------
+# --- valid by the specification ----------------------------------------------------------------------
 
 
 def complaints(*files: Path) -> str:
-    """What the checker of the compose specification's schema says of files; empty if nothing is wrong."""
+    """Return the complaints of the compose specification's schema about files; empty if nothing is wrong."""
     checker = (sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec")
     done = subprocess.run([*checker, *files], cwd=ROOT, capture_output=True, text=True, check=False)
     assert not done.stderr
@@ -155,20 +155,20 @@ def test_no_key_is_set_anywhere(name: str) -> None:
 
 
 def plain(value: Any) -> Any:
-    """A value of a compose file where no variable is set."""
+    """Return a value of a compose file where no variable is set."""
     if isinstance(value, list):
         return [plain(part) for part in value]
     return VARIABLE.sub(lambda found: found["default"], value) if isinstance(value, str) else value
 
 
 def command_of(service: str) -> list[str]:
-    """The words after `khala` of a service; `khala-agent` is `khala agent` where only the agents are installed."""
+    """Return the words after `khala` of a service; `khala-agent` is `khala agent` with only the agents installed."""
     entrypoint = SERVICES[service].get("entrypoint", "khala").removeprefix("khala").removeprefix("-")
     return shlex.split(f"{entrypoint} {plain(SERVICES[service]['command'])}")
 
 
 def parsed(words: list[str]) -> Mapping[str, Any]:
-    """What the command line makes of `khala <words>`, without doing it."""
+    """Return the command line's reading of `khala <words>`, without running it."""
     command: Any = typer.main.get_command(app)
     name = ""
     while hasattr(command, "commands"):
@@ -195,19 +195,19 @@ def test_a_command_that_cannot_be_given_would_be_found(words: list[str], complai
 
 
 def blocks(page: str) -> Iterator[str]:
-    """The blocks of shell commands on a page."""
+    """Yield the blocks of shell commands on a page."""
     yield from re.findall(r"^```bash\n(.*?)^```$", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
 
 
 def lines(page: str) -> list[list[str]]:
-    """The commands on a page, in blocks and in sentences, as words, without variables in front."""
+    """Return the commands on a page, in blocks and in sentences, as words, without variables in front."""
     commands = [line for block in blocks(page) for line in block.splitlines()]
     commands += re.findall(r"`((?:khala|docker) [^`…]*)`", (ROOT / page).read_text())
     return [shlex.split(re.sub(r"^(\w+=\S+ )+", "", re.sub(r"\$\(.*?\)", "", line))) for line in commands]
 
 
 def khala_words(words: list[str]) -> list[str] | None:
-    """What follows `khala`, also where it runs in a container; None if it does not run here."""
+    """Return the words after `khala`, also where it runs in a container; None if it does not run here."""
     match words:
         case ["khala", *rest]:
             return rest
@@ -223,7 +223,7 @@ def khala_words(words: list[str]) -> list[str] | None:
 
 @pytest.fixture
 def environment(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Sets the environment that a service has."""
+    """Set the environment of a service."""
 
     def be(service: str) -> None:
         for name, value in SERVICES[service].get("environment", {}).items():
@@ -290,7 +290,7 @@ def test_the_documentation_names_files_and_services_that_exist(page: str) -> Non
 
 
 def instructions(name: str) -> list[str]:
-    """The values of an instruction in the Dockerfile, in order."""
+    """Return the values of an instruction in the Dockerfile, in order."""
     text = re.sub(r"\\\n\s*", "", (ROOT / "Dockerfile").read_text())
     return re.findall(rf"^{name} (.*)$", text, re.MULTILINE)
 

@@ -1,6 +1,6 @@
 """The documentation, executed: its Python runs, its commands parse, its files are valid, its links lead somewhere.
 
-The first word behind a fence is the language, the second says what a block is: `python compile` is not run, since it
+The first word after a fence is the language, the second says what a block is: `python compile` is not run, since it
 needs a network; `yaml task`, `yaml model`, `yaml agents` and `yaml actions` are files that are read as such, `yaml
 scenario` is played.
 """
@@ -89,7 +89,7 @@ def blocks(*infos: str) -> list[ParameterSet]:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs in a directory with the files that the pages speak of."""
+    """Run in a directory with the files that the pages name."""
     (tmp_path / "tests").mkdir()
     for name in ("recording.mcap", "golden.mcap", "tests/golden.mcap"):
         shutil.copy(GOLDEN, tmp_path / name)
@@ -98,7 +98,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def scene() -> tuple[Briefing, Observation]:
-    """What an agent was told, and what it saw in the middle of a battle."""
+    """Return an agent's briefing, and its observation in the middle of a battle."""
     golden = Recording.open(GOLDEN)
     observations = itertools.islice(golden.observations("Zealots"), 10, None)
     return next(golden.of(Briefing, agent="Zealots")), next(seen for seen in observations if seen.view.teams[0].enemies)
@@ -129,7 +129,7 @@ def run(block: Block) -> dict[str, Any]:
 
 
 async def check_policy(policy: Policy, scene: tuple[Briefing, Observation]) -> None:
-    """Decides once; what is said must be understood, and be among what the agent may say."""
+    """Decide once; the reply must be understood, with allowed actions only."""
     briefing, observation = scene
     await policy.prepare(briefing)
     text = await policy.decide(Context(briefing, observation))
@@ -141,7 +141,7 @@ async def check_policy(policy: Policy, scene: tuple[Briefing, Observation]) -> N
 
 
 def double(fixture: str) -> Callable[..., Any]:
-    """A fixture of `khala.pytest_plugin` that finds no difference, if it is called as the real one may be."""
+    """Return a fixture of `khala.pytest_plugin` that finds no difference, if it is called as the real one may be."""
     real = inspect.signature(getattr(testing, fixture))
 
     async def find_none(*args: Any, **kwargs: Any) -> list[object]:
@@ -155,7 +155,7 @@ def double(fixture: str) -> Callable[..., Any]:
 
 
 def commands() -> list[tuple[str, str]]:
-    """Every line that a reader may type, and where it is; of a session on the console, what is behind the prompt."""
+    """Return every line that a reader may type, and its place; of a console session, the text after the prompt."""
     found = []
     for block in BLOCKS:
         prompt = {"bash": "", "console": "$ "}.get(block.info)
@@ -169,7 +169,7 @@ def commands() -> list[tuple[str, str]]:
 
 
 def find(words: list[str]) -> tuple[Any, list[str]]:
-    """The command that the first words name, and the words behind them."""
+    """Return the command that the first words name, and the words after them."""
     command: Any = typer.main.get_command(app)
     while hasattr(command, "commands") and words and not words[0].startswith("-"):
         name, *words = words
@@ -178,7 +178,7 @@ def find(words: list[str]) -> tuple[Any, list[str]]:
 
 
 def parse(words: list[str]) -> None:
-    """Has the command line read words, without doing what they say. Raises what it raises."""
+    """Parse words as the command line does, without running them. Raise what it raises."""
     command, words = find(words)
     command.make_context("khala", words)
 
@@ -304,7 +304,7 @@ def test_every_page_can_be_found_from_the_map_of_the_documentation() -> None:
 
 
 def test_the_reference_is_up_to_date() -> None:
-    assert outdated() == [], "`make docs` writes these pages anew"
+    assert outdated() == [], "`make docs` writes these pages again"
 
 
 def test_a_page_that_is_old_missing_or_foreign_is_found(tmp_path: Path) -> None:

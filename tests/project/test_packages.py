@@ -1,4 +1,4 @@
-"""The distributions as a user installs them: each in an environment of its own, from wheels."""
+"""The distributions as a user installs them: each in its own environment, from wheels."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ async def decide(briefing, observation):
 
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel of every distribution."""
+    """Return a directory with a wheel of every distribution."""
     out = tmp_path_factory.mktemp("wheels")
     run(UV, "build", "--quiet", "--all-packages", "--wheel", "--out-dir", out, cwd=ROOT)
     return out
@@ -50,17 +50,17 @@ class Environment:
         return self.root / "bin" / "python"
 
     def names(self) -> set[str]:
-        """What is installed."""
+        """Return the installed distributions."""
         listed = run(UV, "pip", "list", "--quiet", "--format", "json", "--python", self.python)
         return {package["name"].lower() for package in json.loads(listed)}
 
     def run(self, command: str, *arguments: object, cwd: Path, **environ: str) -> str:
-        """What a command of this environment prints."""
+        """Return the output of a command of this environment."""
         return run(self.root / "bin" / command, *arguments, cwd=cwd, **environ)
 
 
 def run(*command: object, cwd: Path | None = None, **environ: str) -> str:
-    """What a command prints, with nothing of this environment around it."""
+    """Return the output of a command, without this environment."""
     inherited = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     done = subprocess.run(
         [*map(str, command)], cwd=cwd, env=inherited | environ, capture_output=True, text=True, check=False

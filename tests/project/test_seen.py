@@ -1,4 +1,4 @@
-"""The page of four observations: its pictures are there, each is shown, and none is left that nobody shows."""
+"""The page of four observations: its pictures are there, each is shown, and no other is left."""
 
 from __future__ import annotations
 

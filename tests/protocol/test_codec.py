@@ -1,4 +1,4 @@
-"""Message ↔ bytes: every message comes back, and what is none is refused with a reason."""
+"""Message ↔ bytes: every message comes back, and other bytes are refused with a reason."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SIMPLE: dict[object, st.SearchStrategy[Any]] = {
 
 
 def values(annotation: Any, *, least: int | None = None) -> st.SearchStrategy[Any]:  # noqa: PLR0911 - one a type
-    """Everything that a field of this annotation may hold."""
+    """Return a strategy for all values of a field of this annotation."""
     arguments = get_args(annotation)
     origin = get_origin(annotation)
     if annotation is int and least is not None:
@@ -84,7 +84,7 @@ def test_every_message_comes_back_as_it_was(model: type[Wire]) -> None:
         assert decode(payload) == message
         assert decode_as(model, payload) == message
         assert encode(decode(payload)) == payload
-        json.loads(payload, parse_constant=pytest.fail)  # no NaN, which JSON has not
+        json.loads(payload, parse_constant=pytest.fail)  # no NaN, which JSON lacks
 
     comes_back()
 
@@ -101,7 +101,7 @@ def test_the_order_of_fields_on_the_wire_is_free() -> None:
 
 
 def test_half_of_a_surrogate_pair_is_replaced_and_offsets_stay() -> None:
-    """`json.loads` of a completion lets them through, UTF-8 has none."""
+    """`json.loads` of a completion accepts them, UTF-8 has none."""
     text = "ab\ud800<Stop()>\udfff"
     reply = Reply(run="r", agent="A", side="p1", episode=0, step=0, text=text)
     arrived = decode_as(Reply, encode(reply))

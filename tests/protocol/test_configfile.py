@@ -1,4 +1,4 @@
-"""What a user reads when a YAML file is wrong."""
+"""The errors that a user reads when a YAML file is wrong."""
 
 from __future__ import annotations
 
@@ -104,11 +104,11 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, text: st
     assert str(caught.value) == f"{path}: {text}"
 
 
-# --- files that are like others -------------------------------------------------------------------------------
+# --- files that extend others ---------------------------------------------------------------------------------
 
 
 def written(directory: Path, **files: str) -> Path:
-    """Writes files, and returns the path of the last one."""
+    """Write files, and return the path of the last one."""
     for name, text in files.items():
         (directory / f"{name}.yaml").write_text(text, encoding="utf-8")
     return directory / f"{name}.yaml"

@@ -1,4 +1,4 @@
-"""The errors: the tree is what its picture shows, and a place is said in front of the sentence."""
+"""The errors: the tree matches its picture, and a place precedes the sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages: what every one of them promises, whatever it says."""
+"""The messages: what every one of them promises, whatever its content."""
 
 from __future__ import annotations
 

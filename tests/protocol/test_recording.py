@@ -1,4 +1,4 @@
-"""A recording: what goes in comes out byte for byte, whatever became of the process that wrote it."""
+"""A recording: what goes in comes out byte for byte, whatever happened to the process that wrote it."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def agent_messages(agent: str, step: int) -> Iterator[Wire]:
 
 
 def samples(steps: int = 3) -> Iterator[tuple[str, bytes]]:
-    """A run of some steps, as (key, payload)."""
+    """Yield a run of some steps, as (key, payload)."""
 
     def keyed(message: Wire, agent: str | None = None) -> tuple[str, bytes]:
         topic = Topic(type(message).model_fields["kind"].default)

@@ -1,4 +1,4 @@
-"""The text language: one row for each rule of tolerance, one for each fault; and what holds for every text."""
+"""The text language: one row for each rule of tolerance, one for each fault; and promises for every text."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Communications:
 
 
 def outline(speech: Speech) -> list[str]:
-    """What a reply says, one line each, in the order of the text; `?` marks mentions, `!` faults."""
+    """Return the content of a reply, one line each, in the order of the text; `?` marks mentions, `!` faults."""
     lines = [(call.start, f"{call.team}: {render(call)}" if call.team else render(call)) for call in speech.calls]
     lines += [(call.start, f"? {render(call)}") for call in speech.mentions]
     lines += [(message.start, f"to {message.recipient}: {message.text}") for message in speech.messages]
@@ -475,7 +475,7 @@ def test_a_fault_repeats_only_the_beginning_of_its_words() -> None:
     assert len(fault.text) == 120
 
 
-# --- what holds for every text ----------------------------------------------------------------------
+# --- promises for every text -------------------------------------------------------------------------
 
 FRAGMENTS = st.sampled_from(
     [

@@ -1,4 +1,4 @@
-"""The address of an endpoint, checked: it is seen in every recording, so nothing secret may stand in it."""
+"""Check the address of an endpoint: every recording shows it, so it must not hold a secret."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from urllib.parse import urlsplit, urlunsplit
 
 
 def checked_address(base_url: str) -> str:
-    """`base_url` without a slash at its end.
+    """Return `base_url` without a trailing slash.
 
     Raises:
-        ValueError: it is no http:// or https:// URL, or holds a user name, a password or a query.
+        ValueError: it is not an http:// or https:// URL, or holds a user name, a password or a query.
     """
     try:
         parts = urlsplit(base_url)

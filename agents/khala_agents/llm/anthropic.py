@@ -32,10 +32,10 @@ class Anthropic:
         model: `claude-…`.
         prices: to price the tokens with.
         key: of the account.
-        base_url: other than Anthropic's own for a gateway.
-        max_tokens: limit of generated tokens; the API wants one.
+        base_url: set it for a gateway; Anthropic's own by default.
+        max_tokens: limit of generated tokens; the API requires one.
         temperature: sent if given.
-        extra: fields of the request body, as they are.
+        extra: fields of the request body, unchanged.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Anthropic:
         self._fixed = {"model": model, **asked}
 
     async def complete(self, request: Request) -> Completion:
-        """Makes one try; see `LLMClient`."""
+        """Make one try; see `LLMClient`."""
         system = "\n\n".join(m.content for m in request.messages if m.role == "system")
         turns = [_turn(message, request.pictures) for message in request.messages if message.role != "system"]
         body = {**self._fixed, "messages": turns}
@@ -73,15 +73,15 @@ class Anthropic:
         return self._read(answer)
 
     async def check(self) -> None:
-        """Asks whether the key is taken; see `LLMClient.check`."""
+        """Check that the endpoint accepts the key; see `LLMClient.check`."""
         await self._http.check()
 
     async def refresh(self) -> None:
-        """Drops old connections and makes a new one."""
+        """Drop old connections and make a new one."""
         await self._http.refresh()
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         await self._http.close()
 
     def _read(self, answer: bytes) -> Completion:
@@ -120,7 +120,7 @@ class _Usage(BaseModel):
     cache_creation_input_tokens: int | None = None
 
     def priced(self, prices: Prices) -> Usage:
-        """The usage in our terms: Anthropic counts what was cached beside `input_tokens`, not in them."""
+        """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""
         cached = self.cache_read_input_tokens or 0
         prompt = self.input_tokens + cached + (self.cache_creation_input_tokens or 0)
         return Usage(

@@ -1,4 +1,4 @@
-"""One request to a language model, and what can come of it: the interface that every client implements.
+"""One request to a language model and its possible outcomes: the interface that every client implements.
 
 A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_agents.llm.limits` holds back, and
 `khala_agents.llm_policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
@@ -8,12 +8,12 @@ A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_age
     │   └── Unauthorized        the user's: the key (401, 403)
     ├── OutOfMoney              the account is empty or its quota used up (402, some 429)
     ├── Unavailable             the provider's, for now (408, 409, 429, 5xx); may say when to come back
-    ├── Unreachable             the link's: refused, reset, torn off in the middle
+    ├── Unreachable             the link's: refused, reset, broken in the middle
     ├── TryTimeout              the time of this one try is over
     ├── MalformedCompletion     the provider's: "200 OK" without a completion in it
     └── limits.LimitExceeded    ours: a limit that this process was given
 
-No text of an error holds a key: what a server said is passed through `khala_agents.secret.scrub`.
+No error text holds a key: texts of a server pass through `khala_agents.secret.scrub`.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Request:
     """One request.
 
     Attributes:
-        messages: the prompt, in order; a system message can stand at the front only.
+        messages: the prompt, in order; only the first message may be a system message.
         timeout_s: time this try may take, from the start of sending to the last byte of the answer.
         origin: the decision it belongs to, if any.
         attempt: number of this try for this decision, from 1.
-        pictures: bytes of the images that the messages name, by their hashes; all of them.
+        pictures: bytes of all images that the messages name, by their hashes.
     """
 
     messages: tuple[ChatMessage, ...]
@@ -63,10 +63,10 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Completion:
-    """What a model answered.
+    """The answer of a model.
 
     Attributes:
-        text: its words, without what it thought.
+        text: its words, without its reasoning.
         usage: tokens and price; `unknown_requests=1` if the endpoint did not say.
         finish: why it stopped, in the endpoint's words: `stop`, `length`, …
     """
@@ -82,7 +82,7 @@ class LLMClient(Protocol):
     Attributes:
         model: its name, as the endpoint calls it.
         endpoint: base URL without credentials or query.
-        params: what else is asked of the model, as recorded.
+        params: other parameters of the request, as recorded.
     """
 
     model: str
@@ -90,15 +90,15 @@ class LLMClient(Protocol):
     params: Mapping[str, Scalar]
 
     async def complete(self, request: Request) -> Completion:
-        """Makes one try.
+        """Make one try.
 
         Raises:
-            LLMError: no completion came; the type says why.
+            LLMError: there is no completion; the type says why.
         """
         ...
 
     async def check(self) -> None:
-        """Finds out, without cost, what can be known to be wrong before the first request.
+        """Find out, without cost, what is wrong before the first request.
 
         Raises:
             Unauthorized: the endpoint refuses the key.
@@ -106,21 +106,21 @@ class LLMClient(Protocol):
         ...
 
     async def refresh(self) -> None:
-        """Drops old connections and makes a new one, between episodes. Raises nothing."""
+        """Drop old connections and make a new one, between episodes. Raise nothing."""
         ...
 
     async def close(self) -> None:
-        """Closes its connections. May be called twice."""
+        """Close the connections. May be called twice."""
         ...
 
 
 class LLMError(KhalaError):
-    """No completion came.
+    """There is no completion.
 
     Attributes:
         status: as in `ModelCall.status`: `http 429`, `timeout`, `connection`, …
         retryable: whether the same request may succeed a little later.
-        may_be_billed: whether an answer may have been generated; False if the endpoint refused to.
+        may_be_billed: whether an answer may have been generated; False if the endpoint refused the request.
     """
 
     retryable: ClassVar[bool] = False
@@ -163,7 +163,7 @@ class EndpointUnavailable(LLMError):
 
 
 class Unreachable(LLMError):
-    """No connection, or one that broke before the answer was complete."""
+    """There is no connection, or it broke before the answer was complete."""
 
     retryable = True
 
@@ -172,7 +172,7 @@ class Unreachable(LLMError):
 
 
 class TryTimeout(LLMError):
-    """The try took longer than it may."""
+    """The try took too long."""
 
     retryable = True
 
@@ -181,7 +181,7 @@ class TryTimeout(LLMError):
 
 
 class MalformedCompletion(LLMError):
-    """The endpoint answered with something that is no completion."""
+    """The endpoint's answer is not a completion."""
 
     retryable = True
 
@@ -190,7 +190,7 @@ class MalformedCompletion(LLMError):
 
 
 def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
-    """Hash of a prompt: of roles, contents and hashes of pictures, with their boundaries."""
+    """Return the hash of a prompt: of roles, contents and hashes of pictures, with their boundaries."""
     digest = hashlib.sha256()
     for message in messages:
         content = message.content.encode("utf-8", "surrogatepass")
@@ -202,12 +202,12 @@ def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
 
 
 def estimated_tokens(messages: Sequence[ChatMessage], vision: Vision | None = None) -> int:
-    """Tokens of a prompt: of texts by the rule of thumb of four characters a token, of pictures by the model's rule."""
+    """Return the tokens of a prompt: texts at about four characters a token, pictures by the model's rule."""
     texts = (text for message in messages for text in (message.content, *(image.title for image in message.images)))
     words = sum(-(-len(text) // 4) for text in texts)
     return words + (estimated_image_tokens(messages, vision) if vision else 0)
 
 
 def estimated_image_tokens(messages: Iterable[ChatMessage], vision: Vision) -> int:
-    """Tokens of the pictures of a prompt."""
+    """Return the tokens of the pictures of a prompt."""
     return sum(vision.image_tokens(image) for message in messages for image in message.images)

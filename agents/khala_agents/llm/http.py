@@ -1,8 +1,8 @@
 """HTTP to one model endpoint: with `khala_agents.llm.transport` below it, the only module that knows httpx.
 
-Each agent has a client, and so connections, of its own: what is cancelled for one disturbs no other. There is no
-limit on connections, `khala_agents.llm.limits` holds requests back; and `refresh` throws the client away between
-episodes, with whatever is left of cancelled calls. HTTP/2 stays off: nothing is won for few long calls.
+Each agent has its own client, and so its own connections: a cancelled call disturbs no other agent. The number of
+connections is not limited, `khala_agents.llm.limits` holds requests back. `refresh` discards the client between
+episodes, with whatever cancelled calls left behind. HTTP/2 stays off: a few long calls gain nothing from it.
 
 Above it are `openai_compatible` and `anthropic`, which know what the bytes mean.
 """
@@ -44,23 +44,23 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_TIMEOUT = httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None)  # a whole try has a limit of its own
+_TIMEOUT = httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None)  # a whole try has its own limit
 _WARM_TIMEOUT_S = 5.0
 _SPENT_CODES = frozenset(
     {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
 )
-"""Codes under which "429 Too Many Requests" means that the money is used up."""
+"""Codes under which "429 Too Many Requests" means that the account has no money left."""
 _LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 class HttpEndpoint:
-    """POSTs JSON to an endpoint over a connection of its own.
+    """POST JSON to an endpoint over its own connection.
 
     Args:
         base_url: `https://host/v1`; paths are appended to it.
         headers: sent with each request.
         key_header: name and prefix of the header that carries the key.
-        key: None sends none.
+        key: None for no key.
     """
 
     def __init__(
@@ -79,10 +79,10 @@ class HttpEndpoint:
         self._client: httpx.AsyncClient | None = None
 
     async def post(self, path: str, body: bytes, timeout_s: float | None) -> bytes:
-        """The body of the answer.
+        """Return the body of the answer.
 
         Raises:
-            LLMError: there was none within `timeout_s` seconds, or its status says that it is none.
+            LLMError: there was no answer within `timeout_s` seconds, or its status is an error.
         """
         try:
             async with asyncio.timeout(timeout_s):
@@ -98,15 +98,15 @@ class HttpEndpoint:
         return response.content
 
     async def refresh(self) -> None:
-        """Throws the connections away and opens a new one, so that the first request of an episode finds it warm."""
+        """Discard the connections and open a new one, so that the first request of an episode finds it warm."""
         await self.close()
         with suppress(LLMError):
             await self.check()
 
     async def check(self) -> None:
-        """Asks for the list of models, which costs nothing, to see whether the key is taken.
+        """Ask for the list of models, which costs nothing, to see whether the key is accepted.
 
-        Only a key that is refused is an error: an endpoint may come up later, or know no such list. (403 is none:
+        Only a refused key is an error: an endpoint may come up later, or have no such list. (403 is no error:
         keys may be restricted to completions.)
 
         Raises:
@@ -119,7 +119,7 @@ class HttpEndpoint:
                 raise error_for(self.address, response.status_code, response.headers, response.content)
 
     async def close(self) -> None:
-        """Closes the connections; the next request opens new ones."""
+        """Close the connections; the next request opens new ones."""
         client, self._client = self._client, None
         if client is not None:
             await client.aclose()
@@ -130,13 +130,13 @@ class HttpEndpoint:
                 headers=self._headers,
                 transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in _LOOPBACK),
                 timeout=_TIMEOUT,
-                trust_env=False,  # what is to be had from the environment, the transport has
+                trust_env=False,  # the transport reads the environment
             )
         return self._client
 
 
 def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes) -> LLMError:
-    """The error that an answer with this status is. What the server says is quoted shortly, without keys."""
+    """Return the error for an answer with this status. The server's text is quoted briefly, without keys."""
     code, message = _said(body)
     name = f"http {status}"
     said = f"{address} answered {name}" + (f": {message}" if message else "")
@@ -150,7 +150,7 @@ def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Seconds that the headers `Retry-After-Ms` or `Retry-After` (seconds, or a date) ask to wait."""
+    """Return the seconds that the headers `Retry-After-Ms` or `Retry-After` (seconds, or a date) ask to wait."""
     with suppress(KeyError, ValueError):
         return max(float(headers["retry-after-ms"]) / 1000, 0.0)
     value = headers.get("retry-after")
@@ -160,7 +160,7 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
         return max(float(value), 0.0)
     try:
         until = parsedate_to_datetime(value)
-        # the server's own clock, if it says what it shows: ours may differ
+        # by the server's own clock if it sends the time: ours may differ
         now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
         return max((until - now).total_seconds(), 0.0)
     except (ValueError, TypeError):
@@ -168,7 +168,7 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 
 
 def _said(body: bytes) -> tuple[str, str]:
-    """Code and message of an error body in the forms that are in use; ("", beginning of the text) otherwise."""
+    """Return code and message of an error body in the known forms; ("", beginning of the text) otherwise."""
     try:
         error = from_json(body)["error"]
     except (ValueError, KeyError, TypeError):
@@ -190,4 +190,4 @@ def _words(error: httpx.TransportError) -> str:
 
 @cache
 def _tls() -> ssl.SSLContext:
-    return httpx.create_ssl_context()  # 28 ms: once a process, not once an agent
+    return httpx.create_ssl_context()  # 28 ms: once per process, not once per agent

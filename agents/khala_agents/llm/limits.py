@@ -4,9 +4,9 @@
         completion = await client.complete(request)
         ticket.settle(completion.usage)
 
-`admit` waits for its turn, first come first served, and raises `LimitExceeded` where waiting is no use: the
-money is used up, or the turn would come after the deadline. It knows no model and no HTTP. A provider's own
-limits are met by `khala_agents.llm.retry`; these keep an experiment below them, and below its budget.
+`admit` waits for its turn, in the order of arrival, and raises `LimitExceeded` where waiting is useless: the
+money is used up, or the turn would come after the deadline. It knows no model and no HTTP. `khala_agents.llm.retry`
+handles a provider's own limits; these keep an experiment below them, and within its budget.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ LimitType = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
 
 
 class LimitRules(Frozen):
-    """Limits for one endpoint, shared by all agents of a process that use it; None is no limit."""
+    """Limits for one endpoint, shared by all agents of a process that use it; None for no limit."""
 
     in_flight: int | None = Field(default=None, ge=1)
     """Requests at the same time."""
     requests_per_minute: float | None = Field(default=None, gt=0)
     tokens_per_minute: float | None = Field(default=None, gt=0)
-    """Prompt and completion together; the prompt's are estimated before, and corrected after."""
+    """Prompt and completion together; the prompt's tokens are estimated before, and corrected after."""
 
 
 class LimitExceeded(LLMError):
-    """A limit of this process stands in the way.
+    """A request would exceed a limit of this process.
 
     Attributes:
-        type: which one.
-        value: what it stands at, with this request.
-        limit: what it may not pass.
+        type: which limit.
+        value: its value with this request.
+        limit: its maximum.
         source: where it was set.
     """
 
@@ -65,19 +65,19 @@ class Budget:
         self.source = source
 
     def check(self) -> None:
-        """Raises `LimitExceeded` if nothing is left."""
+        """Raise `LimitExceeded` if nothing is left."""
         if self.limit_usd is not None and self.spent_usd >= self.limit_usd:
             raise LimitExceeded("budget_usd", value=self.spent_usd, limit=self.limit_usd, source=self.source)
 
     def spend(self, usd: float) -> None:
-        """Notes what a request cost."""
+        """Add the cost of a request."""
         self.spent_usd += usd
 
 
 class Bucket:
-    """So many units a minute, of which a minute's worth may be taken at once after a pause.
+    """So many units a minute; after a pause, a minute's worth may be taken at once.
 
-    Turns are given out in the order of the calls: who comes reserves its units at once, and then waits until
+    Turns follow the order of the calls: each caller reserves its units at once, and then waits until
     they have flowed in.
     """
 
@@ -90,7 +90,7 @@ class Bucket:
         self._source = source
 
     async def take(self, units: float, deadline: float | None) -> None:
-        """Takes `units` as soon as they are there; gives them back if cancelled.
+        """Take `units` as soon as they are there; return them if cancelled.
 
         Raises:
             LimitExceeded: they will not be there before `deadline`.
@@ -109,7 +109,7 @@ class Bucket:
                 raise
 
     def correct(self, units: float) -> None:
-        """Takes `units` more (or gives them back, if negative) without waiting."""
+        """Take `units` more without waiting; negative units are returned."""
         self._level = min(self._level - units, self._capacity)
 
     def _fill(self) -> float:
@@ -125,15 +125,15 @@ class Ticket:
     """The right to make one request.
 
     Attributes:
-        waited_s: how long its turn took to come.
-        usage: what the request took, once settled; None for one that failed or was cancelled.
+        waited_s: how long the request waited for its turn.
+        usage: the usage of the request, once settled; None for one that failed or was cancelled.
     """
 
     waited_s: float
     usage: Usage | None = None
 
     def settle(self, usage: Usage) -> None:
-        """Notes what the request took."""
+        """Note the usage of the request."""
         self.usage = usage
 
 
@@ -157,10 +157,10 @@ class Limits:
 
     @asynccontextmanager
     async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
-        """Waits until one request with a prompt of about `tokens` may be made, and counts it afterwards.
+        """Wait until one request with a prompt of about `tokens` may be made, and count it afterwards.
 
-        A request that is not settled (failed, cancelled) is counted with its prompt: its answer may have been
-        generated and billed, and nobody told us.
+        A request that is not settled (failed, cancelled) counts with its prompt: the provider may have generated and
+        billed an answer without reporting it.
 
         Raises:
             LimitExceeded: it may not be made, or not before `deadline`.
@@ -172,7 +172,7 @@ class Limits:
             await self._in_flight.acquire()
         try:
             await self._take_turn(tokens, deadline)
-            self.budget.check()  # it may have been spent while this one waited
+            self.budget.check()  # it may have been spent during the wait
             ticket = Ticket(waited_s=clock() - arrived)
             try:
                 yield ticket

@@ -1,6 +1,6 @@
-"""OpenAI's chat completions, as spoken by nearly every endpoint there is, Khala's own scripted one among them.
+"""OpenAI's chat completions, as spoken by nearly every endpoint, including Khala's own scripted one.
 
-What differs between the endpoints is a row of `khala_agents.llm.profiles`.
+A row of `khala_agents.llm.profiles` says how an endpoint differs.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class OpenAICompatible:
     """An `LLMClient` for one model at one endpoint.
 
     Args:
-        profile: what is particular about the endpoint.
+        profile: the particulars of the endpoint.
         model: as the endpoint calls it.
         base_url: usually ends in `/v1`.
         prices: to price the tokens with.
-        key: None sends none.
+        key: None for no key.
         max_tokens: limit of generated tokens.
-        temperature, seed: sent if given and if the endpoint takes them.
-        extra: fields of the request body, as they are.
-        detail: how finely the model shall look at pictures.
+        temperature, seed: sent if given and if the endpoint accepts them.
+        extra: fields of the request body, unchanged.
+        detail: how finely the model looks at pictures.
     """
 
     def __init__(
@@ -75,22 +75,22 @@ class OpenAICompatible:
         self._fixed = {"model": model, **fields}
 
     async def complete(self, request: Request) -> Completion:
-        """Makes one try; see `LLMClient`."""
+        """Make one try; see `LLMClient`."""
         messages = [self._message(message, request.pictures) for message in request.messages]
         body = to_json({**self._fixed, "messages": messages})
         answer = await self._http.post(_PATH, body, request.timeout_s)
         return self._read(answer)
 
     async def check(self) -> None:
-        """Asks whether the key is taken; see `LLMClient.check`."""
+        """Check that the endpoint accepts the key; see `LLMClient.check`."""
         await self._http.check()
 
     async def refresh(self) -> None:
-        """Drops old connections and makes a new one."""
+        """Drop old connections and make a new one."""
         await self._http.refresh()
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         await self._http.close()
 
     def _message(self, message: ChatMessage, pictures: Mapping[str, bytes]) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class OpenAICompatible:
 
     def _no_completion(self, answer: bytes) -> LLMError:
         try:
-            fault = _Fault.model_validate_json(answer)  # "200 OK", and the error in the body: OpenRouter does it
+            fault = _Fault.model_validate_json(answer)  # "200 OK" with the error in the body: OpenRouter does it
         except ValidationError:
             begin = scrub(answer[:80].decode("utf-8", "replace"))
             return MalformedCompletion(f"{self.endpoint} answered with no chat completion: {begin!r}")

@@ -1,4 +1,4 @@
-"""What tokens cost. Prices come from model files, for no table of ours would stay true."""
+"""The price of tokens. Prices come from model files, because a table here would soon be out of date."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PER_MILLION = 1e-6
 
 
 class Prices(Frozen):
-    """Prices of one model in US dollars per million tokens; None is not known."""
+    """Prices of one model in US dollars per million tokens; None for an unknown price."""
 
     prompt: float | None = Field(default=None, ge=0)
     completion: float | None = Field(default=None, ge=0)
@@ -23,7 +23,7 @@ class Prices(Frozen):
         return self.prompt is not None and self.completion is not None
 
     def cost_usd(self, *, prompt: int, completion: int, cached: int = 0) -> float | None:
-        """Price of one request; `cached` tokens are a part of `prompt`. None if a price is not known."""
+        """Return the price of one request; `cached` tokens are a part of `prompt`. None if a price is not known."""
         if self.prompt is None or self.completion is None:
             return None
         cached_price = self.prompt if self.cached is None else self.cached

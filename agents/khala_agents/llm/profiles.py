@@ -1,7 +1,7 @@
 """How endpoints that speak OpenAI's chat completions differ from each other: one row each.
 
-A row is what an endpoint of this kind must be sent or asked differently, nothing else: address, model, prices
-and the name of the key stand in a model file. What no row knows is written there under `extra`.
+A row says what an endpoint of this kind must be sent or asked differently, nothing else: a model file has the
+address, model, prices and the name of the key. What no row covers is written there under `extra`.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ ProfileName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What is particular about one kind of endpoint.
+    """The particulars of one kind of endpoint.
 
     Attributes:
         length_field: name of the limit of generated tokens.
         system_role: role under which the system message is sent; `user` where a model has no such role.
-        temperature: whether `temperature` may be sent; a model that thinks refuses it with 400.
+        temperature: whether `temperature` may be sent; a reasoning model refuses it with 400.
         seed: whether `seed` may be sent.
         cached_path: where in `usage` the number of cached prompt tokens stands.
-        reasoning_path: where in `usage` the number of tokens stands that were thought and not said.
-        needs_key: whether it makes no sense without a key.
+        reasoning_path: where in `usage` the number of reasoning tokens stands.
+        needs_key: whether it requires a key.
         image_tokens: how it counts pictures, for models that see.
     """
 

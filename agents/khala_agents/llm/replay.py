@@ -1,7 +1,7 @@
 """Recorded completions in place of a model: the same prompts get the same answers, and the same failures.
 
-A request is looked up by its agent, episode, step and attempt, and its prompt must be the recorded one to the
-letter: what differs is said, for an answer to another question would prove nothing. Nothing is waited for; a
+A request is looked up by its agent, episode, step and attempt, and its prompt must be exactly the recorded one.
+Any difference is reported, because an answer to another question proves nothing. Nothing is waited for: a
 request that was cut off by the deadline fails at once, so that the agent falls back as it did then.
 """
 
@@ -49,11 +49,11 @@ class ReplayClient:
         self.params: Mapping[str, Scalar] = dict(first.params) if first else {}
 
     async def complete(self, request: Request) -> Completion:
-        """The recorded completion, or the recorded failure as an error.
+        """Return the recorded completion, or raise the recorded failure.
 
         Raises:
             NotRecorded: the request is not in the recording.
-            LLMError: it is, and failed.
+            LLMError: the recorded request failed.
         """
         exchange = self._look_up(request)
         if exchange.completion is not None:
@@ -63,13 +63,13 @@ class ReplayClient:
         raise _passing(exchange) if was_repeated else _Final.of(exchange)
 
     async def check(self) -> None:
-        """Finds nothing wrong."""
+        """Find nothing wrong."""
 
     async def refresh(self) -> None:
-        """Does nothing."""
+        """Do nothing."""
 
     async def close(self) -> None:
-        """Does nothing."""
+        """Do nothing."""
 
     def _look_up(self, request: Request) -> ModelCall:
         agent, episode, step, attempt = key = _key(request)
@@ -85,7 +85,7 @@ class ReplayClient:
 
 
 class _Final(LLMError):
-    """A failure that was not tried again then, and so is not now."""
+    """A failure that was not retried in the recording, and so is not retried now."""
 
     @classmethod
     def of(cls, exchange: ModelCall) -> LLMError:
@@ -133,5 +133,5 @@ def _difference(recorded: tuple[ChatMessage, ...], asked: tuple[ChatMessage, ...
 
 
 def _names(message: ChatMessage) -> str:
-    """The pictures of a message."""
+    """Return the names of the pictures of a message."""
     return ", ".join(f"{image.name} {image.sha256[:8]}" for image in message.images) or "no pictures"

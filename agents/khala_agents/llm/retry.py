@@ -1,8 +1,8 @@
-"""When a failed try is repeated: which errors, after what wait, how often, and never past the deadline.
+"""When a failed try is repeated: after which errors, after what wait, how often, and never past the deadline.
 
-The loop is tenacity's; here are the table of statuses, the wait that knows `Retry-After` and the stop that
-knows the deadline. An answer that would come after the deadline is paid for and thrown away, so a wait
-that would end after it is not begun: the error goes up at once and the agent sends its fallback early.
+The loop is tenacity's. Here are the table of statuses, the wait that respects `Retry-After` and the stop that
+respects the deadline. An answer after the deadline would be paid for and discarded, so a wait that would end
+after it is not begun: the error is raised at once and the agent sends its fallback early.
 """
 
 from __future__ import annotations
@@ -23,37 +23,37 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 RETRIED_STATUSES = frozenset({408, 409, 429})
-"""HTTP statuses below 500 that are tried again; all from 500 to 599 are, among them 529 ("overloaded")."""
+"""HTTP statuses below 500 that are retried; all from 500 to 599 are, including 529 ("overloaded")."""
 
 
 class RetryRule(Frozen):
-    """How often and after what time a failed try is repeated.
+    """How often a failed try is repeated, and after what time.
 
-    The wait before try i + 2 is min(base_s · 2^i, cap_s) + jitter, i = 0, 1, …, with jitter even in
+    The wait before try i + 2 is min(base_s · 2^i, cap_s) + jitter, i = 0, 1, …, with jitter uniform in
     [0, jitter_s); it is as long as `Retry-After` says if that is longer. Form and numbers of the paper's client.
     """
 
     tries: int = Field(default=5, ge=1)
-    """Tries in all; 1 repeats nothing."""
+    """Number of tries; 1 repeats nothing."""
     base_s: float = Field(default=1.0, ge=0)
     cap_s: float = Field(default=8.0, ge=0)
     jitter_s: float = Field(default=1.0, ge=0)
 
 
 def is_retried(status: int) -> bool:
-    """Whether a request that was answered with this HTTP status is tried again."""
+    """Return whether a request that was answered with this HTTP status is retried."""
     return status in RETRIED_STATUSES or 500 <= status <= 599
 
 
 async def retried(
     attempt: Callable[[], Awaitable[T]], rule: RetryRule, *, deadline: float | None, rng: random.Random
 ) -> T:
-    """What `attempt` returns, tried again when it raises an `LLMError` that may pass. Raises what the last try raised.
+    """Return the result of `attempt`, retried after an `LLMError` that may pass. Raise the error of the last try.
 
     Args:
         attempt: makes one try.
-        rule: how often, after what time.
-        deadline: on the clock of the running loop; None is no deadline.
+        rule: how often, and after what time.
+        deadline: on the clock of the running loop; None for no deadline.
         rng: source of the jitter.
     """
     now = asyncio.get_running_loop().time
@@ -61,7 +61,7 @@ async def retried(
     def is_late(state: RetryCallState) -> bool:
         return deadline is not None and now() + state.upcoming_sleep >= deadline
 
-    async def once() -> T:  # tenacity awaits what it can see to be a coroutine function, and nothing else
+    async def once() -> T:  # tenacity awaits only what it recognises as a coroutine function
         return await attempt()
 
     attempts = stop_after_attempt(rule.tries)

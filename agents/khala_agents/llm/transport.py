@@ -1,8 +1,8 @@
 """httpx's requests over aiohttp's connections.
 
-httpx's own transport spends most of a call's CPU, and leaves slots of its pool taken by calls that were cancelled
-(httpcore 1.0.9, encode/httpcore#1093). Over this one a call costs half as much when many are made at once:
-`bench/http_client.py` tells. Bodies are read whole: no completion is streamed here.
+httpx's own transport spends most of a call's CPU, and cancelled calls keep slots of its pool
+(httpcore 1.0.9, encode/httpcore#1093). Over this one, a call costs half as much when many are made at once,
+see `bench/http_client.py`. Bodies are read whole: no completion is streamed here.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ _OURS = frozenset({"Accept", "Accept-Encoding", "User-Agent", "Content-Type"})
 
 
 class AiohttpTransport(httpx.AsyncBaseTransport):
-    """Carries the requests of one `httpx.AsyncClient`; may be cancelled at any moment, limits no connections.
+    """Carry the requests of one `httpx.AsyncClient`; may be cancelled at any moment, limits no connections.
 
     Args:
-        tls: whom to trust.
-        proxies: whether to use the proxies that the environment names; none of them could reach our loopback.
+        tls: which certificates to trust.
+        proxies: whether to use the proxies that the environment names; no proxy can reach our loopback.
     """
 
     def __init__(self, tls: ssl.SSLContext, *, proxies: bool) -> None:
@@ -34,10 +34,10 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
         self._session: aiohttp.ClientSession | None = None
 
     async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
-        """The answer, with its body.
+        """Return the answer with its body.
 
         Raises:
-            httpx.TransportError: there is none.
+            httpx.TransportError: there is no answer.
         """
         try:
             async with self._open().request(
@@ -57,7 +57,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
         return httpx.Response(answer.status, headers=answer.raw_headers, content=body, request=request)
 
     async def aclose(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         session, self._session = self._session, None
         if session is not None:
             await session.close()

@@ -1,8 +1,8 @@
-"""What a model sees: whether pictures are sent to it at all, how finely, and about how many tokens one takes.
+"""What a model sees: whether pictures are sent to it, how finely it looks, and about how many tokens one costs.
 
-Providers bill a picture by its size, each by a rule of its own. `TokenRule` holds the rules that are in use; a profile
-has the one of its provider, a model file may say another. The count is an estimate: it keeps shared limits honest and
-stands beside what the provider itself reports.
+Providers bill a picture by its size, each by its own rule. `TokenRule` holds the known rules; a profile names the
+one of its provider, a model file may name another. The count is an estimate: it keeps shared limits honest, and
+is recorded next to what the provider itself reports.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Detail = Literal["auto", "low", "high"]
 
 
 class TokenRule(Frozen):
-    """How many tokens a picture takes.
+    """The number of tokens of a picture.
 
     `area`: its pixels / `pixels`, once its longer side is at most `longest_px` (Anthropic). `tiles`: `base`, and `each`
     for every tile of `pixels` x `pixels`, once it fits into 2048 x 2048 and its shorter side is at most 768 (OpenAI's
@@ -38,7 +38,7 @@ class TokenRule(Frozen):
     """Patches, or tokens of `area`, that a picture is made smaller for; None for any number."""
 
     def tokens(self, width: int, height: int, detail: Detail = "auto") -> int:
-        """Tokens of a picture of this size in pixels."""
+        """Return the tokens of a picture of this size in pixels."""
         match self.kind:
             case "fixed":
                 return self.base
@@ -67,23 +67,23 @@ ANTHROPIC = TokenRule(kind="area", pixels=750, longest_px=1568, most=1600)
 OPENAI = TokenRule(kind="tiles", base=85, each=170, pixels=512)
 OPENAI_REASONING = TokenRule(kind="tiles", base=75, each=150, pixels=512)
 QWEN = TokenRule(kind="patches", pixels=28, most=16384)
-"""Many open models that see are Qwen's or cut pictures as Qwen's do."""
+"""Many open vision models are Qwen's, or cut pictures as Qwen's do."""
 
 
 class Vision(Frozen):
-    """What a model file says of a model that sees."""
+    """The vision settings of a model file, for a model that sees."""
 
     detail: Detail = "auto"
-    """How finely the model looks, where the provider lets one choose (OpenAI)."""
+    """How finely the model looks, where the provider offers a choice (OpenAI)."""
     tokens: TokenRule | None = None
     """How pictures are counted; None for the rule of the profile."""
     max_images: int = Field(default=20, ge=1)
-    """Pictures in one request; more are left out, the last ones first."""
+    """Pictures in one request; of more, the last ones are left out."""
 
     def counted_by(self, rule: TokenRule) -> Vision:
-        """The same with a rule, if it has none."""
+        """Return the same settings with this rule, if they have none."""
         return self if self.tokens else self.model_copy(update={"tokens": rule})
 
     def image_tokens(self, image: ImageRef) -> int:
-        """About how many tokens a picture takes."""
+        """Return about how many tokens a picture costs."""
         return self.tokens.tokens(image.width, image.height, self.detail) if self.tokens else 0

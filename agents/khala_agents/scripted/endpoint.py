@@ -5,9 +5,9 @@
     GET  /v1/models              their names
     GET  /health                 {"status": "ok"}
 
-It stands in for a model wherever none is wanted: in the demo, in tests and benchmarks, in a compose file. It is
-no stand-in for a model's wit. Answers come after a fixed latency, faults on request (`khala_agents.scripted.faults`).
-Tokens are counted by `count_tokens`, so that usage and prices have something to work on.
+It replaces a model where none is wanted: in the demo, in tests and benchmarks, in a compose file. It does not
+play as well as a model. Answers come after a fixed latency, faults on request (`khala_agents.scripted.faults`).
+Tokens are counted by `count_tokens`, so that usage and prices are not empty.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MAX_BODY_BYTES = 32 * 2**20
 DRIPS = 10
 CHARACTERS_PER_TOKEN = 4
 TOKENS_PER_IMAGE = 85
-"""Whatever its size."""
+"""Tokens of a picture, whatever its size."""
 
 
 class EndpointError(KhalaError):
@@ -55,8 +55,8 @@ class Behaviour:
         latency_s: time between a request and its answer; a fault takes as long.
         faults: which requests go wrong.
         retry_after_s: sent with 429 and 503.
-        drip_s: time between two drops of an answer that drips.
-        seed: for players that roll dice.
+        drip_s: time between two pieces of an answer that drips.
+        seed: for players that choose at random.
     """
 
     latency_s: float = 0.0
@@ -70,8 +70,8 @@ class Endpoint:
     """The running server. An asynchronous context manager.
 
     Attributes:
-        base_url: to be used by clients, ends in `/v1`.
-        requests: chat completions that were asked for.
+        base_url: for clients, ends in `/v1`.
+        requests: number of chat completions that were requested.
     """
 
     def __init__(self, behaviour: Behaviour | None = None, *, host: str = "127.0.0.1", port: int = 0) -> None:
@@ -151,7 +151,7 @@ class Endpoint:
 
 
 def count_tokens(text: str) -> int:
-    """Tokens of a text by this endpoint's rule: a token for every four characters begun."""
+    """Return the tokens of a text by this endpoint's rule: a token for every four characters begun."""
     return -(-len(text) // CHARACTERS_PER_TOKEN)
 
 
@@ -185,7 +185,7 @@ class _Said(BaseModel):
 
     @property
     def images(self) -> int:
-        """Pictures in it; the players see none of them."""
+        """Number of pictures in it; the players see none of them."""
         return 0 if isinstance(self.content, str) else sum(part.type == "image_url" for part in self.content)
 
 
@@ -226,13 +226,13 @@ def _refusal(status: int, message: str, code: str, headers: Mapping[str, str] | 
 
 
 def _reset(request: web.Request) -> web.Response:
-    """Ends the connection with a RST: a close with nothing lingering."""
+    """Reset the connection with a RST: close it with nothing lingering."""
     transport = request.transport
     if transport is not None:
         peer: socket.socket = transport.get_extra_info("socket")
         peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         transport.abort()
-    return web.Response()  # nobody is there to read it
+    return web.Response()  # the client is gone
 
 
 async def _send_half(request: web.Request, body: bytes) -> web.StreamResponse:

@@ -1,16 +1,16 @@
 """Faults that the scripted endpoint has on request, each for a given part of the requests.
 
     429=0.1      "too many requests", with `Retry-After`; any status from 400 to 599 works the same way
-    quota=0.1    429 as a provider says it when the money is used up
-    garbage=0.1  "200 OK", and a body that is no JSON
-    nonsense=0.1 a completion whose text is no reply
+    quota=0.1    429 as a provider sends it when the money is used up
+    garbage=0.1  "200 OK", and a body that is not JSON
+    nonsense=0.1 a completion whose text is not a reply
     half=0.1     half of the body, then the connection is closed
     reset=0.1    the connection is reset before a byte of the answer
-    drip=0.1     a byte of the body every now and then
+    drip=0.1     the body, one byte every now and then
     stall=0.1    no answer at all
 
-The choice depends on the seed, on the prompt and on how often it was sent: a repeated request may fare
-better, a repeated run fares the same.
+The choice depends on the seed, on the prompt and on how often it was sent: a repeated request may succeed,
+a repeated run goes the same way.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _MAX_COUNTED = 100_000
 
 
 class Faults:
-    """Which request meets which fault.
+    """Which request gets which fault.
 
     Args:
-        rates: part of the requests, 0 to 1, by the name of the fault; the rest is answered.
-        seed: changes which requests are hit, not how many.
+        rates: part of the requests, 0 to 1, by the name of the fault; the other requests are answered.
+        seed: changes which requests get a fault, not how many.
     """
 
     def __init__(self, rates: Mapping[str, float] | None = None, *, seed: int = 0) -> None:
@@ -42,7 +42,7 @@ class Faults:
         self._sent: Counter[str] = Counter()
 
     def pick(self, prompt: str) -> str | None:
-        """The fault of this request, None for none."""
+        """Return the fault of this request, or None."""
         if not self._rates:
             return None
         if len(self._sent) > _MAX_COUNTED:
@@ -57,10 +57,10 @@ class Faults:
 
 
 def parse_faults(options: Iterable[str]) -> dict[str, float]:
-    """Rates from options such as `429=0.1`.
+    """Return the rates from options such as `429=0.1`.
 
     Raises:
-        ConfigError: one of them is no fault with a rate, or all together are more than 1.
+        ConfigError: one of them is not a fault with a rate, or their sum is more than 1.
     """
     rates: dict[str, float] = {}
     for option in options:

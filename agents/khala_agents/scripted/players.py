@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 PlayerName = Literal["silent", "random-legal", "focus-fire", "skilled"]
 
 REACH = 4.0
-"""World units: an enemy is in reach if it is at most so much farther than the team's nearest one."""
+"""World units: an enemy is in reach if it is at most this much farther than the team's nearest one."""
 SCREEN_CENTRE = (12.0, 12.0)
 MAP_CENTRE = (32.0, 32.0)
 MESSAGE_SHARE = 0.25
-"""Part of the replies in which a player that has somebody to write to does so."""
+"""Part of the replies in which a player with a contact writes a message."""
 
 
 def silent(observation: str, rng: random.Random) -> str:
-    """Analyses, and orders nothing."""
+    """Analyse, and order nothing."""
     del rng
     teams = read(observation).teams
     enemies = {unit.tag for team in teams.values() for unit in team.enemies}
@@ -36,7 +36,7 @@ def silent(observation: str, rng: random.Random) -> str:
 
 
 def random_legal(observation: str, rng: random.Random) -> str:
-    """Gives each team one valid action with arguments that it may have."""
+    """Order one valid action with valid arguments for each team."""
     situation = read(observation)
     orders = {}
     for team in situation.teams.values():
@@ -48,7 +48,7 @@ def random_legal(observation: str, rng: random.Random) -> str:
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
-    """All teams fire on the weakest enemy in reach, the same for all that reach it; who sees none closes up."""
+    """Fire with all teams on the weakest enemy in reach, one target for all that reach it; the others advance."""
     situation = read(observation)
     teams = list(situation.teams.values())
     target = _common_target(teams)
@@ -70,11 +70,11 @@ PLAYERS: dict[PlayerName, Callable[[str, random.Random], str]] = {
 }
 
 
-# --- whom to shoot ----------------------------------------------------------------------------------
+# --- targets ----------------------------------------------------------------------------------------
 
 
 def in_reach(team: TextTeam) -> list[TextUnit]:
-    """The enemies that are about as near as the nearest one."""
+    """Return the enemies that are about as near as the nearest one."""
     if not team.enemies:
         return []
     nearest = min(unit.distance for unit in team.enemies)
@@ -82,7 +82,7 @@ def in_reach(team: TextTeam) -> list[TextUnit]:
 
 
 def _common_target(teams: Iterable[TextTeam]) -> TextUnit | None:
-    """The enemy that most teams reach; of those the weakest, then the nearest."""
+    """Return the enemy that most teams reach; of several the weakest, then the nearest."""
     seen = [unit for team in teams for unit in in_reach(team)]
     reached_by = Counter(unit.tag for unit in seen)
     return min(seen, key=lambda unit: (-reached_by[unit.tag], *_weakness(unit)), default=None)
@@ -106,7 +106,7 @@ def _fight(team: TextTeam, target: TextUnit | None) -> list[str]:
 
 
 def _middle(team: TextTeam) -> tuple[float, float]:
-    """Where the allies of a team are, on its screen."""
+    """Return the middle of a team's allies on its screen."""
     x = sum(unit.x for unit in team.allies) / len(team.allies)
     y = sum(unit.y for unit in team.allies) / len(team.allies)
     return inside((x, y), team)
@@ -116,11 +116,11 @@ def _middle(team: TextTeam) -> tuple[float, float]:
 
 
 def _pools(action: TextAction, team: TextTeam) -> list[list[TextUnit]]:
-    """For each tag that an action takes, the units that it may be."""
+    """Return, for each tag that an action takes, the possible units."""
     hostile = any(word in action.name for word in ("Attack", "Storm", "Feedback", "Beam", "Stasis"))
     targets = team.enemies if hostile else team.allies or team.own
     count = action.args.count("tag")
-    if action.name.startswith("Select_Unit_"):  # the first says who acts
+    if action.name.startswith("Select_Unit_"):  # its first argument names the unit that acts
         return [team.own, targets][:count]
     return [targets] * count
 

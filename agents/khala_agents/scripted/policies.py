@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Fixed(Policy):
-    """Gives the same reply to every observation."""
+    """Give the same reply to every observation."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -23,7 +23,7 @@ class Fixed(Policy):
 
 
 class Silent(Fixed):
-    """Answers, and orders nothing."""
+    """Answer, and order nothing."""
 
     def __init__(self) -> None:
         super().__init__("Analysis: I watch.\nActions:\n")

@@ -1,9 +1,9 @@
-"""The text of an observation → what a scripted player needs of it. It sees what a model sees, and no more.
+"""The text of an observation → what a scripted player needs of it. A player sees exactly what a model sees.
 
 The layout is that of the host's observation text: sections at the margin, a block `Team <name>` with the units
-that the team sees, and `Valid actions` with a line a team. Units are fields between bars, each of them told by its
-first word. A line, a field or a section that is none of these is passed over, so that the text may say more without
-this module knowing.
+that the team sees, and `Valid actions` with a line per team. Units are fields between bars, each recognised by its
+first word. Unknown lines, fields and sections are skipped, so that the text may say more without a change of
+this module.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ _FIRST = re.compile(_NUMBER, re.ASCII)
 
 Point = tuple[float, float]
 POWERFUL = frozenset({"Pylon", "WarpPrismPhasing"})
-"""Types that give power."""
+"""Types that provide power."""
 
 
 class TextUnit(NamedTuple):
-    """A unit on a team's screen, as its line tells."""
+    """A unit on a team's screen, as its line describes it."""
 
     tag: str
     type: str
@@ -74,14 +74,14 @@ class TextUnit(NamedTuple):
     hit_points: float
     """Health and shield together."""
     full: float
-    """Health and shield together of one that is unhurt; 0 if not given."""
+    """Health and shield together of the undamaged unit; 0 if not given."""
     distance: float
-    """The host's, from the middle of the team; infinite if not given."""
+    """Distance as the host gives it, from the middle of the team; infinite if not given."""
     energy: float = 0.0
     weapon_s: float = 0.0
-    """Time until the weapon can be used again; 0 if it can, or if not given."""
+    """Time until the weapon is ready; 0 if it is, or if not given."""
     order: str = ""
-    """First word of what it does; "" for nothing."""
+    """First word of its current order; "" for none."""
     cloaked: bool = False
     hallucination: bool = False
     effects: tuple[str, ...] = ()
@@ -92,12 +92,12 @@ class TextUnit(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Hit points that are left, of all: 0 to 1."""
+        """Remaining part of its hit points: 0 to 1."""
         return self.hit_points / self.full if self.full else 1.0
 
 
 class Price(NamedTuple):
-    """What an action costs, and how often that can be paid now."""
+    """The cost of an action, and how often it can be paid now."""
 
     minerals: int = 0
     vespene: int = 0
@@ -114,7 +114,7 @@ class TextAction(NamedTuple):
 
 @dataclass(slots=True)
 class TextTeam:
-    """A team, as its block and its line of valid actions tell."""
+    """A team, as its block and its line of valid actions describe it."""
 
     name: str
     own: list[TextUnit] = field(default_factory=list)
@@ -128,11 +128,11 @@ class TextTeam:
     resources: list[Point] = field(default_factory=list)
     """Where minerals and geysers are on the screen."""
     minimap: Point | None = None
-    """Where it is; None for a team without units."""
+    """Its place; None for a team without units."""
     task: str = ""
 
     def can(self, name: str) -> bool:
-        """Whether an action of this name is valid now."""
+        """Return whether an action of this name is valid now."""
         return any(action.name == name for action in self.actions)
 
 
@@ -145,7 +145,7 @@ class Situation:
     correspondents: list[str] = field(default_factory=list)
     time_s: float = 0.0
     minerals: int = 0
-    """What is not promised to workers who are on their way to build."""
+    """Resources that are not reserved for workers on their way to build."""
     vespene: int = 0
     supply_used: float = 0.0
     supply_cap: float = 0.0
@@ -155,35 +155,35 @@ class Situation:
     begun: dict[str, int] = field(default_factory=dict)
     """Structures under construction, by type."""
     producing: dict[str, int] = field(default_factory=dict)
-    """How often something is being made or waits for it, by the name of its action."""
+    """How many are being made or queued, by the name of the action."""
     impossible: set[str] = field(default_factory=set)
-    """Names of actions that somebody here has, but not now."""
+    """Names of actions that some unit here has, but cannot use now."""
     sites: list[tuple[str, str]] = field(default_factory=list)
     """Type and tag of the resources by which a base or a gas structure may be built."""
     fields: list[Point] = field(default_factory=list)
     """Where fields of power are on the screen."""
     prices: dict[str, Price] = field(default_factory=dict)
-    """By the name of the action; only of what can be paid now."""
+    """By the name of the action; only actions that can be paid now."""
     power: list[tuple[str, str, Point]] = field(default_factory=list)
-    """Type, tag and place of what gives power, and has room for a unit."""
+    """Type, tag and place of each power source with room for a unit."""
     known: list[tuple[str, Point]] = field(default_factory=list)
-    """Types of enemies and where on the minimap one of them is."""
+    """Types of enemies, and where on the minimap one of each type is."""
     friends: list[Point] = field(default_factory=list)
     """Where on the minimap the teams of other agents are."""
     alarm: bool = False
     """Whether own units are under attack."""
     rejected: list[str] = field(default_factory=list)
-    """What became of calls that were refused, word for word."""
+    """The refusals of the last calls, word for word."""
     task: str = ""
-    """What all have to do, and what this agent has."""
+    """The task of all agents, and that of this agent."""
     messages: list[tuple[str, str]] = field(default_factory=list)
     """Sender and text."""
     accepted: list[tuple[str, str, str]] = field(default_factory=list)
-    """Team, action and arguments of what was carried out of the last reply."""
+    """Team, action and arguments of the calls of the last reply that were carried out."""
 
 
 def read(text: str) -> Situation:
-    """Reads an observation; an unknown text gives an empty situation."""
+    """Read an observation; an unknown text gives an empty situation."""
     situation = Situation()
     for section in _SECTION.split(text):
         title, _, body = section.partition("\n")
@@ -196,7 +196,7 @@ def read(text: str) -> Situation:
 
 
 def points(text: str) -> list[Point]:
-    """Every point that a text names, `[52, 32]`, in its order."""
+    """Return every point that a text names, `[52, 32]`, in its order."""
     return [(float(x), float(y)) for x, y in _AT.findall(text)]
 
 
@@ -259,7 +259,7 @@ def _read_team(team: TextTeam, body: str) -> None:
 
 @functools.lru_cache(4096)
 def _unit(line: str) -> TextUnit | None:
-    """A unit of its line; None for a line that is no unit with a tag, a place and health."""
+    """Return the unit of a line; None for a line that is not a unit with a tag, a place and health."""
     name, *parts = line.split(" | ")
     fields: dict[str, str] = {}
     for part in parts:
@@ -289,7 +289,7 @@ def _unit(line: str) -> TextUnit | None:
 
 
 def _first(text: str, otherwise: float = 0.0) -> float:
-    """The first number in a text."""
+    """Return the first number in a text."""
     found = _FIRST.search(text)
     return float(found[1]) if found else otherwise
 
@@ -327,7 +327,7 @@ def _read_answer(situation: Situation, body: str) -> None:
 
 
 def _read_lines(situation: Situation, body: str) -> None:
-    """What is told by its line, whatever the section."""
+    """Read the lines that are recognised by themselves, whatever their section."""
     if found := _WRITE_TO.search(body):
         situation.correspondents = _NAME.findall(found[1])
     situation.messages += _MESSAGE.findall(body)

@@ -14,23 +14,23 @@ MARGIN = 0.5
 
 
 def call(name: str, *values: str | Point) -> str:
-    """An action with its arguments, `<Attack_Unit(0x1)>`."""
+    """Return an action with its arguments, `<Attack_Unit(0x1)>`."""
     return f"<{name}({', '.join(value if isinstance(value, str) else point(value) for value in values)})>"
 
 
 def point(at: Point) -> str:
-    """A point, `[12.0, 9.5]`."""
+    """Return a point, `[12.0, 9.5]`."""
     return f"[{at[0]:.1f}, {at[1]:.1f}]"
 
 
 def inside(at: Point, team: TextTeam) -> Point:
-    """The point of a team's screen that is nearest to another one, and on the map."""
+    """Return the point of a team's screen that is nearest to another one, and on the map."""
     x0, x1, y0, y1 = team.bounds
     return min(max(at[0], x0 + MARGIN), x1 - MARGIN), min(max(at[1], y0 + MARGIN), y1 - MARGIN)
 
 
 def reply(analysis: str, orders: Mapping[str, Iterable[str]], messages: Iterable[tuple[str, str]] = ()) -> str:
-    """A whole reply.
+    """Return a whole reply.
 
     Args:
         analysis: one line.

@@ -1,7 +1,7 @@
-"""Keeps a first word from being lost: a publisher of Zenoh is silent until it has heard of a subscriber.
+"""Keep the first sample from being lost: a publisher of Zenoh sends nothing until it knows of a subscriber.
 
-News of a subscriber takes a moment (0.2 to 0.8 ms were measured) from the router to a publisher; what is put meanwhile
-goes nowhere, up to 60 of 60 times. A publisher that knows of nobody waits that long, once.
+News of a subscriber takes a moment (0.2 to 0.8 ms were measured) from the router to a publisher; samples put meanwhile
+are lost, up to 60 of 60 times. A publisher that knows of no subscriber waits that long, once.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ WAIT_S = 0.02
 
 
 class Audience:
-    """Whether anybody is known to listen to one publisher; everything here runs on the loop."""
+    """Whether a subscriber of one publisher is known; everything here runs on the loop."""
 
     def __init__(self, *, present: bool = False) -> None:
         self._present = asyncio.Event()
@@ -20,7 +20,7 @@ class Audience:
         self.see(present=present)
 
     def see(self, *, present: bool) -> None:
-        """Somebody listens now, or nobody any more."""
+        """Note that there is a subscriber now, or none any more."""
         if present:
             self._present.set()
         else:
@@ -28,7 +28,7 @@ class Audience:
         self._waited = False
 
     async def wait(self) -> None:
-        """Returns when somebody listens; at once if nobody came the last time."""
+        """Return when there is a subscriber; at once if none came the last time."""
         if self._present.is_set() or self._waited:
             return
         try:

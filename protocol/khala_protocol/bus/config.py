@@ -1,7 +1,7 @@
-"""How to reach the bus: typed, checked before anything is opened, and free of Zenoh.
+"""The settings of the bus: typed, checked before anything is opened, and free of Zenoh.
 
 `settings` turns a `BusConfig` into the paths and values of Zenoh's own configuration; `khala_protocol.bus.zenoh` is the
-only reader. The numbers that are not Zenoh's defaults have their reason beside them.
+only reader. Each number that differs from Zenoh's default has its reason next to it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TX_SLOTS = 16
 """Batches that may wait for the link, per priority; Zenoh's largest. With its default of 2, bursts of 300 kB on a
 100 Mbit link lost 2 of 96, with 16 none."""
 BATCH_BYTES = 65_535
-"""What travels in one piece; Zenoh's largest, and its default."""
+"""Size of a batch; Zenoh's largest, and its default."""
 WAIT_BEFORE_DROP_S = 0.02
 """How long a put of one batch waits for a slot before it is dropped. With Zenoh's 1 ms, bursts of 128 samples of 20 kB
 were dropped on a busy machine, and came 0.3 s later; a batch takes 5 ms on a link of 100 Mbit."""
@@ -31,7 +31,7 @@ _HOST_PORT = re.compile(r"(?P<host>\[[^\]]+\]|[^:\[\]]+):(?P<port>\d{1,5})")
 
 
 class TlsFiles(BaseModel):
-    """Who we are and whom we trust; each file in PEM."""
+    """Our identity, and the authority that we trust; each file in PEM."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
@@ -46,7 +46,7 @@ class TlsFiles(BaseModel):
 
 
 class BusConfig(BaseModel):
-    """What `khala_protocol.bus.zenoh.open_bus` needs to know.
+    """The configuration of `khala_protocol.bus.zenoh.open_bus`.
 
     The default is a client of a router on this machine.
     """
@@ -59,21 +59,21 @@ class BusConfig(BaseModel):
     """Endpoints to connect to, such as `tcp/10.0.0.1:7447`, `tls/router.example:7447`, `unixsock-stream//run/bus.sock`;
     a client takes the first that answers. Empty for a client means the default endpoint on this machine."""
     listen: tuple[str, ...] = ()
-    """Endpoints to listen on. Port 0 takes a free one, see `ZenohBus.endpoints`. Empty for a router means the default
+    """Endpoints to listen on. Port 0 means a free port, see `ZenohBus.endpoints`. Empty for a router means the default
     endpoint on this machine."""
     insecure: bool = False
-    """Allows to listen without TLS where other machines can connect."""
+    """Allow listening without TLS where other machines can connect."""
     tls: TlsFiles | None = None
     connect_timeout_s: float = Field(default=5.0, gt=0)
-    """How long a client tries to reach its router before it gives up; the router may come up meanwhile."""
+    """How long a client tries to reach its router before it gives up; the router may start meanwhile."""
     lease_s: float = Field(default=2.5, gt=0)
-    """A peer that is silent for so long is gone. Longer where processes are stopped or swapped for seconds."""
+    """A peer that is silent for this long is gone. Use more where processes are stopped or swapped for seconds."""
     send_buffer_bytes: int | None = Field(default=None, gt=0)
     """Size of the kernel's send buffer. On links of 100 Mbit or less 65536 lets small messages overtake large ones:
     13 ms instead of 100 ms beside a flood of 300 kB samples."""
     shared_memory: bool = False
-    """Large samples between processes of one machine through /dev/shm. It leaves files behind after a kill, and
-    crosses network namespaces; worth it for images only."""
+    """Send large samples between processes of one machine through /dev/shm. It leaves files behind after a kill, and
+    crosses network namespaces; useful for images only."""
     zenoh: dict[str, Any] = Field(default_factory=dict, repr=False)
     """Anything else, as paths and values of Zenoh's configuration: `{"transport/link/tx/batch_size": 8192}`. They are
     set last, and never printed, as they may hold passwords."""
@@ -94,10 +94,10 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 def check(config: BusConfig) -> None:
-    """Finds what is wrong before a socket is opened.
+    """Find what is wrong before a socket is opened.
 
     Raises:
-        BusError: an endpoint is malformed, would let strangers in, or lacks its TLS files.
+        BusError: an endpoint is malformed, would admit strangers, or lacks its TLS files.
     """
     for endpoint in (*config.connect_to, *config.listen_on):
         _check_endpoint(endpoint, listening=endpoint in config.listen_on)
@@ -114,7 +114,7 @@ def check(config: BusConfig) -> None:
 
 
 def settings(config: BusConfig) -> dict[str, Any]:
-    """The same configuration in Zenoh's words: paths and JSON values, in the order in which to set them."""
+    """Return the same configuration for Zenoh: paths and JSON values, in the order in which to set them."""
     client = config.mode == "client"
     queue = "transport/link/tx/queue"
     values: dict[str, Any] = {
@@ -149,23 +149,23 @@ def settings(config: BusConfig) -> dict[str, Any]:
 
 
 def transport_of(endpoint: str) -> str:
-    """`tcp` of `tcp/127.0.0.1:7447`."""
+    """Return `tcp` of `tcp/127.0.0.1:7447`."""
     return endpoint.partition("/")[0]
 
 
 def address_of(endpoint: str) -> str:
-    """`127.0.0.1:7447` of `tcp/127.0.0.1:7447`, a path of a unix socket; without metadata and configuration."""
+    """Return `127.0.0.1:7447` of `tcp/127.0.0.1:7447`, a path of a unix socket; without metadata and configuration."""
     return re.split(r"[?#]", endpoint.partition("/")[2])[0]
 
 
 def host_port_of(endpoint: str) -> tuple[str, int]:
-    """Host, without brackets, and port of an endpoint that `check` accepts and that is no unix socket."""
+    """Return host, without brackets, and port of an endpoint that `check` accepts and that is no unix socket."""
     host, _, port = address_of(endpoint).rpartition(":")
     return host.strip("[]"), int(port)
 
 
 def is_local(endpoint: str) -> bool:
-    """Whether only this machine can reach the endpoint."""
+    """Return whether only this machine can reach the endpoint."""
     if transport_of(endpoint) == "unixsock-stream":
         return True
     host, _ = host_port_of(endpoint)

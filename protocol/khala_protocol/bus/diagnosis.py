@@ -1,7 +1,7 @@
-"""Says in one sentence why a session could not be opened, and what to do.
+"""Explain in one sentence why a session could not be opened, and what to do.
 
-Zenoh reports a wrong host, a refused connection and a refused certificate alike, as a timeout; a plain connection
-attempt of our own tells them apart.
+Zenoh reports a wrong host, a refused connection and a refused certificate all as a timeout; a plain connection
+attempt of our own distinguishes them.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _SOURCE_PLACE = re.compile(r"\s+at /\S+\.rs:\d+\.?")
 
 
 async def why_not_connected(config: BusConfig) -> str:
-    """The sentence for a client that found no router."""
+    """Return the sentence for a client that found no router."""
     reasons = [f"{endpoint} ({await _attempt(endpoint)})" for endpoint in config.connect_to]
     return (
         f"no router answered within {config.connect_timeout_s:g} s at {', '.join(reasons)}: "
@@ -47,14 +47,14 @@ async def why_not_connected(config: BusConfig) -> str:
 
 
 def why_not_listening(config: BusConfig, said: str) -> str:
-    """The sentence for a session that cannot listen, from what Zenoh said."""
+    """Return the sentence for a session that cannot listen, from Zenoh's error."""
     endpoint = next((e for e in config.listen_on if address_of(e) in said), ", ".join(config.listen_on))
     advice = next((advice for needle, advice in _LISTEN_ADVICE if needle in said), plain(said))
     return f"cannot listen on {endpoint}: {advice}"
 
 
 def plain(said: str) -> str:
-    """An error text of Zenoh without the places in its source and the names of its types."""
+    """Return an error text of Zenoh without its source places and type names."""
     said = _SOURCE_PLACE.sub("", said).strip()
     inner = _INNER_MESSAGE.search(said)
     return inner[1] if inner else said
@@ -73,7 +73,7 @@ async def _attempt(endpoint: str) -> str:
 
 async def _connect(endpoint: str) -> None:
     if transport_of(endpoint) == "quic":
-        raise TimeoutError  # over UDP, nothing can be told from an attempt
+        raise TimeoutError  # over UDP, an attempt shows nothing
     if transport_of(endpoint) == "unixsock-stream":
         _, writer = await asyncio.open_unix_connection(address_of(endpoint))
     else:

@@ -1,8 +1,8 @@
-"""A bounded mailbox: what arrives on any thread waits here until the loop takes it, or the oldest is dropped.
+"""A bounded mailbox: items from any thread wait here until the loop takes them, or the oldest is dropped.
 
-Both buses hand out mailboxes as their subscriptions. Memory is bounded by `depth` alone: an unbounded
+Both buses use mailboxes as their subscriptions. Only `depth` bounds the memory: an unbounded
 `call_soon_threadsafe` per sample held 407 MB after 2000 samples of 200 kB to a busy loop. A burst to any number of
-mailboxes wakes the loop once: with 64 agents in a process, that is a quarter of what a round costs it.
+mailboxes wakes the loop once: with 64 agents in a process, that takes a quarter of the time of a round.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 class Doorbell:
-    """Wakes the loop that it was made on, for any number of mailboxes."""
+    """Wake the loop that it was made on, for any number of mailboxes."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -27,14 +27,14 @@ class Doorbell:
         self._ringing = False
 
     def ring(self, call: Callable[[], None]) -> None:
-        """Has `call` called on the loop soon. From any thread; never blocks and never raises."""
+        """Have `call` called on the loop soon. From any thread; never block and never raise."""
         self._calls.append(call)
         if self._ringing:  # `_answer` has not begun yet, and will find it
             return
         self._ringing = True
         try:
             self._loop.call_soon_threadsafe(self._answer)
-        except RuntimeError:  # the loop is closed: nobody will read this any more
+        except RuntimeError:  # the loop is closed: nothing will read this any more
             self._calls.clear()
 
     def _answer(self) -> None:
@@ -44,12 +44,12 @@ class Doorbell:
 
 
 class Inbox(Generic[T]):
-    """A `khala_protocol.bus.Subscription` of what `offer` or `offer_from_thread` are given.
+    """A `khala_protocol.bus.Subscription` of the items given to `offer` or `offer_from_thread`.
 
-    Made on the loop that iterates over it. What arrived before `close` is still handed out after it.
+    Made on the loop that iterates over it. Items that arrived before `close` are still delivered after it.
 
     Attributes:
-        dropped: items thrown away because `depth` of them were waiting already.
+        dropped: items discarded because `depth` of them were waiting already.
         missed: samples that never arrived, as far as the owner of the mailbox knows.
     """
 
@@ -62,20 +62,20 @@ class Inbox(Generic[T]):
         self.missed = 0
         self._on_close = on_close
         self._doorbell = doorbell or Doorbell()
-        self._lock = threading.Lock()  # guards what follows; never held across a call of somebody else's code
+        self._lock = threading.Lock()  # guards what follows; never held across a call of foreign code
         self._items: deque[T] = deque(maxlen=depth)
         self._waking = False
         self._closed = False
         self._arrived = asyncio.Event()
 
     def offer(self, item: T) -> None:
-        """Puts an item in, on the loop's own thread."""
+        """Put an item in, on the loop's own thread."""
         with self._lock:
             self._append(item)
         self._arrived.set()
 
     def offer_from_thread(self, item: T) -> None:
-        """Puts an item in from any thread. Never blocks and never raises."""
+        """Put an item in from any thread. Never block and never raise."""
         with self._lock:
             self._append(item)
             if self._waking:
@@ -84,17 +84,17 @@ class Inbox(Generic[T]):
         self._doorbell.ring(self._wake)
 
     def miss(self, count: int) -> None:
-        """Adds to `missed`, from any thread."""
+        """Add to `missed`, from any thread."""
         with self._lock:
             self.missed += count
 
     def shut(self) -> None:
-        """Ends the iteration without telling the owner; on the loop's own thread."""
+        """End the iteration without notifying the owner; on the loop's own thread."""
         self._closed = True
         self._arrived.set()
 
     async def close(self) -> None:
-        """Ends the iteration and tells the owner. May be called twice."""
+        """End the iteration and notify the owner. May be called twice."""
         if self._closed:
             return
         self.shut()

@@ -1,7 +1,7 @@
 """Which keys a key expression matches: the part of Zenoh's language that this project uses.
 
 A key is parts joined by `/`. In an expression `*` stands for exactly one part and `**` for any number of
-them, none included. Names of keys are the business of `khala_protocol.keys`; here they are only strings.
+them, including none. `khala_protocol.keys` gives keys their meaning; here they are only strings.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ _PART = re.compile(r"[^/*#?$@][^/*#?$]*")
 
 
 def check_key(key: str) -> str:
-    """Returns `key` if something can be published under it.
+    """Return `key` if something can be published under it.
 
     Raises:
         WrongKey: it has an empty part, a wildcard, or one of the characters `# ? $` or a leading `@`, which Zenoh
-            keeps to itself.
+            reserves.
     """
     return _check(key, wild=False)
 
 
 def check_key_expr(key_expr: str) -> str:
-    """Returns `key_expr` if it can be subscribed to.
+    """Return `key_expr` if it can be subscribed to.
 
     Raises:
-        WrongKey: it has an empty part, `*` beside other characters, or a character that Zenoh keeps to itself.
+        WrongKey: it has an empty part, `*` next to other characters, or a character that Zenoh reserves.
     """
     return _check(key_expr, wild=True)
 
 
 @lru_cache(maxsize=4096)
 def matches(key_expr: str, key: str) -> bool:
-    """Tells whether `key_expr` matches `key`."""
+    """Return whether `key_expr` matches `key`."""
     return _match(key_expr.split("/"), key.split("/"))
 
 

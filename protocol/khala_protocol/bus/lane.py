@@ -1,7 +1,7 @@
-"""Decides where a `put` runs: on the loop while it cannot block, on a thread when it could.
+"""Decide where a `put` runs: on the loop if it cannot block, on a thread if it could.
 
 A put on the loop costs 5 to 25 µs, one through a thread 150 µs and more; but a put into a full queue holds its thread
-until the link takes something. How long, depends on its congestion control: half a second under BLOCK, which then
+until the link takes something. The time depends on its congestion control: half a second under BLOCK, which then
 closes the link; `WAIT_BEFORE_DROP_S` under DROP.
 """
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
     Ask = Callable[[Callable[[bool], None]], None]
 
 WINDOW_BYTES = TX_SLOTS // 2 * BATCH_BYTES - BATCH_BYTES // 2
-"""What fits into a queue for sure. A sample that does not fit into the batch begun starts the next, so two neighbouring
+"""Bytes that surely fit into a queue. A sample that does not fit into the current batch starts the next: two adjacent
 batches hold more than one is large, and all of them more than half; the rest is for the question and for headers."""
 HEADER_BYTES = 200
 SLOW_S = 0.002
 
 
 class Gate(Protocol):
-    """Tells whether a put may run on the loop."""
+    """Decide whether a put may run on the loop."""
 
     def fits(self, size: int) -> bool:
-        """Whether a put of `size` bytes cannot block now."""
+        """Return whether a put of `size` bytes cannot block now."""
         ...
 
     def sent(self, size: int, took_s: float) -> None:
-        """Takes note of a put."""
+        """Note a put."""
         ...
 
 
 class Lane:
-    """Runs puts in the order in which they are given, each on the loop or on a thread.
+    """Run puts in the order in which they are given, each on the loop or on a thread.
 
     Args:
         thread: an executor with one worker; several lanes may share it.
@@ -53,7 +53,7 @@ class Lane:
         self._waiting = 0
 
     async def put(self, put: Callable[[bytes], None], payload: bytes) -> None:
-        """Calls `put(payload)` and returns when it has returned. Cancelled while it waits, the put may still happen."""
+        """Call `put(payload)` and return when it has returned. If cancelled while waiting, the put may still happen."""
         size = len(payload) + HEADER_BYTES
         if self._waiting or not self._gate.fits(size):
             self._waiting += 1
@@ -67,10 +67,10 @@ class Lane:
 
 
 class Window:
-    """The gate of puts that BLOCK: open while what was put and has not arrived would fit into an empty queue.
+    """The gate of puts that BLOCK: open while all bytes that are still on their way would fit into an empty queue.
 
     The kernel's buffers come on top: with them empty, 225 puts of 20 kB went through before the first one blocked; with
-    them full, 32. What tells that something has arrived is a question that follows it through the same queue.
+    them full, 32. A question that follows a put through the same queue shows that it has arrived.
 
     Args:
         ask: sends a question behind the puts. It calls back once, on any thread, and says whether an answer came.
@@ -87,7 +87,7 @@ class Window:
         with self._lock:
             return self._in_flight + size <= WINDOW_BYTES
 
-    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  the signature of a gate
         """See `Gate`; asks when a quarter of the window is used."""
         with self._lock:
             self._in_flight += size
@@ -103,7 +103,7 @@ class Window:
 
 
 class DropGate:
-    """The gate of puts that DROP: open for what fits into one batch, until one was slow, until one is quick again."""
+    """The gate of puts that DROP: open for samples that fit into one batch; shut after a slow put until a quick one."""
 
     def __init__(self) -> None:
         self._slow = False
@@ -112,13 +112,13 @@ class DropGate:
         """See `Gate`."""
         return size <= BATCH_BYTES and not self._slow
 
-    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  a gate is told
+    def sent(self, size: int, took_s: float) -> None:  # noqa: ARG002  the signature of a gate
         """See `Gate`."""
         self._slow = took_s > SLOW_S
 
 
 class Shut:
-    """The gate where nothing tells what has arrived."""
+    """The gate for links without news of arrivals."""
 
     def fits(self, size: int) -> bool:  # noqa: ARG002  a gate is asked
         """See `Gate`."""

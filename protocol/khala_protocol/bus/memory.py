@@ -1,9 +1,9 @@
 """The bus in one process, for tests and for matches without a network.
 
-A `MemoryBroker` is what a router is to Zenoh; each `session()` of it is a `khala_protocol.bus.Bus` of its own, as a
+A `MemoryBroker` is what a router is to Zenoh; each of its `session()`s is its own `khala_protocol.bus.Bus`, as a
 process would have one. A `put` delivers before it returns, session by session as they were opened, so that a test is
-the same each time it runs. `kill`, `cut` and `mend` play what a SIGKILL, a pulled cable and a cable put back do to the
-others.
+the same each time it runs. To the others, `kill`, `cut` and `mend` look like a SIGKILL, a pulled cable and a cable put
+back.
 
     broker = MemoryBroker()
     host, agent = broker.session(), broker.session()
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 class MemoryBroker:
-    """Joins the sessions that it hands out. It is made, used and thrown away on one loop."""
+    """Join the sessions that it opens. It is made, used and discarded on one loop."""
 
     def __init__(self) -> None:
         self._hub = _Hub()
 
     def session(self) -> MemoryBus:
-        """Opens a session."""
+        """Open a session."""
         return MemoryBus(self._hub)
 
 
@@ -82,19 +82,19 @@ class MemoryBus:
         self.kill()
 
     def kill(self) -> None:
-        """What a SIGKILL of this session's process shows to the others: tokens gone, caches gone, silence."""
+        """Act like a SIGKILL of this session's process: tokens gone, caches gone, silence."""
         if not self._node.closed:
             self._node.shut()
             self._hub.nodes.remove(self._node)
             self._hub.report_tokens()
 
     def cut(self) -> None:
-        """Takes this session's link down: neither side hears the other until `mend`."""
+        """Take this session's link down: neither side hears the other until `mend`."""
         self._node.linked = False
         self._hub.report_tokens()
 
     def mend(self) -> None:
-        """Brings the link back: tokens reappear, and STATE subscriptions get the newest that they missed."""
+        """Bring the link back: tokens reappear, and STATE subscriptions get the newest samples that they missed."""
         self._node.linked = True
         self._hub.report_tokens()
         for node in self._hub.nodes:
@@ -108,7 +108,7 @@ class MemoryBus:
 
 @dataclass(eq=False)
 class _Node:
-    """What one session declared, and whether others hear it."""
+    """The declarations of one session, and whether others hear it."""
 
     linked: bool = True
     closed: bool = False
@@ -127,13 +127,13 @@ class _Node:
 
 
 class _Hub:
-    """Every node, and what flows between them."""
+    """All nodes, and the samples between them."""
 
     def __init__(self) -> None:
         self.nodes: list[_Node] = []
 
     def heard_by(self, node: _Node) -> Iterator[_Node]:
-        """The nodes that reach `node`, itself included, in the order in which they were opened."""
+        """Return the nodes that reach `node`, itself included, in the order in which they were opened."""
         return (other for other in self.nodes if other is node or (other.linked and node.linked))
 
     def carry(self, publisher: _Publisher, payload: bytes) -> None:
@@ -181,7 +181,7 @@ class _Watcher:
     alive: set[str] = field(default_factory=set)
 
     def see(self, keys: dict[str, None], *, link_up: bool) -> None:
-        """Reports what changed since the last look: the gone in order of name, then the new in order of age."""
+        """Report what changed since the last look: first lost tokens by name, then new ones by age."""
         for key in sorted(self.alive - keys.keys()):
             self.alive.remove(key)
             self.mailbox.offer(Liveness(key, alive=False, link_up=link_up))

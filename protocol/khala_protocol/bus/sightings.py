@@ -1,6 +1,6 @@
-"""Turns what a session hears of tokens and of its own link into `Liveness`, without blaming others for our link.
+"""Turn a session's news of tokens and of its own link into `Liveness`, without blaming others for our link.
 
-A session that loses its link hears of every token that it is gone, and only then of the link (0.1 to 0.8 ms later on
+A session that loses its link first hears that every token is gone, and only then of the link (0.1 to 0.8 ms later on
 an idle machine). So a token's end waits a moment for such news.
 """
 
@@ -19,7 +19,7 @@ PATIENCE_S = 0.02
 
 
 class Sightings:
-    """Fills the mailbox of one `watch`; everything here runs on the loop.
+    """Fill the mailbox of one `watch`; everything here runs on the loop.
 
     Args:
         mailbox: where the reports go.
@@ -34,7 +34,7 @@ class Sightings:
         self._held: deque[tuple[str, bool]] = deque()
 
     def token(self, key: str, *, alive: bool) -> None:
-        """A token appeared or went away."""
+        """Note that a token appeared or went away."""
         if self._link_up and self._patience_s and (self._held or not alive):
             self._held.append((key, alive))
             asyncio.get_running_loop().call_later(self._patience_s, self._release, 1)
@@ -42,7 +42,7 @@ class Sightings:
             self._report(key, alive=alive)
 
     def link(self, *, up: bool) -> None:
-        """Our link came up or went down."""
+        """Note that our link came up or went down."""
         self._link_up = up
         if not up:
             self._release(len(self._held))

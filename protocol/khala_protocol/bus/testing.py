@@ -1,14 +1,14 @@
-"""What every bus has to pass: the promises of `khala_protocol.bus` as tests, for pytest with asyncio mode `auto`.
+"""The conformance tests of a bus: the promises of `khala_protocol.bus`, for pytest with asyncio mode `auto`.
 
 A new implementation subclasses `BusConformance` in its test module, with a fixture `connect` that opens one more
-session on the same bus and closes all of them in the end:
+session on the same bus and closes all of them at the end:
 
     class TestMyBus(BusConformance):
         @pytest.fixture
         async def connect(self) -> AsyncIterator[Connect]:
             ...
 
-Nothing here sleeps. Where a test has to know that something did *not* arrive, it sends a last sample behind it.
+Nothing here sleeps. To know that something did *not* arrive, a test sends a last sample after it.
 """
 
 # ruff: noqa: D102  a test's name is its docstring
@@ -33,19 +33,19 @@ T = TypeVar("T")
 Connect = Callable[[], Awaitable[Bus]]
 
 WAIT_S = 10.0
-"""Ends a test that waits for what never comes."""
+"""Limit for a test that waits for something that never comes."""
 LAST = b"last"
 EVERY_DELIVERY = pytest.mark.parametrize("delivery", Delivery)
 
 
 async def take(subscription: Subscription[T], count: int) -> list[T]:
-    """The next `count` items."""
+    """Return the next `count` items."""
     async with asyncio.timeout(WAIT_S):
         return [await anext(subscription) for _ in range(count)]
 
 
 async def take_until_last(subscription: Subscription[Sample]) -> list[Sample]:
-    """The items before the one whose payload is `LAST`."""
+    """Return the items before the one whose payload is `LAST`."""
     taken = []
     async with asyncio.timeout(WAIT_S):
         async for sample in subscription:
@@ -56,7 +56,7 @@ async def take_until_last(subscription: Subscription[Sample]) -> list[Sample]:
 
 
 class BusConformance:
-    """The tests. They need a fixture `connect`, see the top of the module."""
+    """The tests. They need a fixture `connect`, see the module's docstring."""
 
     # --- samples ------------------------------------------------------------------------------------
 
@@ -92,7 +92,7 @@ class BusConformance:
             await answer.put(b"%d" % turn)
         for turn in range(20):
             await take(replies, 1)
-            async with asyncio.timeout(0):  # they need not be waited for
+            async with asyncio.timeout(0):  # they need no waiting
                 assert [(await anext(messages)).payload for _ in range(3)] == [b"%d" % turn] * 3
 
     @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ class BusConformance:
             await (await sender.publisher(delivery.value, delivery)).put(b"x")
         assert {sample.key for sample in await take(subscription, 3)} == {"state", "speech", "log"}
 
-    # --- who joins late -----------------------------------------------------------------------------
+    # --- late joiners --------------------------------------------------------------------------------
 
     async def test_who_joins_late_gets_the_newest_state_at_once_and_goes_on_from_there(self, connect: Connect) -> None:
         host, witness, late = await connect(), await connect(), await connect()
@@ -214,7 +214,7 @@ class BusConformance:
         seen = await witness.subscribe("a/b", Delivery.STATE)
         publisher = await host.publisher("a/b", Delivery.STATE)
         await publisher.put(b"old")
-        await take(seen, 1)  # it is not on its way any more
+        await take(seen, 1)  # it has left the link
         await publisher.close()
         await publisher.close()
         await (await host.publisher("a/c", Delivery.STATE)).put(LAST)
@@ -230,7 +230,7 @@ class BusConformance:
         await (await second.publisher("a/b", Delivery.STATE)).put(b"second life")
         assert await take(subscription, 1) == [Sample("a/b", b"second life")]
 
-    # --- who is slow --------------------------------------------------------------------------------
+    # --- slow receivers ------------------------------------------------------------------------------
 
     @EVERY_DELIVERY
     @pytest.mark.parametrize("depth", [1, 3])
@@ -362,7 +362,7 @@ class BusConformance:
         await publisher.put(b"x")
         assert await take(subscription, 1) == [Sample("a/b", b"x")]
 
-    # --- who is there -------------------------------------------------------------------------------
+    # --- liveliness ----------------------------------------------------------------------------------
 
     async def test_a_watch_reports_who_is_there_and_then_who_comes_and_goes(self, connect: Connect) -> None:
         host, early, late = await connect(), await connect(), await connect()

@@ -1,6 +1,6 @@
-"""Runs what may block for seconds where it keeps neither the loop nor the process from ending.
+"""Run work that may block for seconds where it blocks neither the loop nor the end of the process.
 
-The loop's own executor would not do: its threads are waited for at the end of the loop and of the process.
+The loop's own executor would not do: the loop and the process wait for its threads when they end.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 async def run_detached(work: Callable[[], T]) -> T:
-    """Calls `work` on a daemon thread of its own; if this is cancelled, the thread goes on and its result is lost."""
+    """Call `work` on its own daemon thread; if this is cancelled, the thread goes on and its result is lost."""
     future: Future[T] = Future()
 
     def run() -> None:

@@ -1,8 +1,8 @@
 """The bus over Zenoh, and the only module that imports it.
 
-What a bus promises is in `khala_protocol.bus`, how one is reached in `khala_protocol.bus.config`.
+The promises of a bus are in `khala_protocol.bus`, its settings in `khala_protocol.bus.config`.
 
-Every callback of Zenoh runs on one of its own threads and only hands over to a mailbox: a callback that waits stops
+Every callback of Zenoh runs on one of its own threads and only fills a mailbox: a callback that waits stops
 everything that its session receives, and one that publishes deadlocks. Callbacks are direct, as each indirect one has a
 thread that keeps the process from ending. A session does not survive a fork: start other processes with spawn or exec.
 """
@@ -54,18 +54,18 @@ log = logging.getLogger(__name__)
 CLOSE_TIMEOUT_S = 1.8
 ANSWER_TIMEOUT_S = 1.0
 STATE_CACHE = 1
-"""Only the newest of a state is worth anything: a larger cache would hand old ones to a late joiner."""
+"""Only the newest of a state is worth anything: a larger cache would deliver old ones to a late joiner."""
 HEARTBEAT_S = 0.3
-"""A dropped last sample is noticed after so long. With a sporadic heartbeat, which comes once after each change, the
-newest was lost for good when what it brought was dropped, too."""
+"""A dropped last sample is noticed after this time. With a sporadic heartbeat, which comes once after each change, the
+newest sample was lost for good when its heartbeat was dropped too."""
 
 _SPEECH: dict[str, Any] = {"congestion_control": CongestionControl.BLOCK, "priority": Priority.INTERACTIVE_HIGH}
-"""Not express, which brought no earlier arrival: each express sample takes a slot of the queue for itself alone."""
+"""Not express, which brought no earlier arrival: each express sample takes a whole slot of the queue."""
 _LOG: dict[str, Any] = {"congestion_control": CongestionControl.DROP, "priority": Priority.DATA_LOW}
 
 
 async def open_bus(config: BusConfig) -> ZenohBus:
-    """Opens a session.
+    """Open a session.
 
     Raises:
         BusError: the configuration is wrong, there is no router, or it cannot listen; the text says what to do.
@@ -88,7 +88,7 @@ async def open_bus(config: BusConfig) -> ZenohBus:
 
 
 async def probe(config: BusConfig) -> tuple[str, ...]:
-    """Identities of the routers that a client of `config` gets connected to; at least one.
+    """Return the identities of the routers that a client of `config` gets connected to; at least one.
 
     Raises:
         BusError: as `open_bus` does.
@@ -105,7 +105,7 @@ _unclosed: set[ZenohBus] = set()
 
 @atexit.register
 def _close_what_was_forgotten() -> None:
-    """Closes sessions that nobody closed: a callback that meets an interpreter on its way out aborts the process."""
+    """Close sessions that are still open: a callback that meets an exiting interpreter aborts the process."""
     for bus in tuple(_unclosed):
         with contextlib.suppress(zenoh.ZError):
             bus._session.close()  # type: ignore[no-untyped-call]  # noqa: SLF001  # as in `_shut`; the module's own class
@@ -134,7 +134,7 @@ class ZenohBus:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where this session listens, with the ports that it took; or where it connects to, if it does not listen."""
+        """Where this session listens, with its actual ports; or where it connects to, if it does not listen."""
         if not self._config.listen_on:
             return self._config.connect_to
         if not any(endpoint.endswith(":0") for endpoint in self._config.listen_on):
@@ -190,7 +190,7 @@ class ZenohBus:
         try:
             await self._settle(key_expr)
             self._check_open()
-        except BaseException:  # cancelled, too: nobody else could close it
+        except BaseException:  # also if cancelled: nothing else could close it
             await mailbox.close()
             raise
         return mailbox
@@ -255,14 +255,14 @@ class ZenohBus:
         self._forget(mailbox, watcher)
 
     async def _settle(self, key_expr: str) -> None:
-        """Waits until the router knows what was declared: a question that nobody answers follows it, and comes back."""
+        """Wait until the router knows what was declared: a question without a listener follows it, and comes back."""
         back = self._loop.create_future()
         done = partial(self._hand_over, _resolve, back)
         self._session.get(key_expr, Callback(_ignore, done, indirect=False), timeout=ANSWER_TIMEOUT_S)
         await back
 
     def _ask(self, answer: Callable[[bool], None]) -> None:
-        """Sends a question behind the SPEECH puts, for `Window`."""
+        """Send a question behind the SPEECH puts, for `Window`."""
         errors: list[zenoh.Reply] = []  # a timeout comes as an error
         self._session.get(
             self._question,
@@ -273,11 +273,11 @@ class ZenohBus:
         )
 
     def _hand_over(self, action: Callable[..., None], *args: Any) -> None:
-        """From a thread of Zenoh to the loop, for what is rare; samples go through mailboxes."""
+        """Pass a rare event from a thread of Zenoh to the loop; samples go through mailboxes."""
         try:
             self._loop.call_soon_threadsafe(action, *args)
         except RuntimeError:
-            log.debug("the loop is closed; %s is not told", action)
+            log.debug("the loop is closed; %s is not called", action)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         peer = str(event.transport.zid)
@@ -293,7 +293,7 @@ class ZenohBus:
 
 
 class _Held:
-    """What a session declared: Zenoh takes back what nobody refers to."""
+    """The declarations of a session: Zenoh withdraws those that nothing refers to."""
 
     def __init__(self) -> None:
         self.closed = False
@@ -361,7 +361,7 @@ class _Token:
 
 
 def _declare_state_publisher(session: zenoh.Session, key: str) -> AdvancedPublisher:
-    # BLOCK would let one stopped agent freeze all others for seconds; DROP with a cache and a heartbeat kept their
+    # With BLOCK, one stopped agent froze all others for seconds; DROP with a cache and a heartbeat kept their
     # worst gap at 0.1 s, and the stopped one had the newest sample 0.08 s after it went on.
     replies = RepliesConfig(congestion_control=CongestionControl.DROP, priority=Priority.DATA_HIGH)
     return declare_advanced_publisher(
@@ -402,7 +402,7 @@ def _count(mailbox: Inbox[Sample], miss: Miss) -> None:
 
 
 def _ignore(reply: zenoh.Reply) -> None:
-    """For questions whose end is the answer."""
+    """Ignore a reply: for questions whose end is the answer."""
 
 
 # --- on the loop ------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
-"""Where a replay and its recording part: one value, with a text that names the place.
+"""The first point where a replay differs from its recording: one value, with a text that names the place.
 
-Who replays is above (`khala_orchestrator.replay`, `khala_agents.replay`); what is compared is always bytes or words as
-they were sent.
+The replays are above (`khala_orchestrator.replay`, `khala_agents.replay`); they compare bytes or words as sent.
 """
 
 from __future__ import annotations
@@ -11,10 +10,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something that was sent otherwise than it was recorded.
+    """A sent value that differs from the recorded one.
 
     Attributes:
-        agent: whose observation, reply or message it is.
+        agent: the agent of the observation, reply or message.
         what: `observation`, `reply`, `messages`.
         recorded: as it stands in the recording.
         sent: as it was sent now; empty if it was not sent at all.

@@ -34,7 +34,7 @@ W = TypeVar("W", bound=Wire)
 _RUN_LEVEL = tuple(f"/{topic}" for topic in (Topic.RUN, Topic.RESULT))
 _LARGEST_RECORD = 2**30  # bytes; ours are a megabyte or one sample, a length beyond this is damage
 _BROKEN = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError, OverflowError, MemoryError)
-"""What mcap raises on bytes that are no MCAP file; found by cutting and flipping bytes of one."""
+"""Errors that mcap raises on bytes that are not an MCAP file; found by cutting and flipping bytes of one."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Recorded:
 
     @cached_property
     def address(self) -> Address | None:
-        """The key taken apart; None if it is none of this protocol."""
+        """The parsed key; None if it is not of this protocol."""
         try:
             return parse(self.key)
         except PeerError:
@@ -63,7 +63,7 @@ class Recorded:
 
     @cached_property
     def message(self) -> Wire | None:
-        """The message; None if the bytes are none of this protocol, or a picture."""
+        """The message; None if the bytes are not of this protocol, or a picture."""
         if self.address is not None and self.address.topic is Topic.IMAGE:
             return None
         try:
@@ -76,7 +76,7 @@ class Recorded:
 class RecordedStep:
     """One step of an episode: the samples from its first observation to the first one of the next step.
 
-    A late reply stands in the step that it arrived in, not in the one that it answers.
+    A late reply belongs to the step in which it arrived, not to the one that it answers.
     """
 
     episode: int
@@ -84,21 +84,21 @@ class RecordedStep:
     samples: tuple[Recorded, ...]
 
     def of(self, kind: type[W]) -> tuple[W, ...]:
-        """The messages of one kind that were recorded during this step, in order."""
+        """Return the messages of one kind that were recorded during this step, in order."""
         return tuple(sample.message for sample in self.samples if isinstance(sample.message, kind))
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording that was looked through once; iterating reads the file again, sample by sample.
+    """A recording that was scanned once; iterating reads the file again, sample by sample.
 
     Attributes:
         path: the file.
         complete: False if it is torn or damaged, so that it may end in the middle of a run.
         run: the run card; None if none was recorded.
-        results: how each episode ended.
+        results: the results of the episodes.
         counts: samples by key.
-        metadata: versions and whatever the recorder was given.
+        metadata: versions, and what the recorder was given.
     """
 
     path: Path
@@ -110,10 +110,10 @@ class Recording:
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
-        """Looks through a recording.
+        """Scan a recording.
 
         Raises:
-            RecordingError: there is no such file, or it is no recording.
+            RecordingError: there is no such file, or it is not a recording.
         """
         path = Path(path)
         _require_recording(path)
@@ -142,7 +142,7 @@ class Recording:
         return read(self.path)
 
     def of(self, kind: type[W], *, agent: str | None = None) -> Iterator[W]:
-        """All messages of one kind, of one agent or of all, in the order of the file."""
+        """Yield all messages of one kind, of one agent or of all, in the order of the file."""
         for sample in self:
             address = sample.address
             if address is None or KINDS.get(address.topic) is not kind or agent not in (None, address.agent):
@@ -151,7 +151,7 @@ class Recording:
                 yield sample.message
 
     def images(self) -> Iterator[tuple[str, bytes]]:
-        """Every picture once, by the hash under which observations name it."""
+        """Yield every picture once, by the hash under which observations name it."""
         seen: set[str] = set()
         for sample in self:
             if sample.address is None or sample.address.topic is not Topic.IMAGE:
@@ -162,15 +162,15 @@ class Recording:
                 yield digest, sample.payload
 
     def observations(self, agent: str) -> Iterator[Observation]:
-        """What one agent was shown."""
+        """Yield the observations of one agent."""
         return self.of(Observation, agent=agent)
 
     def replies(self, step: int, episode: int = 0) -> tuple[Reply, ...]:
-        """All answers to one step, in order of arrival, late and repeated ones too."""
+        """Return all answers to one step, in order of arrival, including late and repeated ones."""
         return tuple(reply for reply in self.of(Reply) if (reply.episode, reply.step) == (episode, step))
 
     def by_step(self) -> Iterator[RecordedStep]:
-        """The samples step by step; what was recorded before the first observation belongs to no step."""
+        """Yield the samples step by step; samples before the first observation belong to no step."""
         place: tuple[int, int] | None = None
         samples: list[Recorded] = []
         for sample in self:
@@ -187,10 +187,10 @@ class Recording:
 
 
 def read(path: Path | str) -> Iterator[Recorded]:
-    """All samples in the order of the file, up to its end or to the first tear or damage.
+    """Yield all samples in the order of the file, up to its end or to the first tear or damage.
 
     Raises:
-        RecordingError: there is no such file, or it is no recording.
+        RecordingError: there is no such file, or it is not a recording.
     """
     path = Path(path)
     _require_recording(path)
@@ -198,10 +198,10 @@ def read(path: Path | str) -> Iterator[Recorded]:
 
 
 def recover(path: Path | str, new_path: Path | str) -> Recording:
-    """Writes what can be read of a torn or damaged recording as a whole one, and returns it.
+    """Write the readable part of a torn or damaged recording as a whole one, and return it.
 
     Raises:
-        RecordingError: `path` is no recording, or `new_path` exists or cannot be written.
+        RecordingError: `path` is not a recording, or `new_path` exists or cannot be written.
     """
     old = Recording.open(path)
     with Recorder(new_path, metadata=old.metadata) as recorder:
@@ -227,7 +227,7 @@ def _require_recording(path: Path) -> None:
 
 
 def _records(path: Path) -> Iterator[Recorded | McapRecord]:
-    """The records of the file, samples with their keys; ends quietly where the file is torn or damaged."""
+    """Yield the records of the file, samples with their keys; end quietly where the file is torn or damaged."""
     keys: dict[int, str] = {}
     expected: Iterator[int] = itertools.repeat(-1)
     with path.open("rb") as file:
@@ -240,7 +240,7 @@ def _records(path: Path) -> Iterator[Recorded | McapRecord]:
                         keys[record.id] = record.topic
                     case Message():
                         if next(expected) not in (-1, record.sequence):
-                            return  # mcap skips a chunk whose head is damaged, as a record of unknown kind
+                            return  # mcap skips a chunk with a damaged head, as a record of unknown kind
                         yield Recorded(keys[record.channel_id], record.data, record.log_time, record.sequence)
                     case _:
                         yield record

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 KINDS: Mapping[Topic, type[Wire]] = {Topic(model.model_fields["kind"].default): model for model in MESSAGE_TYPES}
-"""The kind of message that stands under each topic."""
+"""The kind of message under each topic."""
 
 LIBRARY = "khala"
 """Name of the writer in a file's header; its samples are numbered from 0 without gaps, across all keys."""
@@ -31,10 +31,10 @@ METADATA = "khala"
 
 
 class Recorder:
-    """Writes one recording. A context manager; a file that was left without `close` is readable up to the last flush.
+    """Write one recording. A context manager; a file without `close` is readable up to the last flush.
 
     Args:
-        path: the file, which must not exist yet; missing directories are made.
+        path: the file, which must not exist yet; missing directories are created.
         clock: wall time in nanoseconds since 1970, for the log times.
         metadata: texts to keep with the versions of Khala, Python and the schema.
 
@@ -58,15 +58,15 @@ class Recorder:
                 self._writer.add_metadata(METADATA, _versions() | dict(metadata or {}))
                 self._flush()
         except RecordingError:
-            with contextlib.suppress(OSError):  # it closes, but says once more what is wrong
+            with contextlib.suppress(OSError):  # it closes, but reports the same error again
                 self._file.close()
             raise
 
     def write(self, key: str, payload: bytes, *, log_time_ns: int | None = None) -> None:
-        """Writes bytes as they went over the bus; bytes that are no message are evidence and are kept too.
+        """Write bytes as they went over the bus; bytes that are not a message are evidence and are kept too.
 
         Raises:
-            RecordingError: the file cannot be written any more.
+            RecordingError: the file can no longer be written.
         """
         self._require_open()
         now = self._clock() if log_time_ns is None else log_time_ns
@@ -76,13 +76,13 @@ class Recorder:
         self._count += 1
 
     def flush(self) -> None:
-        """Hands everything written so far to the operating system: from here on a killed process cannot lose it."""
+        """Pass everything written so far to the operating system: a process killed later cannot lose it."""
         self._require_open()
         with _writing(self.path):
             self._flush()
 
     def close(self) -> None:
-        """Ends the file, with index and statistics. May be called twice."""
+        """End the file, with index and statistics. May be called twice."""
         if self._file.closed:
             return
         with _writing(self.path), self._file:
@@ -160,5 +160,5 @@ def _versions() -> dict[str, str]:
 def _khala_version() -> str:
     try:
         return version("khala")
-    except PackageNotFoundError:  # run from a checkout that was not installed
+    except PackageNotFoundError:  # run from a checkout that is not installed
         return "unknown"

@@ -9,13 +9,13 @@
         <MessageTo(CombatGroup1, '''hold the ramp''')>
         <ListenTo(Channel-2)>
 
-`parse` is tolerant as models need it and exact in what it reports: what can mean one thing only is read as that,
-whatever else looks like a call and is none is a `Rejection` with its place and a sentence that the model can act on,
-and costs nothing but itself. Nothing raises, the time is linear in the length of the text, and a call that is cut off
+`parse` tolerates what models write and is exact in what it reports: text with only one possible meaning is read as
+that, any other text that looks like a call is a `Rejection` with its place and a sentence that the model can act on,
+and affects nothing else. Nothing raises, the time is linear in the length of the text, and a call that is cut off
 is never guessed at.
 
-This package knows no unit, no action and no game: whether a name, a tag or a team exists is the bridge's to
-say. The rules of tolerance, beside those of headings (H, `khala_protocol.speech.headings`) and of arguments
+This package knows no unit, no action and no game: the bridge decides whether a name, a tag or a team exists.
+These are the rules of tolerance, in addition to those of headings (H, `khala_protocol.speech.headings`) and arguments
 (A, `khala_protocol.speech.arguments`); each has a row in the table test:
 
 | id | rule | example |
@@ -26,8 +26,8 @@ say. The rules of tolerance, beside those of headings (H, `khala_protocol.speech
 | S4 | a call without arguments needs no parentheses | `<Hold_Position>`, `<Hold_Position/>` |
 | S5 | markdown around a call and escapes within: bullets, numbers, emphasis, fences, quotes | `- **<Stop()>**` |
 | S6 | full-width brackets, commas, colons and digits, as some input methods write them | |
-| S7 | tags of markup and comparison signs are no calls and no faults | `<b>`, `health < 50 and > 20` |
-| S8 | what stands in a reasoning block is not said | `<think><Stop()></think>` |
+| S7 | tags of markup and comparison signs are neither calls nor faults | `<b>`, `health < 50 and > 20` |
+| S8 | a reasoning block is not said | `<think><Stop()></think>` |
 | S9 | a closing reasoning tag alone ends a block that began before the reply | `<Stop()></think>` |
 | S10 | with a heading `Actions`, calls in the analysis or above any heading are mentions | `Analysis: <Stop()>?` |
 | S11 | the same for messages and a heading `Communications` | `Analysis: <MessageTo(A, 'go')>?` |
@@ -43,10 +43,10 @@ say. The rules of tolerance, beside those of headings (H, `khala_protocol.speech
 | S21 | a name with blanks is one with underscores | `<Attack Unit(0x1)>` |
 | S22 | a bracket too few or too many before a `>` on the line; no `>` where the line ends | `<Stop(>`, `<Stop()` |
 | S23 | a call without angle brackets that stands alone, behind a heading or in a list of JSON | `- Stop()` |
-| S24 | what is in a comment or struck out is not said | `<!-- <Stop()> -->`, `~~<Stop()>~~` |
-| S25 | nor is what stands right behind a negation, in many languages | `do not <Stop()>`, `instead of <Stop()>` |
-| S26 | a turn of somebody else that the model makes up ends the reply | `User:` |
-| S27 | a section that says under the same heading what an earlier one said counts once | the whole reply twice |
+| S24 | a comment or struck out text is not said | `<!-- <Stop()> -->`, `~~<Stop()>~~` |
+| S25 | nor is a call right after a negation, in many languages | `do not <Stop()>`, `instead of <Stop()>` |
+| S26 | a made-up turn of another speaker ends the reply | `User:` |
+| S27 | a section that repeats an earlier one under the same heading counts once | the whole reply twice |
 | S28 | a call as an object of JSON | `{"action": "Attack_Unit", "args": ["0x1"]}` |
 | S29 | a call as an element or with attributes | `<Attack_Unit>0x1</Attack_Unit>`, `<Attack_Unit tag="0x1"/>` |
 | S30 | tags and points in other brackets or in none | `<Attack_Unit[0x1]>`, `<Attack_Unit 0x1>` |

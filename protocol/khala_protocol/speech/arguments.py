@@ -1,8 +1,8 @@
 """The arguments of a call: text between parentheses ↔ tags, points and words; and a call ↔ its canonical text.
 
 Pure and total: every text gives a tuple or `MalformedCall`. It knows the *form* of an
-argument (hexadecimal is a tag, two numbers are a point) and nothing of what an action wants; whether the
-form is the right one, and whether the point lies in its frame, is the business of who knows the catalogue.
+argument (hexadecimal is a tag, two numbers are a point), not what an action requires; the catalogue decides whether
+the form is the right one, and whether the point lies in its frame.
 Above it: `khala_protocol.speech.reader`, which finds the calls.
 
 | id | rule | written | read as |
@@ -61,7 +61,7 @@ _LARGEST_COORDINATE = 1000.0
 
 
 def read_arguments(text: str) -> tuple[str | Point, ...]:
-    """Reads what stands between the parentheses of a call; see the table of the module.
+    """Read the text between the parentheses of a call; see the table of the module.
 
     Raises:
         MalformedCall: an argument other than the last is empty.
@@ -78,7 +78,7 @@ def read_arguments(text: str) -> tuple[str | Point, ...]:
 
 
 def render(call: Call) -> str:
-    """The canonical text of a call, `<Name(0x1002c0001, [3, 4.5])>`.
+    """Return the canonical text of a call, `<Name(0x1002c0001, [3, 4.5])>`.
 
     `khala_protocol.speech.parse` reads it as the same name and arguments, for every call that it returned.
     """
@@ -86,7 +86,7 @@ def render(call: Call) -> str:
 
 
 def written(name: str, args: Iterable[str | Point]) -> str:
-    """The canonical text of a name and arguments."""
+    """Return the canonical text of a name and arguments."""
     return f"<{name}({', '.join(map(_write, args))})>"
 
 
@@ -109,7 +109,7 @@ def _strip(piece: str) -> str:
 
 
 def _apart(piece: str) -> list[str]:
-    """Rule A13: the tags and points of a piece that has several and nothing else."""
+    """Return the tags and points of a piece that has several and nothing else (rule A13)."""
     values = list(_VALUES.finditer(piece)) if " " in piece or '"' in piece else []
     if len(values) < len("AB"):
         return [piece]
@@ -137,7 +137,7 @@ def _read_one(piece: str) -> str | Point:
 
 
 def _point(match: re.Match[str]) -> Point | None:
-    """The point of a match; None if a number is too large to be one."""
+    """Return the point of a match; None if a number is too large to be one."""
     one, other = float(match["one"]), float(match["other"])
     if not (math.isfinite(one) and math.isfinite(other)):
         return None
@@ -146,13 +146,13 @@ def _point(match: re.Match[str]) -> Point | None:
 
 
 def _in_order(match: re.Match[str]) -> str:
-    """Rule A11: two named coordinates as a point."""
+    """Return two named coordinates as a point (rule A11)."""
     one, other = match["one"], match["other"]
     return f"[{other}, {one}]" if match["first"].lower() == "y" else f"[{one}, {other}]"
 
 
 def _join_coordinates(arguments: list[str | Point]) -> Iterator[str | Point]:
-    """Rule A6."""
+    """Yield the arguments, with neighbouring coordinates joined (rule A6)."""
     at = 0
     while at < len(arguments):
         pair = [_coordinate(argument) for argument in arguments[at : at + 2]]
@@ -179,5 +179,5 @@ def _write(argument: str | Point) -> str:
 
 
 def _number(value: float) -> str:
-    """Shortest text that reads as the same number, without `.0`."""
+    """Return the shortest text that reads as the same number, without `.0`."""
     return repr(value).removesuffix(".0")

@@ -1,7 +1,7 @@
-"""One call at one `<`: its name, where its parentheses close, and whether what is no call looks like one.
+"""One call at one `<`: its name, where its parentheses close, and whether other text looks like a call.
 
-Pure regular expressions over text of `khala_protocol.speech.marks.to_ascii`. What the arguments say is read by
-`khala_protocol.speech.arguments`, a message's text by `khala_protocol.speech.quoting`.
+Pure regular expressions over text of `khala_protocol.speech.marks.to_ascii`. `khala_protocol.speech.arguments` reads
+the arguments, `khala_protocol.speech.quoting` a message's text.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from khala_protocol.speech.marks import SHORT, MalformedCall
 
-# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
+# Possessive quantifiers (`*+`) keep every expression linear: they never backtrack. Optional groups that
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
 _NAME = re.compile(r"<(?P<blank>\s*+)[*`]*+(?P<name>[A-Za-z](?:\\?+[\w-])*+)[*`]*+(?P<open>\s*+\\?+\()?")
 _SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4})\s*+\\?+\(")
@@ -51,9 +51,9 @@ class Opening:
 
     Attributes:
         name: as written, without escapes.
-        end: offset behind it.
+        end: offset after it.
         has_parenthesis: whether it ends with `(`.
-        is_call_like: whether the model most likely meant a call: what follows is a fault if it is none.
+        is_call_like: whether the model most likely meant a call: if it is not a call, it is a fault.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Opening:
 
 
 def opening_at(text: str, at: int) -> Opening | None:
-    """The opening of a call at this `<`; None if no name follows."""
+    """Return the opening of a call at this `<`; None if no name follows."""
     if spaced := _SPACED.match(text, at):  # S21
         return Opening("_".join(spaced["name"].split()), spaced.end(), has_parenthesis=True, is_call_like=True)
     match = _NAME.match(text, at)
@@ -76,13 +76,13 @@ def opening_at(text: str, at: int) -> Opening | None:
 
 
 def close_parentheses(text: str, opening: Opening) -> tuple[int, int]:
-    """Where the arguments behind an opening end, and where the call ends.
+    """Return where the arguments after an opening end, and where the call ends.
 
-    A bracket that is missing or too many is mended if a `>` shows where the call ends on its line; a missing `>`, if
+    A bracket that is missing or too many is corrected if a `>` shows where the call ends on its line; a missing `>`, if
     the parentheses are closed and nothing else follows (rule S22).
 
     Raises:
-        MalformedCall: the call is not closed before the next `<` or the end of the text, or what was meant is not
+        MalformedCall: the call is not closed before the next `<` or the end of the text, or its meaning is not
         clear.
     """
     opened = ["("]
@@ -102,7 +102,7 @@ def close_parentheses(text: str, opening: Opening) -> tuple[int, int]:
 
 
 def _mend(text: str, opening: Opening, wrong: re.Match[str]) -> tuple[int, int]:
-    """The ends of a call whose brackets do not match from here on."""
+    """Return the ends of a call whose brackets do not match from here on."""
     closing = _CLOSE.match(text, wrong.start())
     if closing is None or not opening.is_call_like or "\n" in text[opening.end : closing.end()]:
         name = opening.name[:SHORT]
@@ -113,13 +113,13 @@ def _mend(text: str, opening: Opening, wrong: re.Match[str]) -> tuple[int, int]:
 
 
 def loose_arguments(text: str, at: int) -> tuple[int, int, int] | None:
-    """Arguments that stand behind a name without parentheses: where they begin and end, and where the call ends."""
+    """Return where arguments after a name without parentheses begin and end, and where the call ends."""
     match = _LOOSE.match(text, at)
     return None if match is None else (match.start("inside"), match.end("inside"), match.end())
 
 
 def element_at(text: str, at: int, name: str) -> tuple[int, int, int] | None:
-    """Arguments between `<Name>` and `</Name>`: where they begin and end, and where the element ends."""
+    """Return where arguments between `<Name>` and `</Name>` begin and end, and where the element ends."""
     match = _ELEMENT.match(text, at)
     if match is None or match["name"].lower() != name.lower() or not match["inside"].strip():
         return None
@@ -127,7 +127,7 @@ def element_at(text: str, at: int, name: str) -> tuple[int, int, int] | None:
 
 
 def refuse_words(text: str, opening: Opening) -> NoReturn:
-    """Says what is wrong with a name that neither `(` nor `>` follows.
+    """Raise what is wrong with a name that neither `(` nor `>` follows.
 
     Raises:
         MalformedCall: always.
@@ -140,13 +140,13 @@ def refuse_words(text: str, opening: Opening) -> NoReturn:
 
 
 def close_bare(text: str, at: int) -> int | None:
-    """The offset behind the `>` of a call without parentheses; None if something else follows its name."""
+    """Return the offset after the `>` of a call without parentheses; None if something else follows its name."""
     closing = _CLOSE_BARE.match(text, at)
     return closing.end() if closing else None
 
 
 def naked_at(text: str, at: int) -> re.Match[str] | None:
-    """A call without angle brackets, `Name(...)`, that stands here behind markup: groups `call`, `name`, `inside`."""
+    """Match a call without angle brackets, `Name(...)`, here after markup: groups `call`, `name`, `inside`."""
     match = _NAKED.match(text, at)
     if match is None:
         return None
@@ -158,29 +158,29 @@ def naked_at(text: str, at: int) -> re.Match[str] | None:
 
 
 def naked_talk_at(text: str, at: int) -> re.Match[str] | None:
-    """A message without angle brackets that begins here behind markup: groups `call` and `name`."""
+    """Match a message without angle brackets that begins here after markup: groups `call` and `name`."""
     return _NAKED_TALK.match(text, at)
 
 
 def in_words_at(text: str, at: int) -> re.Match[str] | None:
-    """A name and its argument without the brackets of a call, on a line without any call: group `name`."""
+    """Match a name and its argument without the brackets of a call, on a line without any call: group `name`."""
     line_end = text.find("\n", at)
     stop = len(text) if line_end < 0 else line_end
     return None if text.find("<", at, stop) >= 0 else _IN_WORDS.search(text, at, stop)
 
 
 def stands_alone(text: str, end: int) -> bool:
-    """Whether nothing but marks, a comment or another call follows on the line: then a naked call is meant as one."""
+    """Return whether only marks, a comment or another call follow on the line: then a naked call is meant as one."""
     return _STANDS_ALONE.match(text, end) is not None
 
 
 def is_talk(name: str) -> bool:
-    """Whether a call of this name speaks or listens, instead of acting."""
+    """Return whether a call of this name speaks or listens, instead of acting."""
     return name.lower() in MESSAGE_NAMES | LISTEN_NAMES
 
 
 def is_markup(name: str, closing_tags: frozenset[str]) -> bool:
-    """Whether `<name>` is a tag of a markup language and no call without parentheses (rule S7)."""
+    """Return whether `<name>` is a tag of a markup language and not a call without parentheses (rule S7)."""
     if _HTML.fullmatch(name):
         return True
     if name.lower() in closing_tags:
@@ -189,12 +189,12 @@ def is_markup(name: str, closing_tags: frozenset[str]) -> bool:
 
 
 def closing_tags(text: str) -> frozenset[str]:
-    """The names, in lower case, of all `</name>` in a text."""
+    """Return the names, in lower case, of all `</name>` in a text."""
     return frozenset(match[1].lower() for match in _CLOSING_TAG.finditer(text))
 
 
 def segment_end(text: str, start: int) -> int:
-    """Where the words that began at this `<` end: behind the next `>`, or before a `<` or the line's end."""
+    """Return where the words that began at this `<` end: after the next `>`, or before a `<` or the line's end."""
     match = _SEGMENT.match(text, start + 1)
     return match.end() if match else start + 1
 

@@ -1,8 +1,8 @@
-"""Headings of a reply: which line opens a section or speaks for a team, whatever markup stands around it.
+"""Headings of a reply: lines that open a section or speak for a team, whatever markup is around them.
 
-Pure regular expressions over text of `khala_protocol.speech.marks.to_ascii`. It finds headings and decides nothing:
-what a section means for the calls in it is decided in `khala_protocol.speech.reader`, and whether a team exists is
-known to the bridge only.
+Pure regular expressions over text of `khala_protocol.speech.marks.to_ascii`. It only finds headings:
+`khala_protocol.speech.reader` decides what a section means for the calls in it, and only the bridge knows whether a
+team exists.
 
 | id | rule | written |
 |---|---|---|
@@ -17,15 +17,15 @@ known to the bridge only.
 | H9 | a team without the word Team: one word and a colon, then nothing or a call | `- Stalker-1: <Stop()>` |
 | H10 | a remark in brackets behind a team's name is dropped | `Team Stalker-1 (2 units):` |
 | H11 | a team written as a tag | `<Team Stalker-1>`, `<team name="Stalker-1">`, `<Stalker-1>` |
-| H12 | several teams at once are one team of that name: who knows the teams takes them apart | `Team A, B:` |
+| H12 | several teams at once are one team of that name: the bridge splits it | `Team A, B:` |
 | H13 | the word Team without a name is a heading of no team | `Team:` |
 | H14 | words that open a sentence are no team | `Note:`, `Reasoning:`, `Then:` |
 | H15 | a bare name with a number needs no colon: before a call, alone, in a table | `Stalker-1 → <Stop()>` |
 | H16 | the word Team behind the name, and "for" before it | `Stalker-1 team:`, `For Team A:` |
 | H17 | sections and teams in other languages, also two at once | `Aktionen:`, `动作/Actions:`, `小队 A:` |
-| H18 | actions that are only spoken of, and actions that replace earlier ones | `Valid actions:`, `Final actions:` |
+| H18 | actions that are only mentioned, and actions that replace earlier ones | `Valid actions:`, `Final actions:` |
 | H19 | an explanation or notes behind the actions belong to the analysis | `Explanation: <Stop()>?`, `## Notes` |
-| H20 | a team that is named in a sentence right before a call | `Team A should <Stop()>`, `A-1 will now <Stop()>` |
+| H20 | a team named in a sentence right before a call | `Team A should <Stop()>`, `A-1 will now <Stop()>` |
 | H21 | a team as a value of JSON | `"team": "Stalker-1"` |
 """
 
@@ -40,7 +40,7 @@ from khala_protocol.speech.marks import QUOTES
 
 
 class ReplySection(Enum):
-    """The part of a reply that a call stands in."""
+    """The section of a reply that contains a call."""
 
     NONE = "none"
     ANALYSIS = "analysis"
@@ -53,14 +53,14 @@ class Tone(Enum):
 
     DO = "do"
     SPEAK_OF = "speak of"
-    """They are drafts, possibilities, examples, or what was done before."""
+    """They are drafts, possibilities, examples, or past actions."""
     INSTEAD = "instead"
-    """They are to be done instead of those of earlier sections."""
+    """They replace those of earlier sections."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """One heading; `end` is the offset behind it. A heading may open a section, speak for a team, or both."""
+    """One heading; `end` is the offset after it. A heading may open a section, speak for a team, or both."""
 
     end: int
     section: ReplySection | None = None
@@ -68,12 +68,12 @@ class Heading:
     team: str | None = None
     tone: Tone = Tone.DO
     numbered: bool = False
-    """Whether it counts what it opens, `Action 2:`, so that it goes on with what is above."""
+    """Whether it numbers what it opens, `Action 2:`, so that it continues what is above."""
     explains: bool = False
-    """Whether it opens an explanation of what stands above, of one line unless it stands alone (rule H19)."""
+    """Whether it opens an explanation of the text above, of one line unless it stands alone (rule H19)."""
 
 
-# Possessive quantifiers (`*+`) keep every expression linear: nothing that was eaten is given back. Optional groups that
+# Possessive quantifiers (`*+`) keep every expression linear: they never backtrack. Optional groups that
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
 _BULLET = r"(?:\[[xX]\]|[^\w\n<]|_|[0-9]{1,2}+[.)])*+"
 _CLOSE = r"(?:[^\w\n<:(]*+\([^()\n<]{0,80}+\))?(?:[^\w\n<:]|_)*+"
@@ -137,17 +137,17 @@ _SECTIONS = tuple(
 )
 
 SENTENCE_END = rf"(?:[.!?;][ \t]|。)[*_]*+(?={_KEYWORD}[*_]*+:)"
-"""Regular expression of the end of a sentence behind which a section begins within the line (rule H6)."""
+"""Regular expression of the end of a sentence after which a section begins within the line (rule H6)."""
 JSON_KEY = rf"(?:(?<=[,{{])|(?<=[,{{] ))\"(?={_KEYWORD}\"[ \t]*+:)"
 """The same where a section is a key of JSON."""
 
 
 def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
-    """The heading that stands at this place, behind markup.
+    """Return the heading at this place, after markup.
 
     Args:
         text: the reply.
-        at: offset of a line's start, or behind a call or another heading.
+        at: offset of a line's start, or after a call or another heading.
         line_start: which of the two; within a line a bare name is a team only if no prose word looks like it.
     """
     if json_team := _JSON_AHEAD.match(text, at):
@@ -176,13 +176,13 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
 
 
 def json_heading_at(text: str, at: int) -> Heading | None:
-    """The team that stands here as a value of JSON (rule H21)."""
+    """Return the team here as a value of JSON (rule H21)."""
     match = _JSON.match(text, at)
     return None if match is None else Heading(match.end(), names_team=True, team=_clean(match["team"]))
 
 
 def tag_heading_at(text: str, at: int) -> Heading | None:
-    """The heading written as a tag at this `<`."""
+    """Return the heading written as a tag at this `<`."""
     match = _TAG.match(text, at)
     if match is None:
         return None
@@ -201,7 +201,7 @@ def _section(word: str | None) -> ReplySection | None:
 
 
 def _clean(name: str | None) -> str | None:
-    """The name without quotes, and without the word "actions" behind it."""
+    """Return the name without quotes, and without the word "actions" after it."""
     if name is None:
         return None
     parts = name.strip(QUOTES + " \t_").split()

@@ -1,6 +1,6 @@
-"""Characters: what counts as a quote, which foreign marks stand for which ASCII ones, and what a fault is.
+"""Characters: which are quotes, which foreign marks stand for which ASCII ones, and what a fault is.
 
-The lowest module of the text language; every other one of this package stands on it.
+The lowest module of the text language; all other modules of this package use it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ QUOTES = "'\"`´“”„‟‘’‚‛«»‹›「」『』"  # noqa: RUF001 
 """Every mark that a model puts around a word or a message."""
 
 SHORT = 60
-"""Characters of a name or of a faulty text that are repeated to the model; more would only fill its context."""
+"""Characters of a name or of a faulty text that are quoted to the model; more would only fill its context."""
 
 _ONE_FOR_ONE = (
     {wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F)}
@@ -30,21 +30,21 @@ _BACKSLASHED = re.compile(r"\\([\"'nt])")
 
 
 class MalformedCall(ValueError):
-    """Something that looks like a call and is none; the text is the sentence that the model is told."""
+    """Something that looks like a call, but is not one; the text is the sentence for the model."""
 
 
 def to_ascii(text: str) -> str:
-    """The text with full-width marks as ASCII and line ends as LF, offset for offset the same.
+    """Return the text with full-width marks as ASCII and line ends as LF, each at the same offset.
 
-    What is written with more than one character (`&lt;`, an escaped quote or line end, a tag between angle brackets)
-    becomes the one that it stands for, and blanks.
+    An escape of several characters (`&lt;`, an escaped quote or line end, a tag between angle brackets)
+    becomes the character that it stands for, and blanks.
     """
     plain = text.translate(_ONE_FOR_ONE)
     return _ESCAPED.sub(_as_long, plain) if "&" in plain or "\\" in plain or "<0" in plain else plain
 
 
 def _as_long(match: re.Match[str]) -> str:
-    """What an escape stands for, filled up with blanks to its length."""
+    """Return the character of an escape, padded with blanks to its length."""
     escape = match.group()
     if escape[0] == "<":
         return f" {escape[1:-1]} "
@@ -55,7 +55,7 @@ def _as_long(match: re.Match[str]) -> str:
 
 
 def unescaped(words: str) -> str:
-    """What a message says: without blanks around it, and with the characters that escapes stand for."""
+    """Return the text of a message: without blanks around it, and with the characters that escapes stand for."""
     if "&" in words:
         words = html.unescape(words).strip(QUOTES + " \t\n") if "&#" in words or ";" in words else words
     if "\\" in words:

@@ -4,8 +4,8 @@
     {"name": "Move_Screen", "arguments": {"screen": [3, 4]}}
     {"to": "Commander", "text": "two Roaches"}
 
-Models that were trained on tool calls fall into it. An object counts only if the value for the action is a name, or a
-call without angle brackets; whatever else stands in JSON is read as text. Above it: `khala_protocol.speech.reader`.
+Models that were trained on tool calls tend to write it. An object counts only if the value for the action is a name,
+or a call without angle brackets; any other JSON is read as text. Above it: `khala_protocol.speech.reader`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TEAMS = ("team", "team_name", "group")
 RECIPIENTS = ("to", "recipient")
 TEXTS = ("text", "message", "content")
 LONGEST = 2_000
-"""Characters of an object that are looked at."""
+"""Number of characters of an object that are read."""
 _LOOKS_LIKE_ONE = re.compile(
     rf"\{{[^{{}}]{{0,200}}?\"(?:{'|'.join((*NAMES, *RECIPIENTS))})\"\s*+:\s*+[\"{{]", re.IGNORECASE
 )
@@ -37,7 +37,7 @@ _DECODER = json.JSONDecoder()
 
 @dataclass(frozen=True, slots=True)
 class ObjectCall:
-    """A call as an object: what it says, and the offset behind it."""
+    """A call as an object: its content, and the offset after it."""
 
     name: str
     args: tuple[str | Point, ...]
@@ -55,7 +55,7 @@ class ObjectMessage:
 
 
 def object_at(text: str, at: int) -> ObjectCall | ObjectMessage | None:
-    """What the object at this `{` stands for; None if it is neither a call nor a message."""
+    """Return what the object at this `{` stands for; None if it is neither a call nor a message."""
     if not _LOOKS_LIKE_ONE.match(text, at):
         return None
     try:
@@ -98,7 +98,7 @@ def _first(found: object, keys: tuple[str, ...]) -> object:
 
 
 def _values(given: object) -> list[str | Point]:
-    """Arguments as they stand in JSON: a list, an object of named ones, a single one, or text of one of these."""
+    """Return the arguments in JSON: from a list, an object of named ones, a single one, or text of one of these."""
     if isinstance(given, str) and given.lstrip()[:1] in ("{", "["):
         given = _loaded(given)
     match given:

@@ -1,9 +1,9 @@
-"""A message's recipient and text: where words between quotes end when they may hold anything.
+"""A message's recipient and text: where quoted words end when they may contain anything.
 
-The text is foreign matter: it may have quotes, brackets, line ends and whole calls in it. It ends where its
-quote is followed by `)>`; if its quote is missing, at the `)>` that closes it on the same line. Behind three quotes,
-`>` or a `)` at the line's end will do. A message without angle brackets ends with a `)` at the end of a line.
-Below `khala_protocol.speech.reader`, which knows what a message is for.
+The text is foreign: it may contain quotes, brackets, line ends and whole calls. It ends where its
+quote is followed by `)>`; if its quote is missing, at the `)>` that closes it on the same line. After three quotes,
+`>` or a `)` at the line's end is enough. A message without angle brackets ends with a `)` at the end of a line.
+Below `khala_protocol.speech.reader`, which knows the purpose of a message.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _FAMILIES = ("'´`‘’‚‛‹›", '"“”„‟«»', "「」", "『』") 
 
 @dataclass(frozen=True, slots=True)
 class Addressed:
-    """A message as found: `text[start:stop]` is what it says, `end` the offset behind its `>`."""
+    """A message as found: `text[start:stop]` is its text, `end` the offset after its `>`."""
 
     recipient: str
     start: int
@@ -54,10 +54,10 @@ class Addressed:
 
 
 class MessageReader:
-    """Reads the messages of one reply.
+    """Read the messages of one reply.
 
-    It remembers which quotes are not closed any more in the rest of the text, so that a reply full of
-    openings costs one search and not one each.
+    It remembers which quotes are no longer closed in the rest of the text, so that a reply full of
+    openings costs one search in total, not one per opening.
     """
 
     def __init__(self, text: str) -> None:
@@ -66,12 +66,12 @@ class MessageReader:
         self._not_closed_before = 0
 
     def attributes(self, at: int) -> Addressed | None:
-        """The message whose recipient and text stand as attributes behind `<MessageTo`."""
+        """Return the message whose recipient and text are attributes after `<MessageTo`."""
         found = _ATTRIBUTES.match(self._text, at)
         return None if found is None else Addressed(found["to"], *found.span("text"), found.end())
 
     def element(self, at: int) -> Addressed | None:
-        """The message between `<MessageTo>`, which ends here, and `</MessageTo>`."""
+        """Return the message between `<MessageTo>`, which ends here, and `</MessageTo>`."""
         to = _RECIPIENT.match(self._text, at)
         end = None if to is None or "</" in self._never_closed else _ELEMENT_END.search(self._text, to.end())
         if to is None or end is None:
@@ -85,7 +85,7 @@ class MessageReader:
         return Addressed(recipient, start, stop, end.end()) if recipient and start < stop else None
 
     def read(self, at: int, *, naked: bool = False) -> Addressed:
-        """Reads recipient and text behind `<MessageTo(`, or behind `MessageTo(` if it is naked.
+        """Read recipient and text after `<MessageTo(`, or after `MessageTo(` if it is naked.
 
         Raises:
             MalformedCall: one of them is missing, or the message is not closed.
@@ -105,7 +105,7 @@ class MessageReader:
         return Addressed(recipient, start, stop, end)
 
     def _before_quotes(self, start: int, stop: int) -> int:
-        """Where the words end that have quotes behind them."""
+        """Return where the words before the quotes end."""
         while stop > start and self._text[stop - 1] in QUOTES:
             stop -= 1
         return stop
@@ -144,7 +144,7 @@ class MessageReader:
 
 
 def _end_of(mark: str, *, naked: bool = False) -> re.Pattern[str]:
-    """What ends a text that begins with this quote: the quote and `)>`; or another message that begins the same."""
+    """Return the end of a text that begins with this quote: the quote and `)>`, or another message that begins so."""
     family = next((f"[{family}]" for family in _FAMILIES if mark in family), mark)
     end = _END_OF_NAKED if naked else _END_OF_THREE if mark in _RUNS[:3] else _END
     message = _NAKED_MESSAGE if naked else _MESSAGE

@@ -1,8 +1,7 @@
 """One pass over a reply, from mark to mark and never back.
 
-Above it: `khala_protocol.speech`, which says the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting`
-and
-`objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
+Above it: `khala_protocol.speech`, which lists the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting`
+and `objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ if TYPE_CHECKING:
 
 
 def parse(text: str) -> Speech:
-    """Reads a reply. Never raises; see the table of `khala_protocol.speech`."""
+    """Read a reply. Never raise; see the table of `khala_protocol.speech`."""
     walk = _Walk(text)
     walk.run()
     return walk.gathering.speech()
@@ -114,7 +113,7 @@ class _Walk:
     def _closing_tags(self) -> frozenset[str]:
         return closing_tags(self._plain)
 
-    # Each of the following takes what stands at one place and returns the offset behind it.
+    # Each of the following reads the thing at one place and returns the offset after it.
 
     def comment(self, mark: re.Match[str]) -> int:  # S24
         return max(mark.end(), self._plain.find("-->", mark.end()))
@@ -198,7 +197,7 @@ class _Walk:
         if end is not None:
             return self._line(end.end())
         reason = "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>"
-        self._section = ReplySection.ACTIONS  # never a mention, wherever it stands
+        self._section = ReplySection.ACTIONS  # never a mention, in any section
         self._fault(begin.start(), begin.end(), "", reason)
         return len(self._text)
 
@@ -210,7 +209,7 @@ class _Walk:
         return heading.end
 
     def _object(self, start: int) -> int | None:
-        """A call or a message as an object of JSON; None if there is none at this `{`."""
+        """Read a call or a message as an object of JSON; return None if there is none at this `{`."""
         found = object_at(self._plain, start)
         if found is None:
             return None
@@ -221,7 +220,7 @@ class _Walk:
         return found.end
 
     def _naked(self, at: int) -> int | None:
-        """A call without angle brackets; None if there is none."""
+        """Read a call without angle brackets; return None if there is none."""
         talk, naked = naked_talk_at(self._plain, at), naked_at(self._plain, at)
         if (found := talk or naked) is None:
             return None
@@ -290,7 +289,7 @@ class _Walk:
         return end
 
     def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
-        """Arguments at this place, if all of them are tags and points; otherwise none."""
+        """Return the arguments at this place, if all of them are tags and points; otherwise none."""
         args = read_arguments(self._plain[start:stop])
         return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
 
@@ -331,7 +330,7 @@ class _Walk:
         self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
 
     def _section_at(self, start: int) -> ReplySection:
-        """The section that something at this place stands in."""
+        """Return the section at this place."""
         return ReplySection.ANALYSIS if start < self._aside_until else self._section
 
 
@@ -347,4 +346,4 @@ _READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {
     "quoted": _Walk.quoted,
     "angle": _Walk.angle,
 }
-"""What reads on at each kind of mark; each returns the offset behind what it read."""
+"""The method for each kind of mark; each returns the offset after what it read."""

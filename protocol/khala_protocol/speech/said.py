@@ -1,7 +1,7 @@
-"""What a reply says, and what of all that stands in it counts.
+"""The content of a reply, and which parts of it count.
 
-`khala_protocol.speech.reader` walks over the text and puts here what it finds; which calls are orders, which are only
-spoken of, and what was said twice is decided when the whole is known.
+`khala_protocol.speech.reader` walks over the text and collects here what it finds. At the end this module decides
+which calls are orders, which are only mentioned, and which were repeated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from khala_protocol.speech.headings import ReplySection
 
 @dataclass(frozen=True, slots=True)
 class MessageTo:
-    """Words for another agent, or for everybody on a channel; `reply[start:end]` is the call."""
+    """A message for another agent, or for all listeners of a channel; `reply[start:end]` is the call."""
 
     recipient: str
     text: str
@@ -25,7 +25,7 @@ class MessageTo:
 
 @dataclass(frozen=True, slots=True)
 class ListenTo:
-    """The wish to hear a channel; `reply[start:end]` is the call."""
+    """A request to hear a channel; `reply[start:end]` is the call."""
 
     channel: str
     start: int
@@ -34,14 +34,14 @@ class ListenTo:
 
 @dataclass(frozen=True, slots=True)
 class Speech:
-    """What a reply says, in the order of the text.
+    """The content of a reply, in the order of the text.
 
     Attributes:
         calls: actions to carry out.
         messages: messages to agents or channels.
         listens: channels to listen to.
-        faults: what looked like one of these and is none, reason `malformed`.
-        mentions: actions that are only spoken of and not to be carried out (rules S10, S24, S25, S27, H18, H19).
+        faults: text that looks like one of these, but is not; reason `malformed`.
+        mentions: actions that are only mentioned, not ordered (rules S10, S24, S25, S27, H18, H19).
     """
 
     calls: tuple[Call, ...] = ()
@@ -60,7 +60,7 @@ class _Found:
     kind: ReplySection
     """The section that it belongs under."""
     section: ReplySection
-    """The section that it stands in."""
+    """The section that contains it."""
     block: int
     taken_back: bool
 
@@ -71,13 +71,13 @@ class _Found:
 
 @dataclass(slots=True)
 class Gathering:
-    """All that was found in a reply so far."""
+    """Everything found in a reply so far."""
 
     headed: set[ReplySection] = field(default_factory=set)
     """The sections that have a heading."""
     _found: list[_Found] = field(default_factory=list)
     _orders: dict[str | None, list[_Found]] = field(default_factory=dict)
-    """What was ordered and not withdrawn, by team."""
+    """The calls that were ordered and not withdrawn, by team."""
     _gave_orders: bool = False
     _titles: list[str] = field(default_factory=lambda: [""])
     """Headings of the blocks of the reply, by their numbers; the first one has none."""
@@ -86,16 +86,16 @@ class Gathering:
         return bool(self._found)
 
     def open_block(self, title: str) -> None:
-        """A section begins under this heading."""
+        """Begin a section under this heading."""
         self._titles.append("".join(filter(str.isalnum, title)).casefold())
 
     def add(self, item: Item, kind: ReplySection, section: ReplySection, *, taken_back: bool = False) -> None:
-        """Something was found.
+        """Add an item.
 
         Args:
             item: what it is.
             kind: the section that it belongs under.
-            section: the section that it stands in.
+            section: the section that contains it.
             taken_back: whether words around it say that it is not meant.
         """
         found = _Found(item, kind, section, len(self._titles) - 1, taken_back)
@@ -105,17 +105,17 @@ class Gathering:
             self._gave_orders |= section is ReplySection.ACTIONS
 
     def has_orders(self) -> bool:
-        """Whether a section of actions gave any."""
+        """Return whether a section of actions gave any."""
         return self._gave_orders
 
     def withdraw_orders(self, team: str | None) -> None:
-        """What was ordered so far is not meant any more; of one team only, if it is named."""
+        """Withdraw all orders so far; of one team only, if it is named."""
         for name in list(self._orders) if team is None else [team]:
             for found in self._orders.pop(name, ()):
                 found.taken_back = True
 
     def speech(self) -> Speech:
-        """What counts of it."""
+        """Return what counts of it."""
         repeated = self._repeated()
         said: list[Item] = []
         mentioned: list[Call] = []
@@ -134,7 +134,7 @@ class Gathering:
         )
 
     def _repeated(self) -> set[tuple[ReplySection, int]]:
-        """Blocks that say under the same heading what an earlier one says (rule S27)."""
+        """Return the blocks that repeat an earlier one under the same heading (rule S27)."""
         if len(set(self._titles)) == len(self._titles):
             return set()
         blocks: dict[tuple[ReplySection, int], list[tuple[object, ...]]] = {}
@@ -152,7 +152,7 @@ class Gathering:
 
 
 def _words(item: Item) -> tuple[object, ...]:
-    """What something says, without its place."""
+    """Return the words of an item, without its place."""
     match item:
         case Call():
             return item.team, item.name, item.args

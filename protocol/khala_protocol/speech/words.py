@@ -1,6 +1,6 @@
 """Words of headings in the languages that models answer in: sections of a reply, teams, all teams, negations.
 
-Regular expressions without groups, to be matched without regard to case. A language that is not here costs little:
+Regular expressions without groups, to be matched without regard to case. A language that is missing costs little:
 sections without a heading count as they stand. Above it: `khala_protocol.speech.headings` and
 `khala_protocol.speech.reader`.
 """
@@ -23,9 +23,9 @@ TEAM = (
     r"teams?\b|squads?\b|gruppe\b|equipos?\b|[ée]quipes?\b|squadra\b|команда\b|drużyna\b|tak[\u0131i]m\b|đội\b|"
     "队伍|小队|团队|隊伍|小隊|チーム|팀"
 )
-"""The word in front of a team's name."""
+"""The word before a team's name."""
 TEAM_BEHIND = r"[ \t]+team\b|[ \t]*+(?:队伍|小队|团队|隊伍|小隊|チーム|팀)"
-"""The same behind the name."""
+"""The same after the name."""
 EVERY_TEAM = (
     r"(?:all|both|each|every)[ \t]+(?:\w++[ \t]+)??teams?|alle[ \t]+(?:teams|gruppen)|beide[ \t]+teams|"
     "todos los equipos|todas as equipes|toutes les équipes|все команды|所有(?:队伍|小队|团队|隊伍)|全部(?:队伍|小队)|"
@@ -35,17 +35,17 @@ NOT_TO_DO = (
     "draft|initial|tentative|possible|potential|candidate|alternative|other|valid|available|legal|previous|last|past|"
     "earlier|old|rejected|discarded|considered|example|sample|backup|fallback"
 )
-"""Words before "actions" that say that what follows is not to be carried out."""
+"""Words before "actions" that say that the following is not to be carried out."""
 INSTEAD = "final|revised|corrected|updated|definitive|definite|actual"
-"""Words before "actions" that take back what stands under such a heading before."""
+"""Words before "actions" that withdraw earlier text under such a heading."""
 EXPLANATION = "explanations?|rationale|justification|summary|conclusion|erklärung|explicación|解释|说明|总结"
 """Words that open an explanation of what was said."""
 REMARKS = "notes?|remarks?|comments?|strategy|next steps?|reasoning|anmerkungen|notas|备注"
-"""Headings of what else may stand behind the actions."""
+"""Headings of other text that may follow the actions."""
 NEGATION = (
     r"\b(?:do(?:es)?[ \t]++not|don['’´`]t|doesn['’´`]t|must[ \t]++not|should[ \t]++not|won['’´`]t|not|never|avoid|"  # noqa: RUF001  # apostrophes as they are written
     r"instead[ \t]++of|rather[ \t]++than|without|no|nicht|kein[en]?|statt|ohne|ne[ \t]++pas|pas[ \t]++de|"
     r"en[ \t]++lugar[ \t]++de|sin|nunca|não|non|не|вместо|"
     r"not[ \t]++yet:?+|(?:never|avoid|do[ \t]++not|don't):)|不要|不用|不能|别|請勿|请勿|而不是"
 )
-"""What takes back the call right behind it."""
+"""Words that withdraw the call right after them."""

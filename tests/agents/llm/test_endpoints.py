@@ -161,7 +161,7 @@ async def test_refreshing_raises_nothing_when_nobody_is_there() -> None:
 
 
 class Recorder:
-    """A server that writes down what it is asked, and answers what it is told to."""
+    """A server that records its requests, and sends the given answers."""
 
     def __init__(self, answer: Any = None, status: int = 200) -> None:
         self.requests: list[tuple[str, dict[str, str], Any]] = []

@@ -1,4 +1,4 @@
-"""Pictures in requests: the forms of OpenAI and of Anthropic to the letter."""
+"""Pictures in requests: exactly the forms of OpenAI and of Anthropic."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PROMPT = (
 
 
 class Server:
-    """Notes the bodies that it is sent."""
+    """Note the bodies of requests."""
 
     def __init__(self) -> None:
         self.bodies: list[Any] = []

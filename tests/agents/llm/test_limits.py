@@ -1,4 +1,4 @@
-"""Limits that agents share: who waits how long, and what is refused."""
+"""Limits that agents share: how long each agent waits, and what is refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ONE = Usage(requests=1, prompt_tokens=100, completion_tokens=100, cost_usd=0.3)
 async def use(
     limits: Limits, *, tokens: int = 100, takes_s: float = 0.0, usage: Usage | None = ONE, deadline: float | None = None
 ) -> float:
-    """Makes one request; returns when it was let in."""
+    """Make one request; return when it was admitted."""
     async with limits.admit(tokens=tokens, deadline=deadline) as ticket:
         admitted = asyncio.get_running_loop().time()
         await asyncio.sleep(takes_s)

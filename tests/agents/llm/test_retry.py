@@ -1,4 +1,4 @@
-"""Which failures are tried again, after what wait, and never past the deadline."""
+"""Which failures are retried, after what wait, and never past the deadline."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ async def run(model: Any, rule: RetryRule = EXACT, deadline: float | None = None
     return await retried(failing(model), rule, deadline=deadline, rng=random.Random(seed))
 
 
-# status → what it is, tried again; the list of `khala_agents.llm.retry` and `khala_agents.llm.http`, as a table
+# status → error, retried; the list of `khala_agents.llm.retry` and `khala_agents.llm.http`, as a table
 STATUSES = [
     (300, RequestRefused, False),
     (400, RequestRefused, False),
@@ -136,7 +136,7 @@ async def test_retry_after_is_a_minimum(listed_model: Callable[..., Any], asked_
     assert model.times_s == [0, waited_s]
 
 
-# (deadline, Retry-After) → when the error comes up: no wait is begun that would end at or after the deadline
+# (deadline, Retry-After) → when the error is raised: no wait is begun that would end at or after the deadline
 DEADLINES = [(100.0, None, 31.0), (7.5, None, 7.0), (7.0, None, 3.0), (1.0, None, 0.0), (60.0, 61.0, 0.0)]
 
 

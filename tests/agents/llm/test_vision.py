@@ -1,4 +1,4 @@
-"""What pictures cost, by the rule of each kind of endpoint, and what a model file says of a model that sees."""
+"""The cost of pictures, by the rule of each kind of endpoint, and the settings of a model that sees."""
 
 from __future__ import annotations
 

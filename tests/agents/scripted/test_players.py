@@ -23,7 +23,7 @@ OBSERVATION = (Path(__file__).parent / "observation.txt").read_text(encoding="ut
 
 
 def quiet() -> random.Random:
-    """A generator whose first roll is no message."""
+    """Return a generator whose first roll is no message."""
     return random.Random(2)
 
 

@@ -22,7 +22,7 @@ BASIC = ("Move_Screen(screen)", "Move_Minimap(minimap)", "Attack_Unit(tag)", "Se
 def line(
     tag: int, name: str, x: float, y: float, *fields: str, health: str = "100/100", far: float | None = None
 ) -> str:
-    """A unit as an observation lists it; `far` is its distance, of enemies."""
+    """Return a unit as an observation lists it; `far` is its distance, of enemies."""
     distance = () if far is None else (f"distance {far}",)
     return " | ".join((name, f"tag 0x{tag:x}", f"screen [{x}, {y}]", *distance, f"health {health}", *fields))
 
@@ -37,7 +37,7 @@ def page(
     minimap: str = "[30, 32]",
     hit: str = "",
 ) -> str:
-    """An observation of one team, T."""
+    """Return an observation of one team, T."""
     lists = {"Your units": own, "Allied units": tuple(allies), "Enemy units": tuple(enemies)}
     blocks = [
         f"    {title}:\n" + "".join(f"        {unit}\n" for unit in units) for title, units in lists.items() if units
@@ -53,7 +53,7 @@ def page(
 
 
 def calls(text: str) -> list[str]:
-    """What it orders, `Attack_Unit 0x1`."""
+    """Return its orders, `Attack_Unit 0x1`."""
     speech = parse(skilled(text, random.Random(1)))
     assert speech.faults == ()
     return [" ".join((call.name, *(str(arg) for arg in call.args))) for call in speech.calls]

@@ -1,4 +1,4 @@
-"""The simulator's tables beside what agents are told, for each version of the game."""
+"""The simulator's tables next to the facts that agents read, for each version of the game."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ UPGRADES = {int(member): member.name for member in upgrades.Upgrades}
 
 @pytest.fixture(params=VERSIONS)
 def version(request: pytest.FixtureRequest) -> str:
-    """Each version of the game that there are facts of."""
+    """Return each version of the game that has facts."""
     return str(request.param)
 
 
 @pytest.fixture
 def tables(version: str) -> Catalog:
-    """The simulator's tables of that version."""
+    """Return the simulator's tables of that version."""
     return load_catalog(version)
 
 
 @pytest.fixture
 def names() -> dict[str, str]:
-    """PySC2's names of unit types and upgrades by the tables' names; its numbers are those of 4.10."""
+    """Return PySC2's names of unit types and upgrades by the tables' names; its numbers are those of 4.10."""
     old = load_catalog("4.10")
     named = {unit.name: UNITS[unit.id] for unit in old.units if unit.id in UNITS and not unit.like}
     return named | {upgrade.name: UPGRADES[upgrade.id] for upgrade in old.upgrades if upgrade.id in UPGRADES}
@@ -42,6 +42,6 @@ def names() -> dict[str, str]:
 
 @pytest.fixture
 def table_names(names: dict[str, str]) -> Callable[[str], str]:
-    """The tables' name of what the bridge calls so."""
+    """Return a function from the bridge's name to the tables' name."""
     back = {ours: own for own, ours in names.items()}
     return lambda name: back.get(name, name)

@@ -1,4 +1,4 @@
-"""What agents are told of abilities is what the simulator plays by."""
+"""The facts that agents read about abilities are those that the simulator plays by."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEAST = {"4.10": 480, "5.0.13": 490}
 
 
 def special(version: str) -> dict[int, AbilityFacts]:
-    """What is known of abilities that are not general ones."""
+    """Return the facts of abilities that are not general ones."""
     return {number: known for number, known in abilities(version).items() if known.does != "general"}
 
 
@@ -100,7 +100,7 @@ def test_every_ability_of_a_command_card_that_does_something_is_known(version: s
 
 
 def _count(need: Need, owned: set[str], names: dict[str, str], addon: str) -> float:
-    """The value of a condition for a player who has exactly these things, of a unit in the state that it asks for."""
+    """Return the value of a condition for a player who owns exactly these things, of a unit in the required state."""
     parts = [_count(part, owned, names, addon) for part in need.parts]
     rules: dict[str, Callable[[], float]] = {
         "const": lambda: need.value or 0,

@@ -19,7 +19,7 @@ NOTHING = "khala: nothing in version 4.10 of the game is called"
 
 
 def said(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    """Exit code, output and errors of `khala knowledge`."""
+    """Return exit code, output and errors of `khala knowledge`."""
     with pytest.raises(SystemExit) as exit_:
         main(["knowledge", *arguments])
     out, err = capsys.readouterr()

@@ -1,4 +1,4 @@
-"""What agents are told of unit types is what the simulator plays by."""
+"""The facts that agents read about unit types are those that the simulator plays by."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_weapons_are_those_that_the_api_tells(version: str, tables: Catalog, tab
         ("Carrier", [("any", 8, 0, 5, 16, {})]),  # eight Interceptors with two beams each
         ("Battlecruiser", [("ground", 6, 0, 8, 1, {}), ("air", 6, 0, 5, 1, {})]),
         ("Baneling", [("ground", 0.25, 0, 20, 1, {"light": 15, "structure": 60})]),
-        ("BroodlingEscort", []),  # its hit is told as the Brood Lord's
+        ("BroodlingEscort", []),  # its hit is listed with the Brood Lord
         ("LocustFlying", []),
         ("Oracle", []),  # until it is switched on
     ],

@@ -1,4 +1,4 @@
-"""What agents are told of upgrades and buffs is what the simulator plays by."""
+"""The facts that agents read about upgrades and buffs are those that the simulator plays by."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
 
 WITHOUT, WITH = 0, 1
-"""Two players, of whom one has the upgrade."""
+"""Two players, one with the upgrade."""
 
 
 def test_prices_times_and_places_are_those_of_the_research(
@@ -70,7 +70,7 @@ def test_an_upgrade_requires_what_its_research_requires_and_enables_what_require
 
 
 def _played(stats: Stats, unit: UnitType) -> dict[str, float]:
-    """What an upgrade changes for a type in the simulator's own rules, in our words."""
+    """Return what an upgrade changes for a type in the simulator's own rules, in our words."""
     columns = {
         "health": stats.life_max,
         "armor": stats.armor,
@@ -88,7 +88,7 @@ def _played(stats: Stats, unit: UnitType) -> dict[str, float]:
 
 
 def _hurts_more(stats: Stats, unit: UnitType) -> set[float]:
-    """By how much hits of a type grow, on plain targets and on each attribute."""
+    """Return by how much hits of a type grow, on plain targets and on each attribute."""
     found = set()
     for weapon in unit.weapons:
         pairs = zip(stats.damage[WITHOUT][weapon.row], stats.damage[WITH][weapon.row], strict=True)

@@ -1,4 +1,4 @@
-"""Fixtures of the bus: where to meet, and whom."""
+"""Fixtures of the bus: endpoints, and peers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PEER = str(Path(__file__).parent / "peer.py")
 
 @pytest.fixture
 def socket() -> Iterator[str]:
-    """An endpoint of its own. Not below `tmp_path`, as the path of a unix socket has at most 107 bytes."""
+    """Return its own endpoint. Not below `tmp_path`, as the path of a unix socket has at most 107 bytes."""
     directory = Path(tempfile.mkdtemp(prefix="bus"))
     yield f"unixsock-stream/{directory}/bus.sock"
     shutil.rmtree(directory)
@@ -33,7 +33,7 @@ def socket() -> Iterator[str]:
 
 @pytest.fixture
 async def opened() -> AsyncIterator[OpenBus]:
-    """Opens sessions of Zenoh and closes them in the end."""
+    """Open sessions of Zenoh and close them at the end."""
     async with AsyncExitStack() as sessions:
 
         async def open_one(config: BusConfig) -> ZenohBus:
@@ -46,7 +46,7 @@ async def opened() -> AsyncIterator[OpenBus]:
 
 @pytest.fixture
 async def start() -> AsyncIterator[StartPeer]:
-    """Starts `peer.py` in a role, waits until it is up, and kills it in the end."""
+    """Start `peer.py` in a role, wait until it is up, and kill it at the end."""
     async with AsyncExitStack() as processes:
 
         async def start_one(*arguments: str, command: tuple[str, ...] = ()) -> Process:

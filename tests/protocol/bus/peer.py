@@ -14,7 +14,7 @@ from khala_protocol.bus.zenoh import open_bus
 
 
 async def agent(*endpoints: str) -> None:
-    """Replies to each observation with its first eight bytes."""
+    """Reply to each observation with its first eight bytes."""
     bus = await open_bus(BusConfig(connect=endpoints))
     observations = await bus.subscribe("agent/observation", Delivery.STATE, depth=1)
     replies = await bus.publisher("agent/reply", Delivery.SPEECH)
@@ -26,7 +26,7 @@ async def agent(*endpoints: str) -> None:
 
 
 async def router(*endpoints: str) -> None:
-    """Routes until it is killed."""
+    """Route until killed."""
     await open_bus(BusConfig(mode="router", listen=endpoints, insecure=True))
     sys.stdout.write("up\n")
     sys.stdout.flush()
@@ -34,7 +34,7 @@ async def router(*endpoints: str) -> None:
 
 
 async def forgetful(*endpoints: str) -> None:
-    """Uses everything, closes nothing, and ends."""
+    """Use everything, close nothing, and end."""
     bus = await open_bus(BusConfig(connect=endpoints))
     for delivery in Delivery:
         subscription = await bus.subscribe("a/*", delivery)

@@ -1,4 +1,4 @@
-"""What is refused before a socket is opened, and what Zenoh is told."""
+"""What is refused before a socket is opened, and the settings that Zenoh gets."""
 
 from __future__ import annotations
 

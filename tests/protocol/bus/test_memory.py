@@ -1,4 +1,4 @@
-"""What the in-memory bus can play: death and broken links."""
+"""What the in-memory bus can simulate: death and broken links."""
 
 from __future__ import annotations
 

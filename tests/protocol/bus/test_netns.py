@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.netns,
     pytest.mark.skipif(os.geteuid() != 0 or shutil.which("ip") is None, reason="needs root and iproute2"),
 ]
-ROUTER_ADDRESS, AGENT_ADDRESS = "198.18.77.1", "198.18.77.2"  # of the block that is set aside for benchmarks
+ROUTER_ADDRESS, AGENT_ADDRESS = "198.18.77.1", "198.18.77.2"  # of the block that is reserved for benchmarks
 
 
 def ip(*arguments: str) -> None:

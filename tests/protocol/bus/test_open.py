@@ -1,4 +1,4 @@
-"""What is said when a session cannot be opened."""
+"""The error when a session cannot be opened."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 async def stranger() -> AsyncIterator[int]:
-    """The port of a server that is no router: it hangs up."""
+    """Yield the port of a server that is no router: it hangs up."""
 
     async def hang_up(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.close()

@@ -1,4 +1,4 @@
-"""The parts that both buses, or the one over Zenoh, are made of."""
+"""The parts of both buses, or of the one over Zenoh."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_mailbox_outlives_its_loop() -> None:
 
 
 class Inline(Executor):
-    """Counts what it is given, and runs it at once."""
+    """Count what it is given, and run it at once."""
 
     def __init__(self) -> None:
         self.given = 0
@@ -118,7 +118,7 @@ class Inline(Executor):
 
 
 class Peer:
-    """Takes puts and answers questions when told to."""
+    """Take puts and answer questions on demand."""
 
     def __init__(self) -> None:
         self.taken: list[bytes] = []

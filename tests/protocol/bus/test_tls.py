@@ -1,4 +1,4 @@
-"""Who is let in over TLS, and who is not."""
+"""Who may connect over TLS, and who may not."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NEW_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-d
 
 
 class Authority:
-    """Makes certificates in a directory of its own."""
+    """Make certificates in its own directory."""
 
     def __init__(self, directory: Path) -> None:
         directory.mkdir()
@@ -31,7 +31,7 @@ class Authority:
         self._openssl("req", "-x509", *NEW_KEY, "-subj", "/CN=authority", "-keyout", "ca.key", "-out", "ca.pem")
 
     def certify(self, name: str, trusting: Authority | None = None) -> TlsFiles:
-        """A certificate for this machine, whose holder trusts `trusting`, or this authority."""
+        """Return a certificate for this machine, whose holder trusts `trusting`, or this authority."""
         (self._directory / "names").write_text("subjectAltName=IP:127.0.0.1,DNS:localhost")
         request = ("-keyout", f"{name}.key", "-out", f"{name}.csr")
         self._openssl("req", *NEW_KEY[:-2], "-subj", f"/CN={name}", *request)

@@ -1,4 +1,4 @@
-"""What only happens where there are processes, links and a router."""
+"""Behaviour that needs processes, links and a router."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ async def test_cancelling_a_subscribe_leaves_nothing_behind(opened: OpenBus) -> 
         async with asyncio.timeout(0):
             await bus.subscribe("a/b", Delivery.SPEECH)
             pytest.fail("it was not cancelled")
-    await (await bus.subscribe("a/b", Delivery.SPEECH)).close()  # by then, Zenoh has let go of the first
+    await (await bus.subscribe("a/b", Delivery.SPEECH)).close()  # by then, Zenoh has released the first
     assert mailboxes() == before
 
 

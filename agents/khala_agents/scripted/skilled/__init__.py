@@ -2,9 +2,9 @@
 
     skilled(observation, rng) -> reply
 
-`kinds` is what anybody knows who plays StarCraft II; `space` is geometry on a screen; `plan` collects the calls of a
+`kinds` is common knowledge of StarCraft II players; `space` is geometry on a screen; `plan` collects the calls of a
 team; `skills`, `combat` and `journey` fill it for units, `economy` for the whole side. It keeps nothing from one
-observation to the next, so that it can be asked like a model; what it would have to remember it reads from the text.
+observation to the next, so that it can be asked like a model: it reads from the text whatever it needs to know.
 """
 
 from khala_agents.scripted.skilled.player import skilled

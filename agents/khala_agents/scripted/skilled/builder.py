@@ -1,6 +1,6 @@
 """Placing structures by hand with one worker: where there is room on the screen, and power if it is needed.
 
-The same wants as in `builds` decide what is built; where is guessed from what the screen shows, and mended by the
+The same wants as in `builds` decide what is built. The place is guessed from the screen, and corrected by the
 place that the host names when it refuses one.
 """
 
@@ -26,21 +26,21 @@ UNPOWERED = frozenset({"Pylon", "Nexus", "Assimilator"})
 FIELD = 5.5
 """How far from a Pylon a structure is put."""
 ROOM = {"Nexus": 4.6, "Pylon": 2.6}
-"""Between the middles of a structure of three cells and another one, with a cell to walk on."""
+"""Distance of two middles of structures of three cells, with a cell between them to walk on."""
 PLAIN_ROOM = 3.6
 FROM_MINERALS = 3.5
 _HINT = re.compile(r"free place is (\[[^\]]*\])")
 
 
 def leads(plan: ReplyPlan) -> bool:
-    """Whether a team is a builder: workers that may build, now or later."""
+    """Return whether a team is a builder: workers that may build, now or later."""
     names = {action.name for action in plan.team.actions} | plan.situation.impossible
     workers = all(kind_of(unit).role == "worker" for unit in plan.team.own)
     return workers and any(name.startswith("Build_") for name in names)
 
 
 def build(plan: ReplyPlan) -> None:
-    """Begins the first structure that is wanted and can be paid, if the worker is free."""
+    """Begin the first structure that is wanted and can be paid, if the worker is free."""
     team, situation = plan.team, plan.situation
     if any(unit.order.startswith("Build") for unit in team.own):
         return
@@ -58,7 +58,7 @@ def build(plan: ReplyPlan) -> None:
 
 
 def _begin(plan: ReplyPlan, what: str) -> bool:
-    """Orders a structure; says whether it could be."""
+    """Order a structure; return whether that was possible."""
     team, situation = plan.team, plan.situation
     if what in {"Nexus", "Assimilator"}:
         wanted = "VespeneGeyser" if what == "Assimilator" else ""
@@ -71,7 +71,7 @@ def _begin(plan: ReplyPlan, what: str) -> bool:
 
 
 def _hint(plan: ReplyPlan, what: str) -> Point | None:
-    """The place that the host named when it refused the last one."""
+    """Return the place that the host named when it refused the last one."""
     for text in plan.situation.rejected:
         if f"Build_{what}_Screen" in text and (found := _HINT.search(text)):
             return points(found[1])[0]
@@ -79,7 +79,7 @@ def _hint(plan: ReplyPlan, what: str) -> Point | None:
 
 
 def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
-    """A free place: by a Pylon for what needs power, near the base for Pylons; whole cells for odd sizes in halves."""
+    """Return a free place: by a Pylon if it needs power, near the base for Pylons; whole cells for odd sizes."""
     half = 0.0 if what == "Pylon" else 0.5
     halls = [unit for unit in team.allies if unit.type in TOWN_HALLS]
     x0, x1, y0, y1 = (int(edge) for edge in team.bounds)
@@ -105,7 +105,7 @@ def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
 
 
 def _between(at: Point, halls: Sequence[TextUnit], resources: Sequence[Point]) -> bool:
-    """Whether workers pass there on their way between minerals and base."""
+    """Return whether workers pass there on their way between minerals and base."""
     return any(
         distance(at, hall) + distance(at, resource) < distance(resource, hall) + 2.0
         for hall in halls

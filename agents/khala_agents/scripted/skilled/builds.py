@@ -1,4 +1,4 @@
-"""Build orders of the three races, as tables: plain ones, that lead to an army of one or two kinds of units."""
+"""Build orders of the three races, as tables: simple ones that lead to an army of one or two kinds of units."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ if TYPE_CHECKING:
 
 
 class Want(NamedTuple):
-    """Something that there should be."""
+    """Something that the side should have."""
 
     action: str
     makes: str
     """Unit types that count for it, with a bar between them, or the upgrade."""
     wanted: int = 1
     after: Mapping[str, int] = {}
-    """What has to be there before its turn comes, by type."""
+    """What must exist before its turn comes, by type."""
     per_hall: bool = False
     """Whether the count is for each base."""
     at_once: bool = False
-    """Whether no more of it are made at a time than there are bases."""
+    """Whether at most as many of it are made at a time as there are bases."""
     upgrade: bool = False
     first: bool = False
-    """Whether what comes after it waits until it can be paid."""
+    """Whether later wants wait until it can be paid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +32,14 @@ class Build:
     """The build order of a race."""
 
     signs: tuple[str, ...]
-    """Actions by which it is seen whose turn it is."""
+    """Actions that show which race is playing."""
     supply: Want
     supply_minerals: int
     wants: tuple[Want, ...]
     army: tuple[str, ...]
     """Actions that make units of the army, the best first."""
     producers: tuple[str, ...] = ()
-    """Types of the structures that make them one at a time; () if larvae do."""
+    """Types of the structures that make them one at a time; () for larvae."""
     structures: tuple[str, ...] = field(default=())
 
 

@@ -1,7 +1,7 @@
-"""Fighting with one team: whom to shoot, when to step back, whom to pull out of the fight.
+"""Fight with one team: choose a target, step back, pull hurt units out of the fight.
 
-The team shoots at the enemy whose loss helps most for the time that it takes; while its weapons cool down it steps out
-of the reach of slower or shorter-ranged enemies; units that are nearly dead blink or walk out of reach first.
+The team shoots at the enemy whose loss helps most for the time it takes. While its weapons cool down, it steps out
+of the reach of slower or shorter-ranged enemies. Units that are nearly dead blink or walk out of reach first.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ BLINK = 7.5
 WALK_COST = 1.5
 """World units of walking that halve what a target is worth."""
 MELEE_WALK_COST = 1.0
-"""The same for those who stand in each other's way."""
+"""The same for units that stand in each other's way."""
 COOLING_S = 0.3
 CLINGING = 230.0
-"""Worth of a runner at one's heels during a raid; a worker is worth 200."""
+"""Worth of an enemy that chases the team closely during a raid; a worker is worth 200."""
 
 
 def targets(team: TextTeam) -> list[TextUnit]:
-    """The enemies that some unit of the team has a weapon against."""
+    """Return the enemies that some unit of the team has a weapon against."""
     mine = [kind_of(unit) for unit in team.own]
     return [
         enemy for enemy in team.enemies if enemy.type not in IGNORED and any(kind.hits(kind_of(enemy)) for kind in mine)
@@ -40,7 +40,7 @@ def targets(team: TextTeam) -> list[TextUnit]:
 
 
 def threats(team: TextTeam) -> list[TextUnit]:
-    """The enemies that have a weapon against some unit of the team."""
+    """Return the enemies that have a weapon against some unit of the team."""
     mine = [kind_of(unit) for unit in team.own]
     return [
         enemy
@@ -50,11 +50,11 @@ def threats(team: TextTeam) -> list[TextUnit]:
 
 
 def worth(enemy: TextUnit, prey: str) -> float:
-    """What it is worth to be rid of an enemy.
+    """Return the worth of killing an enemy.
 
     Args:
         enemy: of the other side.
-        prey: what the team is after besides the fight: "worker" or "hall"; "" for nothing.
+        prey: what else the team hunts, beyond the fight: "worker" or "hall"; "" for nothing.
     """
     kind = kind_of(enemy)
     value = kind.damage
@@ -68,7 +68,7 @@ def worth(enemy: TextUnit, prey: str) -> float:
 
 
 def support(teams: Iterable[TextTeam]) -> dict[str, float]:
-    """By the tag of an enemy: how many units of all teams have it in reach, or nearly."""
+    """Return, by the tag of an enemy, how many units of all teams have it in reach, or nearly."""
     count: dict[str, float] = {}
     for team in teams:
         for enemy in team.enemies:
@@ -78,9 +78,9 @@ def support(teams: Iterable[TextTeam]) -> dict[str, float]:
 
 
 def best_target(plan: ReplyPlan, prey: str = "") -> TextUnit | None:
-    """The enemy whose loss helps most for the time and the way that it takes; None without targets.
+    """Return the enemy whose loss helps most for the time and the way it takes; None without targets.
 
-    What others have in reach, too, is the better target.
+    A target that other teams reach as well is better.
     """
     team, most = plan.team, max(1.0, *plan.support.values()) if plan.support else 1.0
     shooters = [unit for unit in team.own if kind_of(unit).reach >= 0]
@@ -94,7 +94,7 @@ def best_target(plan: ReplyPlan, prey: str = "") -> TextUnit | None:
         way = ways[len(ways) // 2]
         value = worth(enemy, prey)
         if prey == "worker" and kind_of(enemy).melee and any(_gap(enemy, unit) < 1.0 for unit in team.own):
-            value = max(value, CLINGING)  # who is caught by runners cannot raid
+            value = max(value, CLINGING)  # a team that is chased closely cannot raid
         shared = 0.5 + plan.support.get(enemy.tag, 0.0) / most
         return -shared * value / (enemy.hit_points + 30.0) / 2 ** (way / patience), enemy.tag
 
@@ -102,13 +102,13 @@ def best_target(plan: ReplyPlan, prey: str = "") -> TextUnit | None:
 
 
 def fight(plan: ReplyPlan, prey: str = "") -> bool:
-    """Plans a fight of one team against what it sees; says whether there is one."""
+    """Plan a fight of one team against the enemies it sees; return whether there is one."""
     team = plan.team
     target = best_target(plan, prey)
     foes = threats(team)
     if target is None and not foes:
         return False
-    if prey != "hall":  # who destroys a base does not come back
+    if prey != "hall":  # a team that destroys a base does not come back
         save_the_hurt(plan, foes)
     if target is None:
         return bool(prey) or _keep_off(plan, foes)
@@ -116,7 +116,7 @@ def fight(plan: ReplyPlan, prey: str = "") -> bool:
 
 
 def shoot(plan: ReplyPlan, target: TextUnit) -> bool:
-    """Orders the team to attack one enemy; units that have no weapon against it take the next best one."""
+    """Order the team to attack one enemy; units without a weapon against it take the next best one."""
     team = plan.team
     able = [unit for unit in team.own if kind_of(unit).hits(kind_of(target))]
     if len(able) == len(team.own) or not team.can("Select_Unit_Attack_Unit"):
@@ -126,7 +126,7 @@ def shoot(plan: ReplyPlan, target: TextUnit) -> bool:
 
 
 def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> None:
-    """Pulls nearly dead units out of reach, those in danger first; leaves `keep` calls for the team."""
+    """Pull nearly dead units out of reach, those in danger first; leave `keep` calls for the team."""
     hit = plan.team.hit
     hurt = [
         unit
@@ -134,7 +134,7 @@ def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> N
         if unit.share < HURT and (unit.tag in hit or _caught(unit, foes)) and _pressed(unit, foes)
     ]
     if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
-        return  # nobody would be left to fight
+        return  # no unit would be left to fight
     for unit in sorted(hurt, key=lambda unit: unit.share):
         if plan.left <= keep:
             return
@@ -146,7 +146,7 @@ def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> N
 
 
 def step_back(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
-    """While weapons cool down: out of the reach of enemies who would have to follow; says whether it is worth it."""
+    """While weapons cool down, step out of the reach of enemies that have to follow; return whether it is worth it."""
     team = plan.team
     kinds = [kind_of(unit) for unit in team.own]
     cooling = sum(unit.weapon_s > COOLING_S for unit in team.own)
@@ -164,7 +164,7 @@ def step_back(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
 
 
 def _keep_off(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
-    """Keeps a team that cannot fight out of reach."""
+    """Keep a team that cannot fight out of reach."""
     near = [foe for foe in foes if any(_gap(foe, unit) < 2.0 for unit in plan.team.own)]
     if near:
         plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
@@ -172,7 +172,7 @@ def _keep_off(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
 
 
 def _caught(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
-    """Whether somebody who fights by hand stands at a unit."""
+    """Return whether an enemy with a melee weapon stands next to a unit."""
     return any(kind_of(foe).melee and _gap(foe, unit) < 1.0 for foe in foes)
 
 
@@ -182,7 +182,7 @@ def _pressed(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
 
 
 def _gap(foe: TextUnit, unit: TextUnit) -> float:
-    """How far a foe has to come until it reaches a unit."""
+    """Return how far a foe has to come until it reaches a unit."""
     return distance(foe, unit) - _range(foe, unit) - 1.0
 
 

@@ -1,8 +1,8 @@
-"""Leading what has no units of its own: production, building and research, and the army of easy control.
+"""Lead everything without units of its own: production, building and research, and the army of easy control.
 
-A build order is a list of wants, looked through from the top at each observation: the first ones that are not met and
-possible are ordered. What is possible is what the observation lists; what is there and in the making it counts. So it
-needs no memory, and mends by itself what was shot down.
+A build order is a list of wants, checked from the top at each observation: the first ones that are possible and not
+met are ordered. The observation lists what is possible, and counts what exists or is being made. So the player
+needs no memory, and replaces whatever was destroyed.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 16
-"""Army units with which the army sets out."""
+"""Number of army units with which the army sets out."""
 MANY = 200
 LARVAE_MAKE = frozenset({"Train_Drone", "Train_Overlord", "Train_Zergling", "Train_Roach", "Train_Hydralisk"})
 WEAK = 6
-"""Army units below which it comes home."""
+"""The army comes home with fewer army units than this."""
 NO_ARMY = frozenset({"Probe", "SCV", "MULE", "Drone", "Overlord", "Overseer", "Larva", "Egg", "Queen", "Observer"})
 HALLS = ("Nexus", "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "Hatchery", "Lair", "Hive")
 
 
 def lead(plan: ReplyPlan) -> None:
-    """Plans what is built, trained, researched and commanded for the whole side."""
+    """Plan building, training, research and the army's orders for the whole side."""
     command(plan)
     warp_to_the_front(plan)
     for build in BUILDS:
@@ -41,7 +41,7 @@ def lead(plan: ReplyPlan) -> None:
 
 
 def command(plan: ReplyPlan) -> None:
-    """Sends the army out when it is strong, and home when it is not and something is attacked."""
+    """Send the army out when it is strong, and home when it is weak and the side is attacked."""
     situation, size = plan.situation, army(plan.situation)
     out = any(name == "All_Units_Attack" for _, name, _ in situation.accepted)
     if size >= STRONG or (out and size >= WEAK):
@@ -51,7 +51,7 @@ def command(plan: ReplyPlan) -> None:
 
 
 def marching_order(situation: Situation) -> str:
-    """What a commander without units tells all groups: where the enemy is, or where to gather."""
+    """Return a commander's order to all groups: where the enemy is, or where to gather."""
     x, y = (sum(values) / len(situation.friends) for values in zip(*situation.friends, strict=True))
     bases = sorted(points(situation.task), key=lambda base: math.dist(base, (x, y))) or [(x, y)]
     known = [place for kind, place in situation.known if kind in _STRUCTURES]
@@ -61,14 +61,14 @@ def marching_order(situation: Situation) -> str:
 
 
 def army(situation: Situation) -> int:
-    """Units that fight."""
+    """Return the number of units that fight."""
     structures = sum(count for kind, count in situation.counts.items() if kind in _STRUCTURES)
     civil = sum(count for kind, count in situation.counts.items() if kind in NO_ARMY)
     return sum(situation.counts.values()) - structures - civil
 
 
 def warp_to_the_front(plan: ReplyPlan) -> None:
-    """Warps in at a phasing Warp Prism, if there is one: it went there for that."""
+    """Warp in at a phasing Warp Prism, if there is one: it went there for that."""
     full = " ".join(plan.situation.rejected)
     fields = [tag for kind, tag, _ in plan.situation.power if kind == "WarpPrismPhasing" and tag not in full]
     if not fields:
@@ -81,7 +81,7 @@ def warp_to_the_front(plan: ReplyPlan) -> None:
 
 @dataclass(slots=True)
 class ReplyBudget:
-    """What may still be spent in this reply."""
+    """What this reply may still spend."""
 
     plan: ReplyPlan
     minerals: int
@@ -90,7 +90,7 @@ class ReplyBudget:
     bought: Counter[str] = field(default_factory=Counter)
 
     def buy(self, action: str) -> bool:
-        """Orders something, if it can be paid after all that was ordered before it; says whether it did."""
+        """Order something, if it can be paid after all earlier orders; return whether it was ordered."""
         price = self.plan.situation.prices.get(action, Price())
         larvae = sum(self.bought[name] for name in LARVAE_MAKE) if action in LARVAE_MAKE else -1
         if larvae >= self.plan.situation.counts.get("Larva", 0):
@@ -106,7 +106,7 @@ class ReplyBudget:
 
 
 def produce(plan: ReplyPlan, build: Build) -> None:
-    """Goes through a build order; a want that cannot be paid yet may keep others from being paid first."""
+    """Follow a build order; a want that cannot be paid yet may keep later ones from being paid first."""
     situation = plan.situation
     room = max(0.0, situation.supply_cap - situation.supply_used)
     purse = ReplyBudget(plan, situation.minerals, situation.vespene, room)
@@ -121,7 +121,7 @@ def produce(plan: ReplyPlan, build: Build) -> None:
         if met(situation, want):
             continue
         if not purse.buy(want.action) and want.first and want.action in situation.impossible:
-            return  # it is saved for
+            return  # its money is saved
     free = _free_producers(situation, build)
     for action in build.army:
         while plan.left > 0 and free > 0 and purse.buy(action):
@@ -129,7 +129,7 @@ def produce(plan: ReplyPlan, build: Build) -> None:
 
 
 def _free_producers(situation: Situation, build: Build) -> int:
-    """About how many units of the army can be begun without one waiting for another; larvae are not counted."""
+    """Return about how many units of the army can begin without waiting for another; larvae do not count."""
     if not build.producers:
         return MANY
     there = sum(situation.counts.get(kind, 0) for kind in build.producers)
@@ -138,7 +138,7 @@ def _free_producers(situation: Situation, build: Build) -> int:
 
 
 def needs_supply(situation: Situation, build: Build) -> bool:
-    """Whether supply will soon be short, with what is in the making."""
+    """Return whether supply will soon be short, counting what is being made."""
     pending = 8 * (situation.begun.get(build.supply.makes, 0) + situation.producing.get(build.supply.action, 0))
     room = situation.supply_cap + pending - situation.supply_used
     return situation.supply_cap < 200 and room < 3 + situation.supply_used / 8
@@ -149,10 +149,10 @@ def _pending(situation: Situation, want: Want) -> bool:
 
 
 def met(situation: Situation, want: Want) -> bool:
-    """Whether there is enough of something, in the making or there, or its turn has not come yet."""
+    """Return whether there is enough of something, existing or being made, or its turn has not come yet."""
     halls = sum(situation.counts.get(kind, 0) for kind in HALLS)
     if any(situation.counts.get(kind, 0) < count for kind, count in want.after.items()):
-        return True  # not yet its turn
+        return True  # its turn has not come yet
     if want.upgrade:
         return want.makes in situation.upgrades or want.action in situation.producing
     there = sum(situation.counts.get(kind, 0) + situation.begun.get(kind, 0) for kind in want.makes.split("|"))

@@ -1,4 +1,4 @@
-"""Where a team goes that sees nobody to fight: by what it was told, by its task, or to where enemies must be."""
+"""Where a team without enemies in sight goes: by a message, by its task, or to where enemies must be."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FAR = 6.0
 
 
 def passing(plan: ReplyPlan) -> bool:
-    """Whether the team is on a way on which it shall not fight."""
+    """Return whether the team is on a way on which it does not fight."""
     team, named = plan.team, points(plan.team.task)
     if not named or team.minimap is None or not _PASSING.search(team.task):
         return False
@@ -28,13 +28,13 @@ def passing(plan: ReplyPlan) -> bool:
 
 
 def travel(plan: ReplyPlan) -> bool:
-    """Plans the way of a team; says whether it has one to go."""
+    """Plan the way of a team; return whether it has one to go."""
     team, told = plan.team, None if plan.prey else told_goal(plan.situation)
     goal = told or task_goal(team, plan.situation)
     if goal is None or team.minimap is None or math.dist(goal, team.minimap) <= ARRIVED:
         return False
     if told is None and all(unit.order for unit in team.own) and not team.allies:
-        return True  # on its way
+        return True  # already on its way
     if told is None and sum(bool(unit.order) for unit in team.own) > len(team.own) / 2:
         return True
     if math.dist(goal, team.minimap) > FAR and plan.give("Ability_AdeptPhaseShift_Minimap", goal):
@@ -44,13 +44,13 @@ def travel(plan: ReplyPlan) -> bool:
 
 
 def told_goal(situation: Situation) -> Point | None:
-    """Where somebody asks for help, in the last message that names a place."""
+    """Return the place of the last call for help that names one."""
     named = [place for _, text in situation.messages for place in points(text)]
     return named[-1] if named else None
 
 
 def task_goal(team: TextTeam, situation: Situation) -> Point | None:
-    """The last place that the team's task names, or that of all; the middle of the map if there is no word of any."""
+    """Return the last place in the team's task, or else in the side's task, or else the middle of the map."""
     for text in (team.task, situation.task):
         if named := points(text):
             return named[-1]

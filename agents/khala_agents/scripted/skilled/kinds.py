@@ -1,7 +1,7 @@
-"""What somebody who knows StarCraft II knows of a unit by its name: reach, worth, pace. Rounded, and no more.
+"""What a StarCraft II player knows of a unit by its name: reach, worth, pace. All numbers are rounded.
 
-These are a player's rules of thumb, not the bridge's knowledge: an observation may leave that out. A type that is not
-listed is taken for a slow one that reaches 5.
+These are a player's rules of thumb, not the bridge's knowledge, which an observation may leave out. A type that is not
+listed counts as a slow one that reaches 5.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 Role = Literal["army", "worker", "structure", "support"]
 NONE = -1.0
-"""Range of a weapon that is not there."""
+"""Range of a missing weapon."""
 
 
 class Kind(NamedTuple):
-    """A unit type; ranges in world units from edge to edge, damage and speed a second."""
+    """A unit type; ranges in world units from edge to edge, damage and speed per second."""
 
     ground: float = 5.0
     """Range against the ground."""
     air: float = NONE
     damage: float = 10.0
-    """A second, or what it is worth to be rid of it."""
+    """Damage per second, or the worth of killing it."""
     speed: float = 2.5
     flying: bool = False
     role: Role = "army"
@@ -35,12 +35,12 @@ class Kind(NamedTuple):
         return max(self.ground, self.air)
 
     def hits(self, other: Kind) -> bool:
-        """Whether its weapon can be aimed at another type."""
+        """Return whether its weapon can be aimed at another type."""
         return (self.air if other.flying else self.ground) >= 0
 
     @property
     def melee(self) -> bool:
-        """Whether it has to touch what it hits."""
+        """Whether it has to touch its target."""
         return 0 <= self.ground < 2
 
 
@@ -136,7 +136,7 @@ TOWN_HALLS = frozenset(
     {"Nexus", "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "Hatchery", "Lair", "Hive"},
 )
 IGNORED = frozenset({"Larva", "Egg", "BroodlingEscort", "ForceField", "KD8Charge", "ParasiticBombDummy", "Interceptor"})
-"""Nothing to shoot at."""
+"""Not targets."""
 
 KINDS: dict[str, Kind] = {
     **_GROUND,
@@ -149,6 +149,6 @@ UNKNOWN = Kind()
 
 
 def kind_of(unit: TextUnit) -> Kind:
-    """What is known of a unit's type; what the graviton beam holds flies."""
+    """Return the kind of a unit's type; a unit in the graviton beam flies."""
     kind = KINDS.get(unit.type, UNKNOWN)
     return kind._replace(flying=True) if "GravitonBeam" in unit.effects else kind

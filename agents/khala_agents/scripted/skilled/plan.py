@@ -1,4 +1,4 @@
-"""The orders that a player thinks of for one team, and how many of them it may give."""
+"""The orders that a player plans for one team, and the limit on their number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class ReplyPlan:
-    """Calls for one team in one reply; skills first, the order for all of it last."""
+    """Calls for one team in one reply; skills first, the order for the whole team last."""
 
     team: TextTeam
     situation: Situation
@@ -23,17 +23,17 @@ class ReplyPlan:
     support: Mapping[str, float] = field(default_factory=dict)
     """By the tag of an enemy: how many units of all teams have it in reach."""
     prey: str = ""
-    """What the team is after besides the fight: "worker", "hall" or "place"; "" if it may be called."""
+    """What else the team hunts, beyond the fight: "worker", "hall" or "place"; "" if other teams may call it."""
     busy: set[str] = field(default_factory=set)
     """Tags of units that have an order in this reply."""
 
     @property
     def left(self) -> int:
-        """How many calls the team may still be given."""
+        """Number of calls that the team may still get."""
         return self.situation.max_actions - len(self.calls)
 
     def give(self, name: str, *values: str | Point) -> bool:
-        """Adds a call, if the action is valid and one more may be given; says whether it did."""
+        """Add a call, if the action is valid and the limit allows it; return whether it was added."""
         form = next((action for action in self.team.actions if action.name == name), None)
         if form is None or self.left <= 0 or len(form.args) != len(values):
             return False
@@ -45,7 +45,7 @@ class ReplyPlan:
         return True
 
     def cast(self, skill: str, caster: TextUnit, *values: str | Point) -> bool:
-        """Gives one unit's skill by its own action, or by the team's if the unit is all of the team."""
+        """Order one unit's skill by its own action, or by the team's if the unit is the whole team."""
         tag = caster.tag
         if tag in self.busy or any(name in skill for name in caster.not_ready):
             return False

@@ -1,4 +1,4 @@
-"""One reply of the skilled player: every team has its turn, then it tells others what they should know."""
+"""One reply of the skilled player: each team plans in turn, then messages to other agents follow."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from khala_agents.scripted.reading import Situation, TextTeam
 
 MESSAGE_SHARE = 0.2
-"""Part of the replies in which something is said to others."""
+"""Part of the replies that contain a message to others."""
 ORDERS_EVERY_S = 12
-"""How often a commander says where all go."""
+"""How often a commander sends the marching order."""
 _RAID = re.compile(r"\b(raid|workers?|drones?|probes?|scvs?)\b", re.IGNORECASE)
 _GATHER = re.compile(r"\bgather\b", re.IGNORECASE)
 _HALL = re.compile(r"(?<!your )\b(hatchery|nexus|command center)\b", re.IGNORECASE)
@@ -28,7 +28,7 @@ _ATTACK = re.compile(r"\b(raid|kill|destroy)\b", re.IGNORECASE)
 
 
 def skilled(observation: str, rng: random.Random) -> str:
-    """Uses skills, concentrates fire, keeps its distance, raids, and builds; by the text of the observation alone."""
+    """Use skills, concentrate fire, keep distance, raid and build, by the text of the observation alone."""
     situation = read(observation)
     support = combat.support(situation.teams.values())
     orders: dict[str, list[str]] = {}
@@ -63,7 +63,7 @@ def _lead(plan: ReplyPlan) -> None:
 
 
 def prey(plan: ReplyPlan) -> str:
-    """What a team is after by its task: "worker", "hall", or "" for the enemy's army."""
+    """Return what a team hunts by its task: "worker", "hall", or "" for the enemy's army."""
     text = plan.team.task or plan.situation.task
     if not _ATTACK.search(text):
         return ""
@@ -71,7 +71,7 @@ def prey(plan: ReplyPlan) -> str:
 
 
 def shade(plan: ReplyPlan) -> None:
-    """To where the Adepts shall appear: among workers, if it sees any."""
+    """Order where the Adepts appear: among workers, if the team sees any."""
     workers = [unit for unit in plan.team.enemies if kind_of(unit).role == "worker"]
     if workers:
         plan.give("Move_Screen", middle(workers))
@@ -80,7 +80,7 @@ def shade(plan: ReplyPlan) -> None:
 
 
 def prism(plan: ReplyPlan) -> None:
-    """To where its task wants it, and open a field of power there; away when it is shot at."""
+    """Fly to the place that its task names and open a field of power there; flee when it is shot at."""
     team, plan.prey = plan.team, "place"
     foes = [foe for foe in combat.threats(team) if foe.distance < 9]
     phasing = any(unit.type == "WarpPrismPhasing" for unit in team.own)
@@ -103,7 +103,7 @@ def _analysis(situation: Situation) -> str:
 
 
 def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
-    """A call for help from a team in a fight to the first whom one may write to; a commander passes it on."""
+    """Return a call for help from a team in a fight to its first contact; a commander passes calls on."""
     people = situation.correspondents
     if not people:
         return []

@@ -1,6 +1,6 @@
-"""When to use which skill, by one function per skill. A skill that is not valid now is never thought of.
+"""When to use which skill, one function per skill. A skill that is not valid now is never planned.
 
-Ranges, radii and prices are those that any player knows; they are checked by the host again.
+Ranges, radii and prices are common knowledge of players; the host checks them again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NOVA_DAMAGE = 100.0
 
 
 def use(plan: ReplyPlan, prey: str = "", keep: int = 1) -> None:
-    """Plans the skills of a team that are worth it now; leaves `keep` calls for a fight or a move."""
+    """Plan the skills of a team that are worth it now; leave `keep` calls for a fight or a move."""
     plan.prey = prey
     for name, skill in SKILLS.items():
         if plan.left <= keep:
@@ -33,7 +33,7 @@ def use(plan: ReplyPlan, prey: str = "", keep: int = 1) -> None:
 
 
 def _bodies(plan: ReplyPlan, *without: str) -> list[TextUnit]:
-    """Enemies of flesh, without those under an effect."""
+    """Return the biological enemies, without those under an effect."""
     return [
         unit
         for unit in plan.team.enemies
@@ -46,13 +46,13 @@ def _friends(plan: ReplyPlan) -> list[TextUnit]:
 
 
 def _price(unit: TextUnit) -> float:
-    """What is lost with a unit under an area skill: its hit points up to what a storm takes, by its worth."""
+    """Return the worth of a unit under an area skill: its hit points, up to a storm's damage, times its worth."""
     kind = kind_of(unit)
     return min(unit.hit_points, STORM_DAMAGE) * (0.5 + kind.damage / 20.0) * (0.3 if kind.role == "support" else 1.0)
 
 
 def storm(plan: ReplyPlan) -> None:
-    """Each templar that can storms a crowd, another one than the others."""
+    """Storm a crowd with each templar that can, each a different crowd."""
     pool = _bodies(plan, "PsiStorm")
     for caster in sorted(plan.team.own, key=lambda unit: -unit.energy):
         if caster.energy < 75 or plan.left <= 0:
@@ -67,7 +67,7 @@ def storm(plan: ReplyPlan) -> None:
 
 
 def nova(plan: ReplyPlan) -> None:
-    """A ball at the enemy with the largest crowd around, if no friend is near it."""
+    """Send a ball at the enemy with the largest crowd around, if no friend is near it."""
     pool = _bodies(plan)
     for caster in plan.team.own:
         near = [unit for unit in pool if distance(caster, unit) < 13.0 and not kind_of(unit).flying]
@@ -86,7 +86,7 @@ def _one(unit: TextUnit) -> float:
 
 
 def guardian_shield(plan: ReplyPlan) -> None:
-    """One shield over the team while several enemies shoot from afar."""
+    """Raise one shield over the team while several enemies shoot from afar."""
     friends = _friends(plan)
     if sum("GuardianShield" in unit.effects for unit in friends) > len(friends) / 3:
         return
@@ -99,11 +99,11 @@ def guardian_shield(plan: ReplyPlan) -> None:
 
 
 def force_field(plan: ReplyPlan) -> None:
-    """A wall through the middle of those who come, so that half of them cannot."""
+    """Raise a wall through the middle of the advancing enemies, so that half of them cannot pass."""
     fields = [unit for unit in plan.team.enemies + plan.team.allies if unit.type == "ForceField"]
     walkers = [u for u in _bodies(plan) if not kind_of(u).flying and kind_of(u).role == "army"]
     if any(unit.type in {"Ultralisk", "Ravager", "Colossus", "Archon", "Thor"} for unit in walkers):
-        walkers = [unit for unit in walkers if unit.distance < 9]  # they break a wall that they come to
+        walkers = [unit for unit in walkers if unit.distance < 9]  # they break a wall that they reach
     if len(walkers) < 6:
         return
     ours, theirs = middle(_friends(plan)), middle(walkers)
@@ -120,7 +120,7 @@ def _rich(plan: ReplyPlan, energy: float) -> list[TextUnit]:
 
 
 def _wall(ours: Point, theirs: Point, away_: float) -> list[Point]:
-    """Three places in a row across the way from one place to another."""
+    """Return three places in a row across the way from one place to another."""
     centre = towards(ours, theirs, away_)
     dx, dy = (theirs[0] - ours[0]), (theirs[1] - ours[1])
     length = max((dx * dx + dy * dy) ** 0.5, 1e-6)
@@ -129,7 +129,7 @@ def _wall(ours: Point, theirs: Point, away_: float) -> list[Point]:
 
 
 def graviton_beam(plan: ReplyPlan) -> None:
-    """Lifts a Queen, or a worker when there is none, once another Phoenix is there to shoot."""
+    """Lift a Queen, or a worker when there is none, once another Phoenix is there to shoot."""
     team = plan.team
     free = [unit for unit in team.own if unit.energy >= 50 and "Graviton" not in unit.order]
     if len(team.own) < 2 or any("GravitonBeam" in unit.effects for unit in team.enemies) or len(free) < 1:
@@ -149,14 +149,14 @@ def graviton_beam(plan: ReplyPlan) -> None:
 
 
 def prismatic_alignment(plan: ReplyPlan) -> None:
-    """When at least half of the team is in a fight."""
+    """Align when at least half of the team is in a fight."""
     foes = [unit for unit in _bodies(plan) if unit.distance < 9]
     if len(foes) >= 2 and not any("VoidRaySwarmDamageBoost" in unit.effects for unit in plan.team.own):
         plan.give("Ability_PrismaticAlignment")
 
 
 def time_warp(plan: ReplyPlan) -> None:
-    """Over the largest crowd that comes."""
+    """Warp time over the largest advancing crowd."""
     found = crowd([unit for unit in _bodies(plan) if not kind_of(unit).flying], 3.5, _one)
     if found is not None and found[0] >= 6:
         for caster in _rich(plan, 100):
@@ -165,14 +165,14 @@ def time_warp(plan: ReplyPlan) -> None:
 
 
 def pulsar_beam(plan: ReplyPlan) -> None:
-    """On as soon as something on the ground is near."""
+    """Switch the beam on as soon as something on the ground is near."""
     prey = [unit for unit in _bodies(plan) if not kind_of(unit).flying and unit.distance < 6]
     if prey and not any("OracleWeapon" in unit.effects for unit in plan.team.own) and _rich(plan, 45):
         plan.give("Ability_PulsarBeamOn")
 
 
 def fungal(plan: ReplyPlan) -> None:
-    """Growth on a crowd."""
+    """Grow fungus on a crowd."""
     found = crowd(_bodies(plan, "FungalGrowth"), 2.25, _price, ())
     if found is not None and found[0] >= 200:
         for caster in _rich(plan, 75)[:1]:
@@ -181,7 +181,7 @@ def fungal(plan: ReplyPlan) -> None:
 
 
 def stim(plan: ReplyPlan) -> None:
-    """When the fight begins and nobody is hurt much."""
+    """Use stim when the fight begins and no unit is hurt much."""
     team = plan.team
     near = [foe for foe in threats(team) if foe.distance < 8]
     stimmed = any("Stim" in effect for unit in team.own for effect in unit.effects)
@@ -191,7 +191,7 @@ def stim(plan: ReplyPlan) -> None:
 
 
 def siege(plan: ReplyPlan) -> None:
-    """Tanks dig in when walkers come into their range, and move on when nothing is left."""
+    """Siege tanks when walkers come into their range, and unsiege them when nothing is left."""
     walkers = [foe for foe in _bodies(plan) if not kind_of(foe).flying]
     near = [foe for foe in walkers if foe.distance < 12]
     dug = any(unit.type == "SiegeTankSieged" for unit in plan.team.own)
@@ -203,7 +203,7 @@ def siege(plan: ReplyPlan) -> None:
 
 
 def archon(plan: ReplyPlan) -> None:
-    """Two templar without energy become one Archon."""
+    """Merge two templar without energy into one Archon."""
     tired = [unit for unit in plan.team.own if unit.type == "HighTemplar" and unit.energy < 40 and not unit.order]
     if len(tired) >= 2 and plan.give("Select_Two_Units_Morph_Archon", tired[0].tag, tired[1].tag):
         plan.busy |= {tired[0].tag, tired[1].tag}
@@ -224,4 +224,4 @@ SKILLS: dict[str, Callable[[ReplyPlan], None]] = {
     "Morph_Unsiege": siege,
     "Morph_Archon": archon,
 }
-"""By a part of the names of the actions that it needs; tried in this order."""
+"""By a part of the names of the actions that each needs; tried in this order."""

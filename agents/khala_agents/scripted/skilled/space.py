@@ -17,12 +17,12 @@ _DIRECTIONS = tuple((math.cos(k * math.pi / 8), math.sin(k * math.pi / 8)) for k
 
 
 def place(unit: TextUnit) -> Point:
-    """Where a unit is on the screen."""
+    """Return the place of a unit on the screen."""
     return unit.x, unit.y
 
 
 def distance(a: TextUnit | Point, b: TextUnit | Point) -> float:
-    """Between two units or points of one screen, centre to centre."""
+    """Return the distance of two units or points of one screen, centre to centre."""
     (ax, ay), (bx, by) = _xy(a), _xy(b)
     return math.hypot(ax - bx, ay - by)
 
@@ -32,17 +32,17 @@ def _xy(what: TextUnit | Point) -> Point:
 
 
 def middle(units: Sequence[TextUnit]) -> Point:
-    """The mean place of some units."""
+    """Return the mean place of some units."""
     return sum(unit.x for unit in units) / len(units), sum(unit.y for unit in units) / len(units)
 
 
 def nearest(to: TextUnit | Point, units: Iterable[TextUnit]) -> TextUnit | None:
-    """The nearest unit; of equally near ones the first."""
+    """Return the nearest unit; of equally near ones the first."""
     return min(units, key=lambda unit: distance(to, unit), default=None)
 
 
 def towards(begin: Point, end: Point, length: float) -> Point:
-    """The point so far on the way from one to another; beyond it if the way is shorter."""
+    """Return the point this far on the way from one to another; beyond it if the way is shorter."""
     way = distance(begin, end)
     if way < 1e-6:
         return end
@@ -50,7 +50,7 @@ def towards(begin: Point, end: Point, length: float) -> Point:
 
 
 def away(team: TextTeam, begin: Point, threats: Sequence[TextUnit], length: float) -> Point:
-    """A point on the map about so far from a place that is as far from some threats as possible."""
+    """Return a point on the map about this far from a place that is as far from some threats as possible."""
 
     def safety(at: Point) -> tuple[float, float]:
         return min((distance(at, unit) for unit in threats), default=0.0), distance(at, begin)
@@ -62,13 +62,13 @@ def away(team: TextTeam, begin: Point, threats: Sequence[TextUnit], length: floa
 def crowd(
     targets: Sequence[TextUnit], radius: float, worth: Callable[[TextUnit], float], spared: Sequence[TextUnit] = ()
 ) -> tuple[float, Point] | None:
-    """Where most is hit within a radius, and what it is worth; None without targets.
+    """Return the place where a radius hits most, and its worth; None without targets.
 
     Args:
-        targets: units that are to be hit; the middle is tried on each of them and between near ones.
-        radius: of what is hit.
+        targets: units to hit; the middle is tried on each of them and between near ones.
+        radius: of the skill.
         worth: of one target.
-        spared: units whose worth counts against a place, twice.
+        spared: units whose worth counts twice against a place.
     """
     best: tuple[float, Point] | None = None
     for centre in targets:
