@@ -1,6 +1,6 @@
 """Skills of Terran structures: building a tech lab or a reactor at their side.
 
-The add-on grows by itself; its structure makes nothing meanwhile. Lifting off, landing and taking over add-ons stand
+The add-on grows by itself; its structure makes nothing meanwhile. Lifting off, landing and taking over add-ons are
 elsewhere.
 """
 
