@@ -44,7 +44,7 @@ PAID_FIRST: Final = frozenset({"grow"})
 
 
 def is_modelled(ability: Ability) -> bool:
-    """Whether the simulator has a rule for this ability."""
+    """Return whether the simulator has a rule for this ability."""
     return ability.effect in ORDINARY or ability.effect in SKILLS
 
 
@@ -68,7 +68,7 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
 
 
 def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
-    """Return whether a unit could use an ability of its card now, whatever the target; ``free`` ignores the cost."""
+    """Return why a unit can't use an ability of its card now, or success, for any target; ``free`` ignores the cost."""
     if not is_modelled(ability):
         return ActionResult.NOT_SUPPORTED
     if ability.effect in ORDINARY:
@@ -113,13 +113,13 @@ def _unaffordable(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def cooldown_left(world: World, slot: int, ability: Ability) -> float:
-    """Loops until the ability's cooldown is over, 0 when it is."""
+    """Return the loops until the ability's cooldown is over, 0 when it is."""
     timers = world.players[int(world.owner[slot])].timers if ability.cooldown_shared else world.timers.get(slot, {})
     return max(0.0, timers.get(ability.timer, 0.0) - world.loop)
 
 
 def aim_refusal(world: World, cast: Cast) -> ActionResult:
-    """Return whether a unit may aim an ability like this; the way there only counts if the unit can't walk."""
+    """Return why a unit can't aim an ability like this, or success; the way there only counts if it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
@@ -136,7 +136,7 @@ def aim_refusal(world: World, cast: Cast) -> ActionResult:
 
 
 def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
-    """Return whether the catalog's filter allows a unit as the target of another unit's ability."""
+    """Return why the catalog's filter forbids a unit as the target of another unit's ability, or success."""
     for word in words.required:
         if not _is(world, slot, target, word):
             return NOT_REQUIRED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
@@ -275,7 +275,7 @@ def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool 
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """Do the right click of the skills, else that of ``commands``; return the slots that took it."""
+    """Right-click: do what the skills make of it, else what ``commands`` does; return the slots that took it."""
     rest, taken, victim = list(slots), list[int](), world.slot_of(target)
     for rule in SMARTS:
         some = rule(world, rest, victim, point, queue)
@@ -317,7 +317,7 @@ def start_cooldown(world: World, slot: int, ability: Ability, loops: float | Non
 
 
 def skill_of(ability: Ability) -> Skill:
-    """The rule behind an ability; raises ``KeyError`` for one that is not modelled."""
+    """Return the rule behind an ability; raise ``KeyError`` for one that is not modelled."""
     return SKILLS[ability.effect]
 
 

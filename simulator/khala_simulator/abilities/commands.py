@@ -109,7 +109,7 @@ def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """The right click: attack an enemy, harvest a resource, drop off a load, follow any other unit, walk to a point."""
+    """Right-click: attack an enemy, harvest a resource, drop off a load, follow any other unit, walk to a point."""
     victim = world.slot_of(target)
     if victim == NOBODY:
         return [] if point is None else move(world, slots, point, queue=queue)
@@ -233,20 +233,20 @@ def can_move(world: World, slot: int) -> bool:
 
 
 def can_attack(world: World, slot: int) -> bool:
-    """Whether the unit has a weapon that it can aim now."""
+    """Return whether the unit has a weapon that it can aim now."""
     armed = world.ground_weapon[slot] >= 0 or world.air_weapon[slot] >= 0
     return bool(armed) and _commandable(world.unit_type(slot))
 
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
-    """Whether the unit has a weapon that it can aim at ``victim`` now."""
+    """Return whether the unit has a weapon that it can aim at ``victim`` now."""
     if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
         return False
     return weapon_for(world, slot, victim) >= 0
 
 
 def is_enemy(world: World, player: int, other: int) -> bool:
-    """Whether two owners fight each other; no unit attacks the neutral player unless ordered."""
+    """Return whether two owners fight each other; no unit attacks the neutral player unless ordered."""
     return player != other and 0 not in (player, other) and len(world.players) > max(player, other)
 
 

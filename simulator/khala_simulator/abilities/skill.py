@@ -107,12 +107,12 @@ def foes(world: World, slots: list[int], owner: int) -> list[int]:
 
 
 def friends(world: World, slots: list[int], owner: int) -> list[int]:
-    """Those of ``slots`` that are the owner's."""
+    """Return those of ``slots`` that are the owner's."""
     return [slot for slot in slots if int(world.owner[slot]) == owner]
 
 
 def place_of(world: World, cast: Cast) -> Point:
-    """Where a cast is aimed: the target's place, else its point, else the caster's place."""
+    """Return where a cast is aimed: the target's place, else its point, else the caster's place."""
     slot = cast.target if cast.target != NOBODY else cast.slot
     if cast.target == NOBODY and cast.point is not None:
         return cast.point

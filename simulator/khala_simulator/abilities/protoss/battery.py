@@ -99,7 +99,7 @@ def _cant_overcharge(world: World, cast: Cast) -> ActionResult:
 def recharge_by_click(
     world: World, slots: list[int], target: int, _: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
-    """The right click of a battery on a unit: recharge it, if that is possible now."""
+    """Right-click a unit with a battery: recharge it, if that is possible now."""
     taken: list[int] = []
     for slot in slots if target != NOBODY else ():
         card = world.catalog.abilities_of(int(world.type[slot]))

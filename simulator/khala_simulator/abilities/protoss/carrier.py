@@ -35,7 +35,7 @@ DOCKING_GAP = 1.1  # a follower stops within this distance of the unit that it f
 
 
 def crew_of(world: World, carrier: int) -> list[int]:
-    """The Interceptors of a Carrier, in the hangar and outside, ascending."""
+    """Return the Interceptors of a Carrier, in the hangar and outside, ascending."""
     crew: list[int] = which(world.home[: world.top] == carrier).tolist()
     return crew
 
@@ -60,7 +60,7 @@ def _arm(world: World, slots: list[int], ability: Ability, _: int, __: Point | N
 
 
 def _has_place(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Return whether the hangar and its queue have room for one more."""
+    """Refuse if the hangar and its queue have no room for one more."""
     queued = len(world.jobs.get(slot, ()))
     if queued >= production.QUEUE:
         return ActionResult.QUEUE_IS_FULL

@@ -40,7 +40,7 @@ SCRAMBLED = "RavenScramblerMissile"
 
 
 def _taken(world: World, cast: Cast) -> list[int]:
-    """Return the units that a recall would take: the owner's in the circle, less its caster and those bound."""
+    """Return the units that a recall would take: the owner's in the circle, except its caster and bound ones."""
     near = around(world, place_of(world, cast), number(cast, "radius"), structures=False)
     return [
         slot

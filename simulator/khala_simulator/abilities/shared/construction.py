@@ -103,7 +103,7 @@ def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Poi
 
 
 def resume(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
-    """The right click of a Terran builder on an unfinished structure: go on with it."""
+    """Right-click an unfinished structure with a Terran builder: go on with it."""
     unit = world.unit_type(target) if target != NOBODY else None
     if unit is None or world.build_progress[target] >= 1.0 or world.self_made[target]:
         return []
@@ -156,7 +156,7 @@ def _cancel_change(world: World, slot: int) -> None:
 
 
 def _has_something(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Whether there is anything of this kind to call off."""
+    """Refuse if there is nothing of this kind to call off."""
     if world.build_progress[slot] < 1.0:
         return ActionResult.SUCCESS if ability.link in IN_PROGRESS else ActionResult.CANT_FIND_CANCEL_ORDER
     if ability.link in IN_PROGRESS:

@@ -44,7 +44,7 @@ def _length(world: World, slot: int) -> float:
 
 
 def has_place(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Return whether a queue has room for one more job of this kind."""
+    """Refuse if a queue has no room for one more job of this kind."""
     if ability.unit and ability.unit not in world.catalog.row_of_name:
         return ActionResult.NOT_SUPPORTED
     jobs = world.jobs.get(slot, [])
@@ -97,7 +97,7 @@ def _hatch_back(world: World, slot: int) -> None:
 
 
 def has_job(world: World, slot: int, _: Ability) -> ActionResult:
-    """Return whether there is anything to call off."""
+    """Refuse if there is nothing to call off."""
     found = slot in world.jobs or morphs.grows(world, slot)
     return ActionResult.SUCCESS if found else ActionResult.CANT_FIND_CANCEL_ORDER
 
@@ -142,7 +142,7 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
 
 
 def _sends_units(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Return whether it produces units: a structure, an egg, or a unit that is itself unfinished."""
+    """Refuse what produces no units: all but structures, eggs, and units that are themselves unfinished."""
     finished = world.build_progress[slot] >= 1.0
     return ActionResult.ERROR if ability.link == "ProgressRally" and finished else ActionResult.SUCCESS
 

@@ -29,7 +29,7 @@ def push_units_off(world: World, slot: int) -> None:
 
 
 def _on(world: World, cells: Ints) -> Ints:
-    """Slots of the units on the ground that reach into the box around the cells."""
+    """Return the slots of the units on the ground that reach into the box around the cells."""
     slots = world.live
     solid = (world.plane_bits[slots] & GROUND_PLANE != 0) & (world.layer_bits[slots] != 0)
     slots = slots[solid & ~world.walled[slots]]

@@ -71,7 +71,7 @@ def room(world: World, carrier: int) -> int:
 
 
 def cant_carry(world: World, carrier: int, passenger: int) -> ActionResult:
-    """Why a carrier can't take a unit in now, ``ActionResult.SUCCESS`` when it can."""
+    """Return why a carrier can't take a unit in now, ``ActionResult.SUCCESS`` when it can."""
     unit, vessel = world.unit_type(passenger), world.unit_type(carrier)
     if world.owner[passenger] != world.owner[carrier]:
         return ActionResult.CANT_LOAD_OTHER_PLAYERS_UNITS
@@ -176,7 +176,7 @@ def _told_to_unload(
 
 
 def _no_place(world: World, cast: Cast) -> ActionResult:
-    """Return whether no unit could stand at the named point."""
+    """Refuse if no unit could stand at the named point."""
     if cast.point is None or cast.target != NOBODY:
         return ActionResult.SUCCESS
     unit = world.unit_type(inside(world, cast.slot)[0])

@@ -22,7 +22,7 @@ OFFSET: Final = (2.5, -0.5)  # from a structure's middle to that of its add-on
 
 
 def place_of(world: World, slot: int) -> Point:
-    """Where the add-on of a structure stands."""
+    """Return where the add-on of a structure stands."""
     x, y = world.pos[slot].tolist()
     return x + OFFSET[0], y + OFFSET[1]
 

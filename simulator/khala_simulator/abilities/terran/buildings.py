@@ -101,7 +101,7 @@ class Radar:
 
 
 def radars(world: World) -> list[Radar]:
-    """Every radar that works now, in the order of slots."""
+    """Return every radar that works now, in the order of slots."""
     rows = {world.catalog.row_of_name[name]: world.catalog.buff(buff).radar for name, buff in RADAR.items()}
     slots = world.live[np.isin(world.type[world.live], list(rows))]
     slots = slots[world.build_progress[slots] >= 1.0]

@@ -35,7 +35,7 @@ def _can_heal(world: World, cast: Cast) -> ActionResult:
 
 
 def _is_healed(world: World, cast: Cast) -> bool:
-    """Whether another Medivac heals the target now."""
+    """Return whether another Medivac heals the target now."""
     return any(
         other.target == cast.target and other.ability.effect == cast.ability.effect and slot != cast.slot
         for slot, other in world.channelling.items()

@@ -37,7 +37,7 @@ def _can_repair(world: World, cast: Cast) -> ActionResult:
 
 
 def _unaffordable(world: World, cast: Cast) -> ActionResult:
-    """Return whether the player can't afford the next loop of work."""
+    """Refuse if the player can't afford the next loop of work."""
     player = world.players[int(world.owner[cast.slot])]
     if "free" in player.cheats:
         return ActionResult.SUCCESS
@@ -89,7 +89,7 @@ def _begin(world: World, cast: Cast) -> None:
 
 
 def _pick(world: World, slot: int, ability: Ability) -> int:
-    """The nearest machine or structure of the owner's that needs repair."""
+    """Return the nearest machine or structure of the owner's that needs repair."""
     return next(iter(nearest_hurt(world, slot, ability.autocast_range, MECHANICAL)), NOBODY)
 
 

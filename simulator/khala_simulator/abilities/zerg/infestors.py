@@ -79,7 +79,7 @@ def _arrives(world: World, item: AreaEffect) -> None:
 
 
 def _controls(world: World, cast: Cast) -> bool:
-    """Whether the parasite is on its way, or holds its victim within the leash."""
+    """Return whether the parasite is on its way, or holds its victim within the leash."""
     slot, target = cast.slot, cast.target
     if world.order_target[slot] != target:
         return False
@@ -90,7 +90,7 @@ def _controls(world: World, cast: Cast) -> bool:
 
 
 def _holder(world: World, target: int) -> int:
-    """Slot of the Infestor that holds a unit, or NOBODY."""
+    """Return the slot of the Infestor that holds a unit, or NOBODY."""
     at = world.buffs.find(target, world.catalog.buff(NEURAL).row)
     return int(world.buffs.rows[at]["source"]) if at >= 0 else NOBODY
 

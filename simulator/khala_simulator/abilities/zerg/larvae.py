@@ -36,7 +36,7 @@ RING: Final = tuple(
 
 
 def of(world: World, hall: int) -> Ints:
-    """Slots of the larvae of a town hall, ascending."""
+    """Return the slots of the larvae of a town hall, ascending."""
     live = world.live
     mine: Ints = live[(world.home[live] == hall) & (world.type[live] == _larva(world))]
     return mine
