@@ -84,8 +84,11 @@ def new_game(
 ) -> World:
     """Return a world at loop 0 in which the map's script has run its start.
 
-    Args: game_map: Terrain and scenario. players: The players in the slots; by default as the scenario says. seed: The
-        seed of every random draw of the game. catalog: The tables of a game version; 4.10 by default.
+    Args:
+        game_map: Terrain and scenario.
+        players: The players in the slots; by default as the scenario says.
+        seed: The seed of every random draw of the game.
+        catalog: The tables of a game version; 4.10 by default.
     """
     world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog)
     triggers.start(world)

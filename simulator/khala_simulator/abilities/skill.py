@@ -44,15 +44,19 @@ def nothing_against_it(_: World, __: Cast) -> ActionResult:
 class Skill:
     """What an ability does.
 
-    Args: effect: Called when it takes effect; cost and cooldown are taken by then. give: Carries the order out in its
-        own way instead of as a cast, such as by a structure's queue: called with the units that may, the ability, the
-        target (tag), the point and whether to queue it; returns those that took it. It charges what it costs. refuse:
-        Reasons of its own against the cast, ``ActionResult.SUCCESS`` for none. ready: Reasons of its own against using
-        it now, whatever it is aimed at. anytime: A unit that can't act may use it too, such as a structure that is to
-        be cancelled. hold: Makes it a channel: called in every later loop, False when it is over. end: Called when a
-        channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused). pick: The target (slot)
-        that a unit with autocast chooses, NOBODY for none; the nearest allowed one without. prepare: Called when the
-        caster begins to prepare (``prep_loops``). binds: Once it has begun, other orders wait until it is over.
+    Args:
+        effect: Called when it takes effect; cost and cooldown are taken by then.
+        give: Carries the order out in its own way instead of as a cast, such as by a structure's queue: called with the
+            units that may, the ability, the target (tag), the point and whether to queue it; returns those that took
+            it. It charges what it costs.
+        refuse: Reasons of its own against the cast, ``ActionResult.SUCCESS`` for none.
+        ready: Reasons of its own against using it now, whatever it is aimed at.
+        anytime: A unit that can't act may use it too, such as a structure that is to be cancelled.
+        hold: Makes it a channel: called in every later loop, False when it is over.
+        end: Called when a channel ends, in time or not; the unit may be dead by then (``cast.slot`` is unused).
+        pick: The target (slot) that a unit with autocast chooses, NOBODY for none; the nearest allowed one without.
+        prepare: Called when the caster begins to prepare (``prep_loops``).
+        binds: Once it has begun, other orders wait until it is over.
         estimates: Which parts of it no source confirms, a sentence each.
     """
 

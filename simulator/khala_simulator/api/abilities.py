@@ -54,9 +54,13 @@ class UnitCommand:
 class OrderPlan:
     """A judged command: its result, and what to do if that is a success.
 
-    Args: asked: The command. result: The result. ability: The specific id in the report. target: The unit (tag) that it
-        is aimed at; for a snapshot the unit that it shows. point: Where it is aimed. parts: The specific abilities, by
-        ascending id, each with its units and its target.
+    Args:
+        asked: The command.
+        result: The result.
+        ability: The specific id in the report.
+        target: The unit (tag) that it is aimed at; for a snapshot the unit that it shows.
+        point: Where it is aimed.
+        parts: The specific abilities, by ascending id, each with its units and its target.
     """
 
     asked: UnitCommand

@@ -65,8 +65,11 @@ def _beside_commands(seat: PlayerSeat, action: sc.Action) -> Result:
 def perform(seat: PlayerSeat, action: sc.Action, loop: int, plan: OrderPlan | None = None) -> None:
     """Carry out an action, and note what the next observation reports of it.
 
-    Args: seat: Whose action it is. action: The action. loop: The loop in which it takes effect. plan: The plan of its
-        first command, if it was judged in the present world.
+    Args:
+        seat: Whose action it is.
+        action: The action.
+        loop: The loop in which it takes effect.
+        plan: The plan of its first command, if it was judged in the present world.
     """
     for planned in _plans(seat, action, plan):
         _give(seat, planned, loop, by_tags=action.action_raw.HasField("unit_command"))

@@ -27,9 +27,13 @@ def apply(
 ) -> None:
     """Apply a buff to a unit, or restart its time if the unit already has one of the kind.
 
-    Args: world: The game. slot: The unit that gets it; a unit has each kind only once, but kinds that stack count.
-        name: Its name in the catalog. source: Slot of the unit that casts it. owner: The owner of that unit, the
-        source's owner by default. loops: How long it lasts, as the catalog says by default; 0 is without an end.
+    Args:
+        world: The game.
+        slot: The unit that gets it; a unit has each kind only once, but kinds that stack count.
+        name: Its name in the catalog.
+        source: Slot of the unit that casts it.
+        owner: The owner of that unit, the source's owner by default.
+        loops: How long it lasts, as the catalog says by default; 0 is without an end.
     """
     buff = world.catalog.buff(name)
     if "spares_frenzied" in buff.flags and frenzied(world, slot):

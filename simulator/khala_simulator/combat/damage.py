@@ -90,10 +90,15 @@ def apply_damage(
 ) -> None:
     """Take an amount of damage from one unit: shields first, then life; both players' scores count it.
 
-    Args: world: The game. source: Slot of the unit that deals it, or NOBODY. owner: Whose damage it is. victim: Slot of
-        the unit that takes it; one that can't be touched takes none. amount: Before armor, bonuses included. kind:
-        ``ranged``, ``melee_start``, ``splash`` or ``spell``; buffs depend on it. ignores_armor: Whether armor does not
-        count. shield_bonus: More damage that only shields take.
+    Args:
+        world: The game.
+        source: Slot of the unit that deals it, or NOBODY.
+        owner: Whose damage it is.
+        victim: Slot of the unit that takes it; one that can't be touched takes none.
+        amount: Before armor, bonuses included.
+        kind: ``ranged``, ``melee_start``, ``splash`` or ``spell``; buffs depend on it.
+        ignores_armor: Whether armor does not count.
+        shield_bonus: More damage that only shields take.
     """
     if not world.targetable[victim] or world.life[victim] <= 0.0 or amount <= 0.0 >= shield_bonus:
         return

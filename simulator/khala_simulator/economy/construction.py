@@ -30,9 +30,14 @@ def begin(
 ) -> int:
     """Put an unfinished structure or unit into the world; return its slot.
 
-    Args: world: The game. unit: What it will be. owner: Its owner. point: Its exact centre. loops: Loops of work until
-        it is finished. paid: The price that was charged; a part comes back when it is called off. by_itself: Whether
-        the work goes on without a builder.
+    Args:
+        world: The game.
+        unit: What it will be.
+        owner: Its owner.
+        point: Its exact centre.
+        loops: Loops of work until it is finished.
+        paid: The price that was charged; a part comes back when it is called off.
+        by_itself: Whether the work goes on without a builder.
     """
     slot = lifecycle.spawn(world, unit, owner, point, STRUCTURE_FACING)
     world.build_progress[slot] = 0.0

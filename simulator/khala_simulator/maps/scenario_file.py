@@ -3,7 +3,7 @@
 A file may extend another one and may hold variants of itself:
 
 * ``extends: bases/smac`` takes a shipped file as the beginning;
-* * ``variants: {3m: {...}, 8m: {...}}`` makes one map of each entry, which holds only its differences.
+* ``variants: {3m: {...}, 8m: {...}}`` makes one map of each entry, which holds only its differences.
 
 Later values override earlier ones: mappings are merged key by key; ``units``, ``triggers`` and ``estimates`` are
 joined, where a trigger replaces one of the same name; all else is replaced. This happens on the nodes of YAML, which
@@ -82,7 +82,8 @@ class Sheet:
 def read_scenario(path: Path) -> Scenario:
     """Read one scenario file.
 
-    Raises: ScenarioError: it can't be read, is no YAML, or breaks the language.
+    Raises:
+        ScenarioError: it can't be read, is no YAML, or breaks the language.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -99,7 +100,8 @@ def parse_scenario(text: str, source: str) -> Scenario:
 def single_sheet(text: str, source: str) -> Sheet:
     """Return the only scenario of a text.
 
-    Raises: ScenarioError: it is no YAML, extends a missing file, or has several variants.
+    Raises:
+        ScenarioError: it is no YAML, extends a missing file, or has several variants.
     """
     found = list(sheets(text, source))
     if len(found) != 1:

@@ -123,7 +123,8 @@ class Link(asyncio.Protocol):
 async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]:
     """Return a link to the host of the game on this port, and its answer to the request to join.
 
-    Raises: NobodyCameError: no host accepted a guest for so long.
+    Raises:
+        NobodyCameError: no host accepted a guest for so long.
     """
     loop = asyncio.get_running_loop()
     with contextlib.suppress(TimeoutError):
@@ -159,7 +160,9 @@ class Door:
     async def wait(self, port: int, patience_s: float, full: Callable[[], bool]) -> None:
         """Wait until all guests are there.
 
-        Raises: NobodyCameError: not all guests came. OSError: the port is taken.
+        Raises:
+            NobodyCameError: not all guests came.
+            OSError: the port is taken.
         """
         server = await asyncio.get_running_loop().create_server(self._open, HOST, port)
         try:

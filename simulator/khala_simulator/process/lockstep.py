@@ -64,7 +64,8 @@ class Leave:
 def decode(data: bytes, members: frozenset[int]) -> Commit | Leave:
     """Return the message in bytes, which must be about one of these members.
 
-    Raises: LockstepError: there is none, or it is about another member.
+    Raises:
+        LockstepError: there is none, or it is about another member.
     """
     head, _, log = data.partition(b"\n")
     try:
@@ -112,7 +113,8 @@ class Lockstep:
     def receive(self, message: Commit | Leave) -> None:
         """Apply another member's message; ignore members that have left.
 
-        Raises: LockstepError: it cannot have sent that, or its world differs.
+        Raises:
+            LockstepError: it cannot have sent that, or its world differs.
         """
         if message.member not in self._through:
             return
@@ -139,7 +141,8 @@ class Lockstep:
     def advance(self, loops: int) -> None:
         """Advance the own world by up to so many loops, as far as it may go.
 
-        Raises: LockstepError: another member's world differed.
+        Raises:
+            LockstepError: another member's world differed.
         """
         world = self.game.world
         target = min(world.loop + loops, self.horizon)

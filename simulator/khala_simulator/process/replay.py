@@ -131,7 +131,8 @@ def pack(log: Iterable[LogEntry]) -> bytes:
 def unpack(log: bytes) -> Iterator[LogEntry]:
     """Yield the entries in bytes that `pack` made.
 
-    Raises: struct.error, LookupError, DecodeError: the bytes are invalid.
+    Raises:
+        struct.error, LookupError, DecodeError: the bytes are invalid.
     """
     at = 0
     while at < len(log):

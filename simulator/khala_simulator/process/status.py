@@ -77,7 +77,8 @@ class Machine:
     def check(self, kind: str) -> None:
         """Refuse a request of this kind, if it is not legal now.
 
-        Raises: UsageError: with the sentence for the client.
+        Raises:
+            UsageError: with the sentence for the client.
         """
         if kind in LEGAL[self.status]:
             return

@@ -15,13 +15,22 @@ Point = tuple[float, float]
 class AreaEffect:
     """One effect on the ground.
 
-    Args: rule: Name of the rule that runs it, in ``skills.registry.AREA_EFFECTS``. effect: The API's effect id, 0 when
-        clients do not see it. owner: The owner of the unit that made it. points: Where it is, world units; the first is
-        its middle. radius: World units. begun: Loop at which it came. end: Loop at which it ends. due: Loop at which
-        its rule runs next. period: Loops between two runs. ability: The ability that made it, for its numbers. source:
-        Tag of the unit that made it, 0 for none. target: Tag of the unit that it follows or meets, 0 for none. count:
-        Runs so far; the rule's own counter. sights: Radius in which its owner sees, 0 for none. detects: Whether its
-        owner sees cloaked units there.
+    Args:
+        rule: Name of the rule that runs it, in ``skills.registry.AREA_EFFECTS``.
+        effect: The API's effect id, 0 when clients do not see it.
+        owner: The owner of the unit that made it.
+        points: Where it is, world units; the first is its middle.
+        radius: World units.
+        begun: Loop at which it came.
+        end: Loop at which it ends.
+        due: Loop at which its rule runs next.
+        period: Loops between two runs.
+        ability: The ability that made it, for its numbers.
+        source: Tag of the unit that made it, 0 for none.
+        target: Tag of the unit that it follows or meets, 0 for none.
+        count: Runs so far; the rule's own counter.
+        sights: Radius in which its owner sees, 0 for none.
+        detects: Whether its owner sees cloaked units there.
     """
 
     rule: str

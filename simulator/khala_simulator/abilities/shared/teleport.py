@@ -48,8 +48,12 @@ def spot_near(
 ) -> Point | None:
     """Return the place nearest to ``point`` where a unit fits, or None when there is none.
 
-    Args: world: The game. slot: The unit; its own body is ignored. point: Where it is wanted. reach: How far from where
-        it is now the place may be, centre to centre. seen_by: The place must be in this player's sight.
+    Args:
+        world: The game.
+        slot: The unit; its own body is ignored.
+        point: Where it is wanted.
+        reach: How far from where it is now the place may be, centre to centre.
+        seen_by: The place must be in this player's sight.
     """
     unit, here = world.unit_type(slot), world.pos[slot]
     for radius in SEARCH_RADII:
