@@ -32,7 +32,7 @@ class Arguments(NamedTuple):
 
 
 def parse(argv: list[str]) -> Arguments:
-    """Reads the game's command line; flags that a headless game has no use for are passed over."""
+    """Read the game's command line; ignore flags that a headless game has no use for."""
     values = {flag: argv[i + 1] for i, flag in enumerate(argv[:-1]) if flag in _FLAGS}
     build = _BUILD.search(values.get("-executable", ""))
     return Arguments(
@@ -46,7 +46,7 @@ def parse(argv: list[str]) -> Arguments:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that already takes connections, on an IPv4 or IPv6 literal.
+    """Return a socket that already accepts connections, on an IPv4 or IPv6 literal.
 
     Raises:
         OSError: the address is not free or not of this machine.
@@ -61,13 +61,13 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _leave(*_: object) -> NoReturn:
-    # In the middle of a thousand steps the event loop would hear of the signal too late, and PySC2 kills after 3 s.
-    # There is nothing to save: files are written at the moment they are asked for.
+    # In the middle of a thousand steps the event loop would notice the signal too late, and PySC2 kills after 3 s.
+    # There is nothing to save: files are written as soon as a client asks for them.
     os._exit(0)
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Serves one game until a client says quit, or SIGTERM does."""
+    """Serve one game until a client says quit, or SIGTERM does."""
     signal.signal(signal.SIGTERM, _leave)
     signal.signal(signal.SIGINT, _leave)
     try:

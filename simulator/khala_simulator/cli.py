@@ -38,8 +38,8 @@ def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = 
 
         export SC2PATH=~/khala-sc2
 
-    Doing it again repairs the install and updates its maps; what you added stays. Your own maps are linked: terrain and
-    what stands on them is read from the file, their scripts are not run.
+    Run it again to repair the install and update its maps; your additions stay. Your own maps are linked: terrain and
+    units are read from the file, their scripts are not run.
     """
     try:
         root = install(directory)
@@ -64,7 +64,7 @@ def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = 
 
 @app.command()
 def info(as_json: Json = False) -> None:
-    """Tell which game this is, which maps it has, and where SC2PATH points."""
+    """Show which game this is, which maps it has, and where SC2PATH points."""
     facts = _facts()
     if as_json:
         typer.echo(json.dumps(facts))

@@ -1,6 +1,6 @@
 """One game loop, as a table of contents: the systems of the world in the order in which they run.
 
-Each system is a function of the world and the only place of its rule. Above: what advances the game. Below: one
+Each system is a function of the world and the only place of its rule. Above: the game, which advances it. Below: one
 file of ``systems`` per line.
 """
 
@@ -50,14 +50,14 @@ if TYPE_CHECKING:
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
-    acquire.choose_targets,  # whom to fight, without being told
-    autocast.look_out,  # what to use, without being told
-    engagement.measure,  # who is in reach of his target, who wants to walk where
+    acquire.choose_targets,  # units choose targets by themselves
+    autocast.look_out,  # units use abilities by themselves
+    engagement.measure,  # which units are in reach of their target, and where each wants to walk
     power.run,  # which structures have power
     construction.run,  # what is being built
     casts.carry_on,  # abilities are prepared, take effect, go on
     production.run,  # queues of structures and eggs
-    harvest.run,  # workers take, carry home and come again
+    harvest.run,  # workers take, deliver and come again
     passives.run,  # what units do by their nature
     weapons.fire,  # attacks start, take effect, cool down
     navigation.find_ways,  # the next corner on the way to every goal
@@ -65,9 +65,9 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     movement.move,  # steps, turning, acceleration
     collision.separate,  # bodies and walls
     missiles.fly,
-    sweeps.run,  # lines that are being drawn through the ranks
+    sweeps.run,  # lines of hits in progress
     hits.fall_due,
-    area_effects.run,  # storms, scans and whatever else lies on the ground
+    area_effects.run,  # storms, scans and other effects on the ground
     buffs.run_out,
     idleness.count,
     regeneration.regenerate,
@@ -82,13 +82,13 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
 def new_game(
     game_map: GameMap, players: Sequence[PlayerSetup] = (), *, seed: int = 0, catalog: Catalog | None = None
 ) -> World:
-    """A world at loop 0 in which the map's script has run its start.
+    """Return a world at loop 0 in which the map's script has run its start.
 
     Args:
         game_map: Terrain and scenario.
-        players: Who sits in the slots; by default as the scenario says.
-        seed: Of every random draw of the game.
-        catalog: Tables of a game version; 4.10 by default.
+        players: The players in the slots; by default as the scenario says.
+        seed: The seed of every random draw of the game.
+        catalog: The tables of a game version; 4.10 by default.
     """
     world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog)
     triggers.start(world)
@@ -98,7 +98,7 @@ def new_game(
 
 
 def advance(world: World, loops: int = 1) -> int:
-    """Advance by up to ``loops`` game loops; returns how many, fewer when the game ends on the way."""
+    """Advance by up to ``loops`` game loops; return how many, fewer when the game ends on the way."""
     for done in range(loops):
         if world.ended:
             return done

@@ -1,8 +1,8 @@
 """Using abilities: whether a unit may now, what it costs, and how a use begins, takes effect and ends.
 
-What is the same for every ability stands here: who has it, requirements, cost, cooldown, target filters. What one
-does is its ``skills.Skill``. Players come in by ``use``, units with autocast by ``systems.autocast``; ``systems.casts``
-carries out what does not happen at once.
+This module holds what is the same for every ability: who has it, requirements, cost, cooldown, target filters. The
+ability's ``skills.Skill`` holds what it does. Players enter through ``use``, units with autocast through
+``systems.autocast``; ``systems.casts`` carries out what does not happen at once.
 
 Above: the API, ``systems``. Below: ``skills``, ``commands``.
 """
@@ -40,16 +40,16 @@ WALKS: Final = frozenset({"move", "patrol", "hold_position", "scan_move"})
 MORPHS: Final = frozenset({"morph", "grow", "root", "burrow_tumor", "lift", "land"})
 """Abilities whose time, or a random part of it, passes before they take effect."""
 PAID_FIRST: Final = frozenset({"grow"})
-"""Those that are paid for when they begin: their time passes after the effect."""
+"""Abilities that are paid for when they begin: their time passes after the effect."""
 
 
 def is_modelled(ability: Ability) -> bool:
-    """Whether the simulator has a rule for this ability."""
+    """Return whether the simulator has a rule for this ability."""
     return ability.effect in ORDINARY or ability.effect in SKILLS
 
 
 def as_is(world: World, slot: int, ability: Ability) -> Ability:
-    """The ability as a unit has it now: with what its owner's upgrades change."""
+    """Return the ability as a unit has it now, with the changes of its owner's upgrades."""
     return world.stats.ability(int(world.owner[slot]), ability)
 
 
@@ -68,7 +68,7 @@ def prep_loops(world: World, slot: int, ability: Ability) -> float:
 
 
 def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) -> ActionResult:
-    """Whether a unit could use an ability of its card now, whatever it is aimed at; ``free`` looks at no cost."""
+    """Return why a unit can't use an ability of its card now, or success, for any target; ``free`` ignores the cost."""
     if not is_modelled(ability):
         return ActionResult.NOT_SUPPORTED
     if ability.effect in ORDINARY:
@@ -113,13 +113,13 @@ def _unaffordable(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def cooldown_left(world: World, slot: int, ability: Ability) -> float:
-    """Loops until the ability's cooldown is over, 0 when it is."""
+    """Return the loops until the ability's cooldown is over, 0 when it is."""
     timers = world.players[int(world.owner[slot])].timers if ability.cooldown_shared else world.timers.get(slot, {})
     return max(0.0, timers.get(ability.timer, 0.0) - world.loop)
 
 
 def aim_refusal(world: World, cast: Cast) -> ActionResult:
-    """Whether a unit may aim an ability like this; the way there is not looked at, unless it can't walk."""
+    """Return why a unit can't aim an ability like this, or success; the way there only counts if it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
@@ -136,7 +136,7 @@ def aim_refusal(world: World, cast: Cast) -> ActionResult:
 
 
 def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
-    """Whether a unit may be the target of another one's ability by the catalog's filter."""
+    """Return why the catalog's filter forbids a unit as the target of another unit's ability, or success."""
     for word in words.required:
         if not _is(world, slot, target, word):
             return NOT_REQUIRED.get(word, ActionResult.CANT_TARGET_THAT_UNIT)
@@ -147,7 +147,7 @@ def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:
 
 
 def _is(world: World, slot: int, target: int, word: str) -> bool:
-    """Whether a word of a filter holds for a target; words for things that the world does not have never do."""
+    """Return whether a word of a filter holds for a target; words for things that the world lacks never do."""
     rule = WORDS.get(word)
     return rule is not None and bool(rule(world, slot, target))
 
@@ -203,7 +203,7 @@ WORDS: Final[dict[str, Callable[[World, int, int], bool]]] = {
 
 
 def in_range(world: World, cast: Cast, *, slop: float | None = None) -> bool:
-    """Whether a unit stands near enough for its ability, from edge to edge; ``slop`` is what it may be beyond."""
+    """Return whether a unit is near enough for its ability, edge to edge; ``slop`` is the tolerance beyond it."""
     ability = cast.ability
     away = _distance(world, cast)
     if away is None or ability.range >= ANYWHERE:
@@ -212,7 +212,7 @@ def in_range(world: World, cast: Cast, *, slop: float | None = None) -> bool:
 
 
 def _distance(world: World, cast: Cast) -> float | None:
-    """From the caster's centre to the target's or to the point; None for a cast at nothing."""
+    """Return the distance from the caster's centre to the target's or the point; None for a cast at nothing."""
     goal = world.pos[cast.target].tolist() if cast.target != NOBODY else cast.point
     if goal is None:
         return None
@@ -221,7 +221,7 @@ def _distance(world: World, cast: Cast) -> float | None:
 
 
 def reach(world: World, cast: Cast) -> float:
-    """From centre to centre, how near a caster must come."""
+    """Return how near a caster must come, centre to centre."""
     if cast.ability.overhead:
         return 0.0
     if cast.target != NOBODY and cast.ability.range == 0.0:
@@ -242,9 +242,9 @@ def use(
     point: Point | None = None,
     queue: bool = False,
 ) -> list[int]:
-    """Have units use an ability of theirs on a unit (tag), at a point or on nothing; returns the slots that will.
+    """Make units use an ability on a unit (tag), at a point or on nothing; return the slots that will.
 
-    Those that can't are left alone. Of several only the nearest uses an ability that is ``solo``.
+    Units that can't are left alone. Only the nearest of several units uses an ability that is ``solo``.
     """
     victim = world.slot_of(target)
     casts = [Cast(slot, as_is(world, slot, ability), victim, point) for slot in slots]
@@ -254,7 +254,7 @@ def use(
 
 
 def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool = False) -> list[int]:
-    """Have units carry out casts of one ability that nothing stands against; returns the slots that will."""
+    """Make units carry out casts of one ability that nothing forbids; return the slots that will."""
     target, point = casts[0].target, casts[0].point
     give = SKILLS[ability.effect].give
     if give is not None:
@@ -275,7 +275,7 @@ def order(world: World, casts: Sequence[Cast], ability: Ability, *, queue: bool 
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """The right click: what the skills make of it, else what ``commands`` does; returns the slots that took it."""
+    """Right-click: do what the skills make of it, else what ``commands`` does; return the slots that took it."""
     rest, taken, victim = list(slots), list[int](), world.slot_of(target)
     for rule in SMARTS:
         some = rule(world, rest, victim, point, queue)
@@ -285,18 +285,18 @@ def smart(
 
 
 def _busy(world: World, cast: Cast) -> bool:
-    """Whether the unit is using this very ability already: another one is asked first."""
+    """Return whether the unit already uses this very ability; other units are asked first."""
     return bool(world.casts[cast.slot]) and int(world.order_ability[cast.slot]) == cast.ability.id
 
 
 def _away(world: World, cast: Cast) -> float:
-    """What a caster is chosen by, the least first: its way, or its energy where there is none."""
+    """Return the key by which a caster is chosen, smallest first: its distance, or its energy where there is none."""
     distance = _distance(world, cast)
     return -float(world.energy[cast.slot]) if distance is None else distance
 
 
 def perform(world: World, cast: Cast) -> None:
-    """Take the cost, begin the cooldown and let the ability take effect."""
+    """Charge the cost, start the cooldown and make the ability take effect."""
     slot, ability = cast.slot, cast.ability
     player = world.players[int(world.owner[slot])]
     payments.charge(world, player.id, prices.cost_of(ability))
@@ -308,7 +308,7 @@ def perform(world: World, cast: Cast) -> None:
 
 
 def start_cooldown(world: World, slot: int, ability: Ability, loops: float | None = None) -> None:
-    """Let the ability's cooldown run from now, ``loops`` long or as the tables say."""
+    """Start the ability's cooldown now, for ``loops`` or for as long as the tables say."""
     lasts = ability.cooldown_loops if loops is None else loops
     if lasts:
         shared = world.players[int(world.owner[slot])].timers
@@ -317,11 +317,11 @@ def start_cooldown(world: World, slot: int, ability: Ability, loops: float | Non
 
 
 def skill_of(ability: Ability) -> Skill:
-    """The rule behind an ability; raises ``KeyError`` for one that is not modelled."""
+    """Return the rule behind an ability; raise ``KeyError`` for one that is not modelled."""
     return SKILLS[ability.effect]
 
 
 def fail(world: World, cast: Cast, why: ActionResult) -> None:
-    """Tell a player that an order could not be carried out in the end."""
+    """Tell a player that an order could not be carried out after all."""
     owner = int(world.owner[cast.slot])
     world.mishaps.append(Mishap(world.loop, owner, world.tag_of(cast.slot), cast.ability.id, why))

@@ -1,8 +1,8 @@
 """What players and the debug interface may ask of the world, already validated.
 
-The way in for orders: the API resolves which ability is meant and for which units; here an order becomes the units'
-current one or waits in their queues. Everything takes effect when the world next advances. Units that can't do what
-is asked are left alone, and the slots that took the order are returned.
+Orders enter here: the API resolves the ability and the units; this module makes the order the units' current one or
+puts it into their queues. Everything takes effect when the world next advances. Units that can't do what is asked are
+left alone; the functions return the slots that took the order.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Point = tuple[float, float]
 
 
 def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
-    """Walk to a point and look at nobody on the way."""
+    """Walk to a point and ignore everyone on the way."""
     order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
     return give(world, [s for s in slots if can_move(world, s)], order, queue=queue)
 
@@ -70,7 +70,7 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
 
 
 def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
-    """Attack one unit (a tag) until it is dead; allies too, when told so."""
+    """Attack one unit (a tag) until it is dead; allies too, if the order says so."""
     victim = world.slot_of(target)
     if victim == NOBODY:
         return []
@@ -109,7 +109,7 @@ def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
-    """The right click: attack an enemy, harvest a resource, drop off a load, follow anybody else, walk to a point."""
+    """Right-click: attack an enemy, harvest a resource, drop off a load, follow any other unit, walk to a point."""
     victim = world.slot_of(target)
     if victim == NOBODY:
         return [] if point is None else move(world, slots, point, queue=queue)
@@ -124,7 +124,7 @@ def smart(
 
 
 def gather(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
-    """Harvest a mineral field or a gas structure (a tag) until told otherwise."""
+    """Harvest a mineral field or a gas structure (a tag) until another order comes."""
     resource = world.slot_of(target)
     taken: list[int] = []
     for slot in slots:
@@ -154,7 +154,7 @@ def surrender(world: World, player: int) -> None:
 
 
 def debug_kill(world: World, tags: Iterable[int]) -> None:
-    """Kill units; unknown tags are ignored. They die when the world next advances, credited to nobody."""
+    """Kill units; unknown tags are ignored. They die when the world next advances, and no player gets the credit."""
     for tag in tags:
         slot = world.slot_of(tag)
         if slot != NOBODY:
@@ -163,7 +163,7 @@ def debug_kill(world: World, tags: Iterable[int]) -> None:
 
 
 def debug_create(world: World, type_id: int, owner: int, point: Point, quantity: int = 1) -> list[int]:
-    """Create complete units exactly at a point, all on each other; returns their slots."""
+    """Create complete units exactly at one point, on top of each other; return their slots."""
     unit = world.catalog.unit(type_id)
     return [lifecycle.spawn(world, unit, owner, point) for _ in range(quantity)]
 
@@ -184,7 +184,7 @@ def debug_set_value(world: World, tag: int, *, life: float | None = None, shield
 
 
 def debug_switch(world: World, player: int, name: str) -> None:
-    """Switch a debug state of a player's on, or off again."""
+    """Switch a debug state of a player on, or off again."""
     cheats = world.players[player].cheats
     if name in cheats:
         cheats.remove(name)
@@ -218,7 +218,7 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
 
 
 def _soon(world: World, slot: int) -> UnitType:
-    """The type of a unit, or the one that it is about to be of when it is in the midst of a morph."""
+    """Return the type of a unit, or the type that it is morphing into."""
     if world.bound[slot] and world.casts[slot]:
         row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
         if row is not None:
@@ -227,26 +227,26 @@ def _soon(world: World, slot: int) -> UnitType:
 
 
 def can_move(world: World, slot: int) -> bool:
-    """Whether a unit takes movement orders: what it is or is about to be has a speed, or an upgrade gives it one."""
+    """Return whether a unit takes movement orders: its type, or the next one, has a speed or gets one by upgrade."""
     unit = _soon(world, slot)
     return bool(world.stats.step[world.owner[slot], unit.row] > 0.0) and _commandable(unit)
 
 
 def can_attack(world: World, slot: int) -> bool:
-    """Whether the unit has a weapon that it can aim now."""
+    """Return whether the unit has a weapon that it can aim now."""
     armed = world.ground_weapon[slot] >= 0 or world.air_weapon[slot] >= 0
     return bool(armed) and _commandable(world.unit_type(slot))
 
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
-    """Whether the unit has a weapon that it can aim at ``victim`` now."""
+    """Return whether the unit has a weapon that it can aim at ``victim`` now."""
     if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
         return False
     return weapon_for(world, slot, victim) >= 0
 
 
 def is_enemy(world: World, player: int, other: int) -> bool:
-    """Whether two owners fight each other; nobody fights the neutral player by himself."""
+    """Return whether two owners fight each other; no unit attacks the neutral player unless ordered."""
     return player != other and 0 not in (player, other) and len(world.players) > max(player, other)
 
 
@@ -260,7 +260,7 @@ def _inside(world: World, point: Point) -> Point:
 
 
 def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
-    """Make an order the units' current one, or let it wait in their queues; returns the slots that took it."""
+    """Make an order the units' current one, or append it to their queues; return the slots that took it."""
     taken = []
     wanted = order
     for slot in slots:
@@ -295,7 +295,7 @@ GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
 
 
 def _of_its_own(world: World, slot: int, order: Order) -> Order:
-    """The order with the ability id that the unit's own type has for it; a Battlecruiser moves by another one."""
+    """Return the order with the ability id of the unit's own type; a Battlecruiser has its own move."""
     effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
     own = None if effect is None else world.catalog.ordinary[int(world.type[slot])].get(effect)
     return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
@@ -349,7 +349,7 @@ def _end_harvest(world: World, slot: int) -> None:
 
 
 def begin_next(world: World, slot: int) -> None:
-    """Begin the next order of a unit; a patrol turns round, targets that are gone are skipped."""
+    """Begin the next order of a unit; a patrol turns round, orders whose target is gone are skipped."""
     waiting = world.queue[slot]
     if world.order_kind[slot] == OrderKind.PATROL and not waiting:
         here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()

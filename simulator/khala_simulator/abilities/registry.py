@@ -8,7 +8,7 @@ One module per group of units. Each offers some of these tables, and here they a
 * ``FINALS``: a buff's name → what it does when its bearer dies, called with the slot while it is still there
 * ``SMARTS``: what a right click means to some units, called with the slots, the target's slot, the point and whether to
   queue it; returns those that took it
-* ``PASSIVES``: a unit type's name → what units of it do in every loop without being told
+* ``PASSIVES``: a unit type's name → what units of it do in every loop without an order
 * ``DEATHS``: a unit type's name → what happens when one dies, called with the slot while it is still there
 
 ``casting`` and the systems look things up here; the modules know the world and nothing above it.
@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 
 def _joined(*tables: dict[str, Callable[[World, T], None]]) -> dict[str, Callable[[World, T], None]]:
-    """The rules of several tables; a type that more than one of them names obeys all its rules in turn."""
+    """Return the joined rules of several tables; a type in more than one of them runs all its rules in turn."""
     rules: dict[str, list[Callable[[World, T], None]]] = {}
     for table in tables:
         for name, rule in table.items():

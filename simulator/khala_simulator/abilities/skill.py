@@ -1,7 +1,7 @@
 """What a skill is: the rule that carries out an ability, as a few functions of the world and the cast.
 
 Costs, cooldowns, requirements, target filters and the way there are the same for all abilities and stand in
-``casting``; a skill says only what is its own. Beside the type here are the few things that many skills do.
+``casting``; a skill says only what is its own. This module holds the type and the few things that many skills do.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ UnitRule: TypeAlias = Callable[["World", "list[int]"], None]
 
 
 def no_effect(_: World, __: Cast) -> None:
-    """An ability that is carried out in its own way."""
+    """Do nothing: the ability is carried out in its own way."""
 
 
 def nothing_against_it(_: World, __: Cast) -> ActionResult:
-    """No reason of its own to refuse."""
+    """Return success: the ability has no reason of its own to refuse."""
     return ActionResult.SUCCESS
 
 
@@ -46,9 +46,9 @@ class Skill:
 
     Args:
         effect: Called when it takes effect; cost and cooldown are taken by then.
-        give: Carries the order out in its own way instead of as a cast, such as by a structure's queue: called with
-            the units that may, the ability, the target (tag), the point and whether to queue it; returns those that
-            took it. It charges what it costs.
+        give: Carries the order out in its own way instead of as a cast, such as by a structure's queue: called with the
+            units that may, the ability, the target (tag), the point and whether to queue it; returns those that took
+            it. It charges what it costs.
         refuse: Reasons of its own against the cast, ``ActionResult.SUCCESS`` for none.
         ready: Reasons of its own against using it now, whatever it is aimed at.
         anytime: A unit that can't act may use it too, such as a structure that is to be cancelled.
@@ -57,7 +57,7 @@ class Skill:
         pick: The target (slot) that a unit with autocast chooses, NOBODY for none; the nearest allowed one without.
         prepare: Called when the caster begins to prepare (``prep_loops``).
         binds: Once it has begun, other orders wait until it is over.
-        estimates: What of it is no fact of the sources, a sentence each.
+        estimates: Which parts of it no source confirms, a sentence each.
     """
 
     effect: Effect = no_effect
@@ -77,7 +77,7 @@ class Skill:
 
 
 def number(cast_or_ability: Cast | Ability, name: str, default: float | None = None) -> float:
-    """One of the ability's own figures; raises ``KeyError`` when the tables lack it and there is no default."""
+    """Return one of the ability's own numbers; raise ``KeyError`` when the tables lack it and there is no default."""
     ability: Any = getattr(cast_or_ability, "ability", cast_or_ability)
     value = ability.numbers.get(name, default)
     if value is None:
@@ -88,7 +88,7 @@ def number(cast_or_ability: Cast | Ability, name: str, default: float | None = N
 def around(
     world: World, point: Point, radius: float, *, plane: str = "any", edge: bool = True, structures: bool = True
 ) -> list[int]:
-    """Slots of the living units within ``radius`` of a point, ascending, those that can't be touched left out.
+    """Return the slots of living, touchable units within ``radius`` of a point, ascending.
 
     Measured to their edge, or to their centre with ``edge`` off.
     """
@@ -106,17 +106,17 @@ def around(
 
 
 def foes(world: World, slots: list[int], owner: int) -> list[int]:
-    """Those of ``slots`` that fight ``owner``."""
+    """Return those of ``slots`` that are enemies of ``owner``."""
     return [slot for slot in slots if int(world.owner[slot]) not in (owner, 0)]
 
 
 def friends(world: World, slots: list[int], owner: int) -> list[int]:
-    """Those of ``slots`` that are the owner's."""
+    """Return those of ``slots`` that are the owner's."""
     return [slot for slot in slots if int(world.owner[slot]) == owner]
 
 
 def place_of(world: World, cast: Cast) -> Point:
-    """Where a cast is aimed: the target's place, else its point, else the caster's place."""
+    """Return where a cast is aimed: the target's place, else its point, else the caster's place."""
     slot = cast.target if cast.target != NOBODY else cast.slot
     if cast.target == NOBODY and cast.point is not None:
         return cast.point
@@ -127,7 +127,7 @@ def place_of(world: World, cast: Cast) -> Point:
 def lay(
     world: World, cast: Cast, rule: str, *, end: float, due: float, effect: int = 0, period: float = 1.0
 ) -> AreaEffect:
-    """Begin an area effect where a cast is aimed, as wide as the ability says; the caller may change it on.
+    """Begin an area effect where a cast is aimed, as wide as the ability says; the caller may change it further.
 
     Its ``rule`` runs from the loop ``due`` on, every ``period`` loops, until the loop ``end``.
     """
@@ -149,13 +149,13 @@ def lay(
 
 
 def distance(world: World, slot: int, point: Point) -> float:
-    """From a unit's centre to a point."""
+    """Return the distance from a unit's centre to a point."""
     x, y = world.pos[slot].tolist()
     return math.hypot(point[0] - x, point[1] - y)
 
 
 def nearest_hurt(world: World, slot: int, reach: float, attribute: int) -> list[int]:
-    """The owner's other units with an attribute (bit) that lack life, within reach of a unit, the nearest first."""
+    """Return the owner's other damaged units with an attribute (bit), within reach of a unit, the nearest first."""
     hurt = world.live[world.life[world.live] < world.life_max[world.live]]
     friends = hurt[world.owner[hurt] == world.owner[slot]]
     if not friends.size:
@@ -171,12 +171,12 @@ def nearest_hurt(world: World, slot: int, reach: float, attribute: int) -> list[
 
 
 def touching(world: World, slot: int, other: int) -> float:
-    """From centre to centre, how far apart two bodies are that can't come nearer to each other."""
+    """Return the distance of two touching bodies, centre to centre."""
     bodies = float(world.radius[slot] + world.radius[other])
     return max(bodies, float(world.separation[slot] + world.separation[other]))
 
 
 def gap(world: World, slot: int, other: int) -> float:
-    """From edge to edge."""
+    """Return the distance of two units, edge to edge."""
     (x, y), (a, b) = world.pos[slot].tolist(), world.pos[other].tolist()
     return math.hypot(a - x, b - y) - float(world.radius[slot] + world.radius[other])

@@ -1,8 +1,8 @@
-"""Commands: which ability a requested id means to each unit, how the world is told, and what came of it.
+"""Commands: which ability a requested id means to each unit, the orders that follow, and their outcome.
 
-Clients name an ability by its general or by its specific id. A general one stands for whichever specific one each
-unit has: Attack (3674) is an attack (23) to a Stalker and a scan-move (19) to an Observer. What a command was in the
-end is reported back with the specific id.
+Clients name an ability by its general or by its specific id. A general id stands for the specific one of each unit:
+Attack (3674) is an attack (23) to a Stalker and a scan-move (19) to an Observer. The report on a command has the
+specific id.
 
 Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves and fights), `casting.py` (the rest).
 """
@@ -52,15 +52,15 @@ class UnitCommand:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class OrderPlan:
-    """A command as it was judged: its result, and what to do if that is a success.
+    """A judged command: its result, and what to do if that is a success.
 
     Args:
         asked: The command.
-        result: How it goes.
-        ability: The specific id by which it is reported.
-        target: The unit (tag) that it is aimed at; a snapshot's is the unit that it shows.
+        result: The result.
+        ability: The specific id in the report.
+        target: The unit (tag) that it is aimed at; for a snapshot the unit that it shows.
         point: Where it is aimed.
-        parts: The specific abilities, by ascending id, and who is to use each at what.
+        parts: The specific abilities, by ascending id, each with its units and its target.
     """
 
     asked: UnitCommand
@@ -73,7 +73,7 @@ class OrderPlan:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a command: how it went, as which specific ability, and which units took it."""
+    """The outcome of a command: its result, the specific ability, and the units that took it."""
 
     result: Result
     ability: int = 0
@@ -81,21 +81,21 @@ class Outcome:
 
 
 def result_of(why: ActionResult) -> Result:
-    """The API's word for a refusal."""
+    """Return the API's value for a refusal."""
     result: Result = error_pb2.ActionResult.Value(error_pb2.ActionResult.Name(int(why)))  # type: ignore[arg-type]  # same numbers
     return result
 
 
 def meant(world: World, slot: int, requested: int) -> Ability | None:
-    """What a requested id, general or specific, means to a unit; None for nothing.
+    """Return the ability that a requested id, general or specific, means to a unit, or None.
 
-    Of several that one general id stands for, such as the ways to cancel, the first that the unit can use now.
+    If a general id stands for several, such as the ways to cancel, this is the first that the unit can use now.
     """
     return _meant(world, slot, requested)[0]
 
 
 def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
-    """As ``meant``, and whether the unit can use it now; None where that did not have to be looked at."""
+    """Return the result of ``meant``, and whether the unit can use it now; None where that was not checked."""
     card = world.catalog.abilities_of(int(world.type[slot])) if requested > 0 else ()
     exact = next((a for a in card if a.id == requested), None)
     if exact is not None:
@@ -111,13 +111,13 @@ def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, Act
 
 
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
-    """What a unit can be told to do now, by ascending id; ``free`` looks at no cost and no cooldown."""
+    """Return the abilities that a unit can use now, by ascending id; ``free`` ignores cost and cooldown."""
     card = world.catalog.abilities_of(int(world.type[slot]))
     return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
-    """How a command goes now, and what it comes to; nothing is done yet."""
+    """Judge how a command would go now and what it would do; nothing is done yet."""
     slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
     all_obey = "control_enemy" in world.players[player].cheats
     own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
@@ -144,7 +144,7 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
 
 
 def carry_out(world: World, plan: OrderPlan) -> Outcome:
-    """Give a command to the units that can take it, as it was judged in the world as it is now."""
+    """Give a command to the units that can take it, as judged in the present world."""
     if plan.result != error_pb2.Success:
         return Outcome(plan.result)
     taken: list[int] = []
@@ -165,7 +165,7 @@ def _refused(command: UnitCommand, why: ActionResult) -> OrderPlan:
 
 
 def _without_snapshot(world: World, player: int, command: UnitCommand) -> UnitCommand:
-    """A command at a snapshot as one at what it shows: a resource that still lies there, or else its place."""
+    """Return a command at a snapshot as one at its unit, if that is a resource still in place, or else at its point."""
     snapshot = world.memories[player].find(command.target) if command.target != NO_TAG else None
     if snapshot is None:
         return command
@@ -175,16 +175,16 @@ def _without_snapshot(world: World, player: int, command: UnitCommand) -> UnitCo
 
 
 def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
-    """The id by which a command of several kinds is reported: that of a fight before that of a walk."""
+    """Return the id that reports a command of several kinds: a fight's before a walk's."""
     return max(parts, key=lambda part: (part[0].effect == "attack", -part[0].id))[0].id
 
 
 def _groups(
     world: World, slots: list[int], requested: int
 ) -> list[tuple[Ability, list[tuple[int, ActionResult | None]]]]:
-    """The specific abilities that a requested id stands for, by ascending id.
+    """Return the specific abilities that a requested id stands for, by ascending id.
 
-    With each go the units that have it, and whether they can use it now where that is known already.
+    Each comes with the units that have it, and whether they can use it now, where that is already known.
     """
     groups: dict[int, tuple[Ability, list[tuple[int, ActionResult | None]]]] = {}
     for slot in slots:
@@ -197,7 +197,7 @@ def _groups(
 def _judged(
     world: World, player: int, slot: int, ability: Ability, command: UnitCommand, known: ActionResult | None
 ) -> Cast | ActionResult:
-    """What a unit is to do with its ability, or why it can't; ``known`` is what is known of the latter."""
+    """Return what a unit is to do with its ability, or why it can't; ``known`` is the reason if already known."""
     if not command.aim & ability.aim:
         aimless = Aim.POINT not in ability.aim
         return ActionResult.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
@@ -279,4 +279,4 @@ GIVE: dict[str, Callable[[World, list[int], OrderPlan], list[int]]] = {
     "attack": _attack,
     "scan_move": _scan_move,
 }
-"""What is no skill; everything else goes through ``casting.order``."""
+"""Commands that are no skills; all others go through ``casting.order``."""

@@ -1,9 +1,9 @@
 """What a client's actions do, and how they are reported back.
 
 An action is judged when it arrives, which gives the result code of the response, and takes effect when the game next
-advances: as it was judged, or judged again if something else has taken effect since. From then on the next
-observation reports it, in every form that the client's interface has: a raw command also as the click that would have
-given it, a click also as the raw command that it was. Nothing that a client puts into an action is a usage error.
+advances: as it was judged, or judged again if something else has taken effect since. The next observation then reports
+it in every form that the client's interface has: a raw command also as the equivalent click, a click also as the
+equivalent raw command. Nothing in an action is a usage error.
 
 Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` (commands).
 """
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 
 
 ON_MINIMAP = casting.ORDINARY | {"rally"}
-"""What can be told by a click on the minimap, whoever is told; PySC2 has no such function for most of the rest."""
+"""Commands that a click on the minimap can give, to any unit; PySC2 has no such function for most others."""
 
 
 class Judgement(NamedTuple):
-    """The result code for an action as things stand, and what its first command comes to, None without one."""
+    """The result code for an action at present, and the plan of its first command, None without one."""
 
     result: Result
     plan: OrderPlan | None = None
 
 
 def judge(seat: PlayerSeat, action: sc.Action) -> Judgement:
-    """How an action goes as things stand; one that says nothing succeeds."""
+    """Judge how an action would go at present; an empty one succeeds."""
     plans = list[OrderPlan]()
     for plan in _plans(seat, action):
         plans.append(plan)
@@ -63,13 +63,13 @@ def _beside_commands(seat: PlayerSeat, action: sc.Action) -> Result:
 
 
 def perform(seat: PlayerSeat, action: sc.Action, loop: int, plan: OrderPlan | None = None) -> None:
-    """Have an action take effect, and note what the next observation is to report of it.
+    """Carry out an action, and note what the next observation reports of it.
 
     Args:
         seat: Whose action it is.
         action: The action.
         loop: The loop in which it takes effect.
-        plan: What its first command comes to, if it was judged in the world as it is now.
+        plan: The plan of its first command, if it was judged in the present world.
     """
     for planned in _plans(seat, action, plan):
         _give(seat, planned, loop, by_tags=action.action_raw.HasField("unit_command"))
@@ -94,13 +94,13 @@ def perform(seat: PlayerSeat, action: sc.Action, loop: int, plan: OrderPlan | No
 
 
 def _spatial(seat: PlayerSeat, action: sc.Action) -> tuple[spatial_pb2.ActionSpatial, ImagePair]:
-    """What was clicked, and on which images."""
+    """Return the click, and the images that it was on."""
     kind = "action_feature_layer" if action.HasField("action_feature_layer") else "action_render"
     return getattr(action, kind), seat.views.get(kind, seat.view)
 
 
 def _images(seat: PlayerSeat, action: sc.Action) -> Iterator[tuple[spatial_pb2.ActionSpatial, ImagePair]]:
-    """The part of a report for each kind of images that its reader has, with these images."""
+    """Return the part of a report for each kind of images that its reader has, with these images."""
     return ((getattr(action, kind), view) for kind, view in seat.reported.items())
 
 
@@ -112,7 +112,7 @@ def _finite(point: common_pb2.Point) -> bool:
 
 
 def _plans(seat: PlayerSeat, action: sc.Action, first: OrderPlan | None = None) -> Iterator[OrderPlan]:
-    """What the commands of an action come to, each judged when it is its turn; ``first`` is known already."""
+    """Yield the plans of an action's commands, each judged when its turn comes; ``first`` is already known."""
     if action.action_raw.HasField("unit_command"):
         yield first or _judged(seat, _from_tags(seat, action.action_raw.unit_command))
         first = None
@@ -140,7 +140,7 @@ def _from_tags(seat: PlayerSeat, message: raw_pb2.ActionRawUnitCommand) -> UnitC
 
 
 def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand, view: ImagePair) -> UnitCommand:
-    """The command that a click on the screen or the minimap gives to the selected units."""
+    """Return the command that a click on the screen or the minimap gives to the selected units."""
     target, point, clicked = 0, None, None
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
@@ -158,7 +158,7 @@ def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand,
 
 
 def _takes_units(seat: PlayerSeat, requested: int) -> bool:
-    """Whether a click can mean a unit: what the selected units have of a general ability may take points only."""
+    """Return whether a click can mean a unit: the selected units' form of a general ability may take points only."""
     meant = (abilities.meant(seat.world, slot, requested) for slot in seat.selection.slots(seat.world))
     return any(Aim.UNIT in ability.aim for ability in meant if ability is not None)
 
@@ -210,7 +210,7 @@ def _press(seat: PlayerSeat, ui: ui_pb2.ActionUI, loop: int) -> None:
 
 
 def _report_autocast(seat: PlayerSeat, ability: int, tags: Iterable[int], loop: int) -> None:
-    """A switch of autocast, in the words of the raw interface and in those of the panel."""
+    """Report a switch of autocast, as a raw action and as a click on the panel."""
     action = seat.report(loop)
     action.action_ui.toggle_autocast.ability_id = ability
     if seat.options.raw:

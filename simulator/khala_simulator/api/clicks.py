@@ -1,6 +1,6 @@
 """Selection by clicks, rectangles, hotkeys and panels, as actions of a client.
 
-Each function tells whether the action did anything; one that did not is not reported back, as in the game. Above:
+Each function returns whether the action did anything; if not, it is not reported back, as in the game. Above:
 `actions.py`. Below: `selection.py`.
 """
 
@@ -33,7 +33,7 @@ IdleWorker = ui_pb2.ActionSelectIdleWorker
 
 
 def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bool:
-    """A click or a rectangle on the screen that the player looks at."""
+    """Select by a click or a rectangle on the screen that the player looks at."""
     if spatial.HasField("unit_selection_point"):
         return _select_point(seat, spatial.unit_selection_point, screen)
     if spatial.HasField("unit_selection_rect"):
@@ -42,7 +42,7 @@ def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: Screen)
 
 
 def press(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
-    """A hotkey or a click on a panel; panels that are not there do nothing."""
+    """Apply a hotkey or a click on a panel; panels that are not there do nothing."""
     kind = ui.WhichOneof("action")
     sight, types = seat.look(), seat.types
     match kind:
@@ -72,7 +72,7 @@ def press(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
 
 
 def is_possible(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
-    """Whether a panel or a control group that an action names is there at all."""
+    """Return whether the panel or control group that an action names exists."""
     kind = ui.WhichOneof("action")
     if kind == "control_group":
         return ui.control_group.control_group_index < GROUPS
@@ -98,7 +98,7 @@ def toggle_autocast(world: World, player: int, requested: int, tags: Iterable[in
 
 
 def _autocasters(world: World, player: int, requested: int, tags: Iterable[int]) -> list[tuple[int, int]]:
-    """The player's units among ``tags`` (slots) that could use an ability by themselves, with its specific id."""
+    """Return the player's units among ``tags`` (slots) that could autocast an ability, with its specific id."""
     chosen: list[tuple[int, int]] = []
     for slot in map(world.slot_of, tags):
         ability = meant(world, slot, requested) if slot != NOBODY and world.owner[slot] == player else None
@@ -108,20 +108,20 @@ def _autocasters(world: World, player: int, requested: int, tags: Iterable[int])
 
 
 def _cargo(seat: PlayerSeat) -> list[int]:
-    """Tags of what is inside the selected transport, in the order of the panel."""
+    """Return the tags of the units inside the selected transport, in the order of the panel."""
     slots = seat.selection.slots(seat.world)
     return [seat.world.tag_of(s) for s in seat.world.passengers(slots[0])] if len(slots) == 1 else []
 
 
 def _queued(seat: PlayerSeat) -> int:
-    """How many jobs the selected structure has in its queue."""
+    """Return the number of jobs in the selected structure's queue."""
     slots = seat.selection.slots(seat.world)
     own = len(slots) == 1 and seat.world.owner[slots[0]] == seat.player
     return len(seat.world.jobs.get(slots[0], ())) if own else 0
 
 
 def _unload(seat: PlayerSeat, index: int) -> bool:
-    """Have the selected transport set down one of its passengers."""
+    """Make the selected transport unload one of its passengers."""
     cargo = _cargo(seat)
     if not 0 <= index < len(cargo):
         return False
@@ -134,7 +134,7 @@ def _unload(seat: PlayerSeat, index: int) -> bool:
 
 
 def _choose(seat: PlayerSeat, tags: Iterable[int], *, add: bool = False) -> bool:
-    """Selects own units in the order of the panel; none of them leaves the selection as it is."""
+    """Select own units in the order of the panel; if there are none, the selection stays as it is."""
     chosen = [int(tag) for tag in tags]
     if not chosen:
         return False

@@ -1,8 +1,8 @@
-"""The answer to `data`: what abilities, unit types, upgrades, buffs and effects there are.
+"""The answer to `data`: all abilities, unit types, upgrades, buffs and effects.
 
-Numbers of units and upgrades come from the catalog that the game is played with; what the API says beyond that
-(names, targets, which ability stands for which) from the tables in `data/api`. Lists are dense: the entry at index
-i has the id i, because PySC2 looks abilities up by position.
+Numbers of units and upgrades come from the game's catalog; other facts of the API (names, targets, which ability stands
+for which) from the tables in `data/api`. Lists are dense: the entry at index i has the id i, because PySC2 looks
+abilities up by position.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _NORMAL_SECOND_LOOPS = 16
 
 @functools.cache
 def rows(name: str) -> list[dict[str, str]]:
-    """The rows of a table of `data/api`, as they stand there; a blank means that the API leaves the field out."""
+    """Return the unchanged rows of a table of `data/api`; a blank means that the API leaves the field out."""
     path = resources.files("khala_simulator.data") / "api" / f"{name}.tsv"
     lines = path.read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(lines, delimiter="\t", quoting=csv.QUOTE_NONE, restval=""))
 
 
 def answer(catalog: Catalog, request: sc2api_pb2.RequestData) -> sc2api_pb2.ResponseData:
-    """The tables that a request asks for."""
+    """Return the tables that a request asks for."""
     return sc2api_pb2.ResponseData(
         abilities=map(_ability, rows("abilities")) if request.ability_id else (),
         units=_units(catalog) if request.unit_type_id else (),

@@ -1,7 +1,7 @@
 """Debug commands of clients: units made and killed, values set, a game ended.
 
-What the world has no notion of yet is accepted and does nothing, as the game does with what it does not know. Above:
-`game.py`. Below: `commands.py`.
+Commands that the world does not support are accepted and do nothing, as in the game. Above: `game.py`. Below:
+`commands.py`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SWITCHES = {
 
 
 def execute(world: World, player: int, command: debug_pb2.DebugCommand) -> None:
-    """Does what a debug command of a player says."""
+    """Carry out a debug command of a player."""
     match command.WhichOneof("command"):
         case "create_unit":
             _create(world, command.create_unit)

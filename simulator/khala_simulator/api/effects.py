@@ -1,6 +1,6 @@
-"""What a player perceives besides units: effects on the ground, buffs, the power of pylons, what radar tells.
+"""What a player perceives in addition to units: effects on the ground, buffs, the power of pylons, radar.
 
-The one place that decides which are told; raw data, feature layers and rendered images show the same. Below:
+The one place that decides which are visible; raw data, feature layers and rendered images show the same. Below:
 `sight.py`, the world's area effects and buffs.
 """
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 BLIP_RADIUS = 0.5
-"""World units of the disc that stands for a unit of which radar tells nothing but its place."""
+"""World units of the disc that stands for a unit of which radar shows only the place."""
 
 
 class Worn(NamedTuple):
@@ -41,7 +41,7 @@ class Worn(NamedTuple):
     id: Ints  # of the API
     remain: Floats  # loops, 0 for one without an end
     total: Floats  # loops that it lasts, 0 for one without an end
-    foreign: NDArray[np.bool_]  # somebody else's unit cast it
+    foreign: NDArray[np.bool_]  # cast by another player's unit
 
 
 class Spots(NamedTuple):
@@ -59,7 +59,7 @@ class Power(NamedTuple):
 
 
 def seen_area_effects(world: World, player: int, *, through_fog: bool = False) -> list[AreaEffect]:
-    """Fields that the API has an effect id for and that the player perceives: his own, and those in his sight."""
+    """Return the area effects with an API effect id that the player perceives: its own, and those in its sight."""
     told = [area for area in world.area_effects if area.effect]
     if through_fog or not told:
         return told
@@ -67,7 +67,7 @@ def seen_area_effects(world: World, player: int, *, through_fog: bool = False) -
 
 
 def seen_buffs(world: World, sight: Sight) -> Worn | None:
-    """The buffs that clients are told of on units that are seen clearly, None if there are none."""
+    """Return the buffs with an API id on units that are seen clearly, None if there are none."""
     if not len(world.buffs):
         return None
     rows = world.buffs.rows
@@ -84,7 +84,7 @@ def seen_buffs(world: World, sight: Sight) -> Worn | None:
 
 
 def power(sight: Sight, types: Types) -> Power | None:
-    """Which of the player's own finished units give power, None if none does."""
+    """Return which of the player's own finished units give power, None if none does."""
     reach = types.power[sight.row]
     if not reach.any():
         return None
@@ -94,7 +94,7 @@ def power(sight: Sight, types: Types) -> Power | None:
 
 
 def seen_radars(world: World, player: int) -> list[Radar]:
-    """The radars that the player knows of: his own, and those of others where he sees the tower."""
+    """Return the radars that the player knows of: its own, and others' if it sees the tower."""
     types = world.type[: world.top]
     if not any(np.count_nonzero(types == row) for row in _towers(world.catalog.version)):
         return []
@@ -107,7 +107,7 @@ def seen_radars(world: World, player: int) -> list[Radar]:
 
 
 def blips(world: World, types: Types, player: int) -> Floats:
-    """[n, 2] where own radar tells of others' units that the player does not see; structures do not move."""
+    """Return [n, 2] where own radar detects others' units that the player does not see; structures do not move."""
     own = [radar for radar in seen_radars(world, player) if radar.owner == player]
     if not own:
         return np.zeros((0, 2))

@@ -1,4 +1,4 @@
-"""A game as clients play it: the world, the clients' seats, and the log of all that was done to it.
+"""A game as clients play it: the world, the clients' seats, and the log of all actions on it.
 
 Actions and debug commands are noted with the loop they belong to and take effect when the world leaves that loop, in
 the order in which they came. So the log, the setup and the seed are the whole game: a replay is the same class fed
@@ -43,7 +43,7 @@ class Setup:
 
     game_map: GameMap
     map_data: bytes  # from which the map was read
-    path: str  # as the client named the map
+    path: str  # the client's name of the map
     players: tuple[sc.PlayerSetup, ...]
     seed: int
     disable_fog: bool
@@ -53,7 +53,7 @@ class Setup:
 
 @dataclasses.dataclass(frozen=True)
 class LogEntry:
-    """One thing that was done to the game, when the world left `loop`."""
+    """One action on the game, when the world left `loop`."""
 
     loop: int
     player: int
@@ -61,7 +61,7 @@ class LogEntry:
 
 
 class _Judged(NamedTuple):
-    """An action that was judged when it came: at which loop, after how many entries, and what it comes to."""
+    """An action that was judged when it came: at which loop, after how many entries, and its plan."""
 
     entry: LogEntry
     loop: int
@@ -87,7 +87,7 @@ class HostedGame:
         self.log: list[LogEntry] = list(log)
         self.not_before = 0  # what clients do takes effect at this loop at the earliest
         self.delay = 0  # loops from when a client acts until that takes effect
-        self.unsent: list[LogEntry] | None = None  # what was done here since somebody last told the other processes
+        self.unsent: list[LogEntry] | None = None  # what was done here since the last message to the other processes
         self._done = 0  # entries of the log that have taken effect
         self._judged: _Judged | None = None  # the first action since something took effect
 
@@ -97,14 +97,14 @@ class HostedGame:
         return self.world.ended or self.world.loop == self.end_loop
 
     def sit(self, player: int, options: sc.InterfaceOptions) -> PlayerSeat:
-        """Gives a player an interface."""
+        """Give a player an interface."""
         seat = self.seats[player] = PlayerSeat(self.world, self.types, player, options)
         if self.end_loop is None and self.world.players[player].start is not None:
             self.note(LogEntry(_CENTRED_LOOP, player, _centre(seat)))
         return seat
 
     def act(self, player: int, action: sc.Action) -> error_pb2.ActionResult.ValueType:
-        """Notes an action of a player, and says how it looks as things stand."""
+        """Note an action of a player, and return how it would go at present."""
         judgement = actions.judge(self.seats[player], action)
         if action.ListFields():
             copy = sc.Action()
@@ -115,7 +115,7 @@ class HostedGame:
         return judgement.result
 
     def debug(self, player: int, command: debug_pb2.DebugCommand) -> None:
-        """Notes a debug command of a player."""
+        """Note a debug command of a player."""
         copy = debug_pb2.DebugCommand()
         copy.CopyFrom(command)
         self._do(player, copy)
@@ -128,11 +128,11 @@ class HostedGame:
         return entry
 
     def note(self, entry: LogEntry) -> None:
-        """Puts an entry into the log: by its loop, then by its player, then as it came."""
+        """Put an entry into the log: ordered by loop, then by player, then by arrival."""
         bisect.insort(self.log, entry, lo=self._done, key=lambda e: (e.loop, e.player))
 
     def step(self, count: int) -> int:
-        """Advances by up to `count` loops, fewer if the game ends, and returns the loop that was reached."""
+        """Advance by up to `count` loops, fewer if the game ends, and return the loop that was reached."""
         target = self.world.loop + count
         if self.end_loop is not None:
             target = min(target, self.end_loop)
@@ -155,7 +155,7 @@ class HostedGame:
         return tuple(self.log[: self._done])
 
     def results(self) -> list[sc.PlayerResult]:
-        """The result of every player, once the game is over."""
+        """Return the result of every player, once the game is over."""
         if not self.over:
             return []
         players = range(1, len(self.setup.players) + 1)
@@ -172,7 +172,7 @@ class HostedGame:
                 self._spread_chat(entry.player, entry.act)
 
     def _plan_of(self, entry: LogEntry) -> OrderPlan | None:
-        """What an action was judged to come to, if nothing has taken effect since then."""
+        """Return the plan of an action from its judgement, if nothing has taken effect since then."""
         judged = self._judged
         if judged is None or judged.entry is not entry:
             return None
@@ -188,7 +188,7 @@ class HostedGame:
 
 
 def _centre(seat: PlayerSeat) -> sc.Action:
-    """The camera's move to where it already is, with which a melee game begins."""
+    """Return the camera's move to its present place, with which a melee game begins."""
     action = sc.Action()
     point = action.action_raw.camera_move.center_world_space
     point.x, point.y = seat.camera[0] - seat.origin[0], seat.camera[1] - seat.origin[1]
@@ -201,7 +201,7 @@ def _result(world: World, player: int) -> sc.Result.ValueType:
 
 
 def _player_setups(setup: Setup) -> list[PlayerSetup]:
-    """Everybody in the world: the players of the request, and those that only the map knows; no open slots."""
+    """Return all players of the world: those of the request, and those that only the map knows; no open slots."""
     specs = setup.game_map.scenario.players
     taken = [number for number, spec in specs.items() if spec.control != "open"]
     players = []
@@ -225,7 +225,7 @@ def _player_setups(setup: Setup) -> list[PlayerSetup]:
 
 
 def _race(setup: Setup, number: int, asked: sc.PlayerSetup | None) -> str:
-    """The race that was asked for; the seed decides where it was left open."""
+    """Return the requested race; the seed decides where it was left open."""
     if asked is not None and asked.race in _RACES:
         return _RACES[asked.race]
     draw = np.random.default_rng([setup.seed, number]).integers(len(_RACES))

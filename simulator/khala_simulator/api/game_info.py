@@ -1,7 +1,7 @@
 """The answer to `game_info`: players, options and the map.
 
-All of it but the paths is the same for the whole game, and clients ask once per loop; so the message is serialised
-once and only the pathing grid is put in anew. Above: `play.py`.
+All of it but the paths is the same for the whole game, and clients ask once per loop; so the message is serialised once
+and only the pathing grid is replaced. Above: `play.py`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class GameInfo:
         self._paths = b""
 
     def encode(self) -> list[Part]:
-        """The parts of a `ResponseGameInfo`."""
+        """Return the parts of a `ResponseGameInfo`."""
         known = _known_structures(self._seat)
         if known != self._known:
             start = raw_pb2.StartRaw()
@@ -76,7 +76,7 @@ def _message(game: HostedGame, seat: PlayerSeat) -> sc.ResponseGameInfo:
 
 
 def _start_raw(seat: PlayerSeat) -> raw_pb2.StartRaw:
-    """The part of the map that never changes; the placement grid is of the bare terrain, as in the game."""
+    """Return the part of the map that never changes; the placement grid is of the bare terrain, as in the game."""
     terrain, start = seat.world.map.terrain, raw_pb2.StartRaw()
     start.map_size.x, start.map_size.y = _crop(seat, terrain.build).shape[::-1]
     x0, y0, x1, y1 = terrain.playable
@@ -90,7 +90,7 @@ def _start_raw(seat: PlayerSeat) -> raw_pb2.StartRaw:
 
 
 def _start_locations(seat: PlayerSeat) -> list[tuple[float, float]]:
-    """Where others may have started: every start location of the map but the player's own."""
+    """Return where others may have started: every start location of the map but the player's own."""
     scenario = seat.world.map.scenario
     fixed = [spec.start for spec in scenario.players.values() if spec.start is not None]
     own = seat.world.players[seat.player].start
@@ -105,7 +105,7 @@ def _crop(seat: PlayerSeat, grid: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
-    """The structures and resources that the player sees or remembers: of others' he is told no obstacle."""
+    """Return the structures and resources that the player sees or remembers; its game info omits others."""
     sight = seat.look()
     stays = seat.types.structure[sight.row] | (sight.alliance == Alliance.NEUTRAL.value)
     rows, points = sight.row[stays].tolist(), sight.pos[stays].tolist()

@@ -1,8 +1,8 @@
 """Feature layers of the screen and of the minimap.
 
-What is drawn where is decided here, from what a player perceives; how a disc becomes pixels and pixels become bytes
-is `raster.py`. Terrain that does not change is drawn once per camera position. Heights have the scale of
-`terrain_height`: z = -16 + 32 v / 255. That is a choice: the API's own text and a recorded frame contradict each other.
+This module decides what is drawn where, from what a player perceives; `raster.py` turns discs into pixels and pixels
+into bytes. Terrain that does not change is drawn once per camera position. Heights have the scale of `terrain_height`:
+z = -16 + 32 v / 255. That is a choice: the API's own text and a recorded frame contradict each other.
 
 Above: `observation.py`.
 """
@@ -71,11 +71,11 @@ class Frame:
     selected: Bools  # [n] rows of the sight
     camera: tuple[float, float]
     attacked: Floats  # [k, 2] places of alerts since the last observation
-    fogged: bool  # what the player does not see is dark
+    fogged: bool  # dark where the player does not see
 
 
 class FeatureLayers:
-    """The feature layers that one client asked for; keeps what stays the same from frame to frame."""
+    """The feature layers that one client asked for; keeps the parts that stay the same from frame to frame."""
 
     def __init__(self, setup: sc2api_pb2.SpatialCameraSetup, view: ImagePair) -> None:
         self.screen, self.minimap = screen, minimap = view.screen, view.minimap
@@ -85,7 +85,7 @@ class FeatureLayers:
         self._minimap = _Image(spatial_pb2.FeatureLayersMinimap, shown, minimap.columns, minimap.rows)
 
     def encode(self, frame: Frame) -> list[Part]:
-        """The parts of an `ObservationFeatureLayer`."""
+        """Return the parts of an `ObservationFeatureLayer`."""
         values = unit_values(frame)
         return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
 
@@ -108,7 +108,7 @@ class FeatureLayers:
         return parts + self._effects(frame) + self._power(frame) + self._blips(frame)
 
     def _effects(self, frame: Frame) -> list[Part]:
-        """Effect ids at their places; of two at one pixel the younger one."""
+        """Return the pixels of effect ids; the younger of two at one pixel wins."""
         layer = self._screen.layers["effects"]
         if not frame.world.area_effects:
             return layer.blank
@@ -132,7 +132,7 @@ class FeatureLayers:
         return self._spots(layer, spots, np.ones(len(places), np.int32), frame)
 
     def _spots(self, layer: RasterLayer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
-        """Discs of the world with a value each."""
+        """Return discs of the world with a value each."""
         screen = self.screen
         x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
         radius = spots.radius / screen.scale
@@ -174,7 +174,7 @@ class FeatureLayers:
 
 
 class _Image:
-    """The layers of the screen or of the minimap, and how they are drawn alike."""
+    """The layers of the screen or of the minimap, which are drawn in the same way."""
 
     def __init__(self, message: type[Message], bits: dict[str, int], columns: int, rows: int) -> None:
         fields = message.DESCRIPTOR.fields_by_name
@@ -187,7 +187,7 @@ class _Image:
         self._visibility: list[Part] = []
 
     def encode_units(self, discs: Discs, values: Ints) -> list[Part]:
-        """The layers that show units, from the values [k, n] of the discs' rows."""
+        """Return the layers that show units, from the values [k, n] of the discs' rows."""
         shown: list[bool] = np.any(values, axis=1).tolist()
         parts: list[Part] = []
         for k, layer in self._of_units:
@@ -195,7 +195,7 @@ class _Image:
         return parts
 
     def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
-        """Terrain and visibility; drawn again only when the camera moved, the ground changed, or fog may have."""
+        """Return terrain and visibility; drawn again only if the camera moved, the ground changed, or fog may have."""
         world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
         changed = self._walk is not world.ground.walk or self._creep is not world.creep
         moved = changed or self._camera != frame.camera
@@ -213,11 +213,11 @@ class _Image:
 
 
 def unit_values(frame: Frame) -> Ints:
-    """[len(VALUES), n] value of each unit in each layer that shows units.
+    """Return [len(VALUES), n] the value of each unit in each layer that shows units.
 
     Hit points, shields and energy are whole points, their ratios 0 to 255; the progress of a structure is 0 to 255
-    while it is being built and 0 afterwards. Of several buffs on a unit the last one is shown, its duration as the
-    part that remains, 0 to 255; one without an end stays at 255.
+    while it is being built and 0 afterwards. The last of several buffs on a unit is shown; its duration is the part
+    that remains, 0 to 255, and stays at 255 without an end.
     """
     sight = frame.sight
     values = np.zeros((len(VALUES), len(sight)), np.int32)

@@ -39,7 +39,7 @@ _ALARM_PAUSE_LOOPS = 160
 
 
 def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) -> list[Part]:
-    """The parts of a `ResponseObservation`; takes along what is to be told only once."""
+    """Return the parts of a `ResponseObservation`; consume what is reported only once."""
     world = game.world
     sight = seat.look(through_fog=disable_fog)
     selected = seat.selection.rows(sight)
@@ -84,7 +84,7 @@ def _told(seat: PlayerSeat, sight: Sight) -> None:
 
 
 def _mishaps(seat: PlayerSeat) -> list[sc.ActionError]:
-    """Orders of the player's that could not be carried out in the end, since the last observation."""
+    """Return the player's orders since the last observation that could not be carried out after all."""
     return [
         sc.ActionError(unit_tag=m.tag, ability_id=m.ability, result=result_of(m.refusal))
         for m in seat.world.mishaps[seat.mishaps_told :]
@@ -93,7 +93,7 @@ def _mishaps(seat: PlayerSeat) -> list[sc.ActionError]:
 
 
 def _write_abilities(observation: sc.Observation, seat: PlayerSeat) -> None:
-    """What the selection can be told to do now; a foreign unit can be told nothing."""
+    """Write the abilities that the selection can use now; none for a foreign unit."""
     world = seat.world
     own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
     found = {ability.id: ability for slot in own for ability in usable(world, slot)}
@@ -102,7 +102,7 @@ def _write_abilities(observation: sc.Observation, seat: PlayerSeat) -> None:
 
 
 def _attacked(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
-    """Rows of own units damaged since the last observation, if it is time for another alarm."""
+    """Return the rows of own units damaged since the last observation, if another alarm is due."""
     world = seat.world
     if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
         return np.zeros(0, np.intp)

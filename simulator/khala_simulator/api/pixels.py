@@ -1,4 +1,4 @@
-"""Where on a client's images an action would have been clicked.
+"""Where on a client's images a click would have caused an action.
 
 A client may look at feature layers, at rendered images or at both, each in its own size; what a player did is reported
 in the pixels of each. Writes messages, knows no rules. Above: `actions.py`. Below: `projection.py`.
@@ -25,7 +25,7 @@ def write_target(
     *,
     minimap: bool,
 ) -> None:
-    """The click at a world point: on the screen; if that is elsewhere on the minimap, or else at the screen's edge."""
+    """Write the click at a world point: on the screen, if it is off screen on the minimap, or else at the edge."""
     column, row = (math.floor(v) for v in view.screen.to_pixels(*point, camera))
     inside = 0 <= column < view.screen.columns and 0 <= row < view.screen.rows
     if minimap and not inside:
@@ -36,14 +36,14 @@ def write_target(
 
 
 def write_camera(message: spatial_pb2.ActionSpatialCameraMove, view: ImagePair, camera: Point) -> None:
-    """The click on the minimap that moves the camera here."""
+    """Write the click on the minimap that moves the camera here."""
     _write_on_minimap(message.center_minimap, view, camera)
 
 
 def write_selection(
     message: spatial_pb2.ActionSpatial, view: ImagePair, clicked: spatial_pb2.ActionSpatial, on: ImagePair
 ) -> None:
-    """A click or a rectangle on the screen of one view, in the pixels of another one."""
+    """Write a click or a rectangle on the screen of one view, in the pixels of another one."""
     message.CopyFrom(clicked)
     if view is on:
         return

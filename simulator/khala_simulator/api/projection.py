@@ -1,7 +1,7 @@
 """World coordinates to pixels of the screen and of the minimap, and back.
 
-World: origin bottom-left, y up. Images: origin top-left, y down, pixel (i, j) covers [i, i+1) x [j, j+1). Pixels
-are square in the world. Pure arithmetic; works on numbers and on arrays alike.
+World: origin bottom-left, y up. Images: origin top-left, y down, pixel (i, j) covers [i, i+1) x [j, j+1). Pixels are
+square in the world. Pure arithmetic; works on numbers and on arrays.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Rect(NamedTuple):
     y1: float
 
     def clamp(self, x: float, y: float) -> tuple[float, float]:
-        """The point of the rectangle that is nearest to (x, y)."""
+        """Return the point of the rectangle that is nearest to (x, y)."""
         return min(max(x, self.x0), self.x1), min(max(y, self.y0), self.y1)
 
 
@@ -50,21 +50,21 @@ class Screen:
         return self.width / min(self.columns, self.rows)
 
     def to_pixels(self, x: Number, y: Number, camera: tuple[float, float]) -> tuple[Number, Number]:
-        """Image coordinates of world points; outside of the image they go on."""
+        """Return the image coordinates of world points; they continue outside of the image."""
         return (
             (x - camera[0]) / self.scale + self.columns / 2,
             (camera[1] - y) / self.scale + self.rows / 2,
         )
 
     def to_world(self, column: Number, row: Number, camera: tuple[float, float]) -> tuple[Number, Number]:
-        """World coordinates of the centres of pixels."""
+        """Return the world coordinates of the centres of pixels."""
         return (
             (column + 0.5 - self.columns / 2) * self.scale + camera[0],
             camera[1] - (row + 0.5 - self.rows / 2) * self.scale,
         )
 
     def view(self, camera: tuple[float, float]) -> Rect:
-        """The part of the world that the camera shows."""
+        """Return the part of the world that the camera shows."""
         half_x, half_y = self.columns * self.scale / 2, self.rows * self.scale / 2
         return Rect(camera[0] - half_x, camera[1] - half_y, camera[0] + half_x, camera[1] + half_y)
 
@@ -83,11 +83,11 @@ class Minimap:
         return max((self.area.x1 - self.area.x0) / self.columns, (self.area.y1 - self.area.y0) / self.rows)
 
     def to_pixels(self, x: Number, y: Number) -> tuple[Number, Number]:
-        """Image coordinates of world points."""
+        """Return the image coordinates of world points."""
         return (x - self.area.x0) / self.scale, (self.area.y1 - y) / self.scale
 
     def to_world(self, column: Number, row: Number) -> tuple[Number, Number]:
-        """World coordinates of the centres of pixels."""
+        """Return the world coordinates of the centres of pixels."""
         return self.area.x0 + (column + 0.5) * self.scale, self.area.y1 - (row + 0.5) * self.scale
 
 
@@ -100,13 +100,13 @@ class ImagePair:
 
 
 def view_of(setup: sc.SpatialCameraSetup, area: Rect, width: float = DEFAULT_WIDTH) -> ImagePair:
-    """The images that a client asked for, the minimap of this part of the map; `width` where it named none."""
+    """Return the images that a client asked for, the minimap of this part of the map; `width` is the default width."""
     screen, minimap = setup.resolution, setup.minimap_resolution
     return ImagePair(Screen(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
 
 
 def size_problem(options: sc.InterfaceOptions) -> str | None:
-    """What is wrong with the sizes of the images that a client asks for, if anything is."""
+    """Return the error in the sizes of the images that a client asks for, if there is one."""
     asked = (
         ("Feature layers", options.HasField("feature_layer"), options.feature_layer),
         ("Rendered images", options.HasField("render"), options.render),

@@ -1,4 +1,4 @@
-"""The answer to `query`: ways, places to build, and what units can be told to do.
+"""The answer to `query`: ways, places to build, and the abilities that units can use.
 
 Above: `play.py`. Below: `abilities.py`, the world's ground.
 """
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def answer(seat: PlayerSeat, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
-    """One answer to each question, in their order."""
+    """Answer each question, in their order."""
     return query_pb2.ResponseQuery(
         pathing=[query_pb2.ResponseQueryPathing(distance=_distance(seat, question)) for question in request.pathing],
         abilities=[
@@ -51,7 +51,7 @@ def _abilities(seat: PlayerSeat, tag: int, *, ignore_cost: bool) -> query_pb2.Re
 
 
 def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> float:
-    """Length of the way on the ground, 0 where there is none; a flying unit's is the straight line."""
+    """Return the length of the way on the ground, 0 where there is none; a flying unit's is the straight line."""
     world, (ox, oy) = seat.world, seat.origin
     end = (question.end_pos.x + ox, question.end_pos.y + oy)
     start = (question.start_pos.x + ox, question.start_pos.y + oy)
@@ -78,7 +78,7 @@ def _on_map(world: World, x: float, y: float) -> bool:
 
 
 def _place(seat: PlayerSeat, question: query_pb2.RequestQueryBuildingPlacement) -> error_pb2.ActionResult.ValueType:
-    """Whether what an ability builds, lands or warps in may stand at a point; who would do it is not looked at."""
+    """Return why the product of an ability can't be built, landed or warped in at a point, or success."""
     world = seat.world
     ability = world.catalog.ability_of_id.get(question.ability_id)
     unit = None if ability is None else building_sites.product(world, ability)

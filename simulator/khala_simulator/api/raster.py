@@ -30,7 +30,7 @@ _DTYPES: dict[int, np.dtype[Any]] = {
 
 @dataclasses.dataclass(frozen=True)
 class Discs:
-    """Filled discs on an image, in drawing order: of two entries for one pixel the later one is on top."""
+    """Filled discs on an image, in drawing order: the later of two entries for one pixel is on top."""
 
     pixels: NDArray[np.intp]  # [m] index into the flat image
     rows: NDArray[np.intp]  # [m] which disc
@@ -46,7 +46,7 @@ def _window(reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Discs:
-    """Draws discs by their centres [n, 2] and radii [n], in pixels; every disc covers at least one pixel.
+    """Draw discs by their centres [n, 2] and radii [n], in pixels; every disc covers at least one pixel.
 
     A pixel belongs to a disc when its centre does. A few discs are drawn in one go, many by their size.
     """
@@ -68,7 +68,7 @@ def draw_discs(centres: Floats, radius: Floats, columns: int, rows: int) -> Disc
 
 
 def _bytes(sums: NDArray[Any], pixels: NDArray[np.intp]) -> NDArray[np.uint8]:
-    """An image of sums that are 0 but at these pixels: only those are converted, ten units cover a fiftieth of it."""
+    """Return an image of sums that are 0 except at these pixels; it converts only those, a fiftieth for ten units."""
     image = np.zeros(len(sums), np.uint8)
     image[pixels] = np.minimum(sums.take(pixels), 255)
     return image
@@ -81,7 +81,7 @@ def _draw_size(
     x, y = centres[disc, 0, None], centres[disc, 1, None]
     column = np.floor(x).astype(np.intp) + dx
     row = np.floor(y).astype(np.intp) + dy
-    distance = np.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)  # rounds alike everywhere, unlike hypot
+    distance = np.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)  # rounds the same way everywhere, unlike hypot
     size = radius[disc, None]
     cover = np.minimum(np.maximum(size - distance + 0.5, 0), 1)
     centre = (dx == 0) & (dy == 0)
@@ -93,7 +93,7 @@ def _draw_size(
 
 
 def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
-    """Values of a grid [y, x] of the map in the columns x and rows y of an image; 0 outside of the map."""
+    """Return the values of a grid [y, x] of the map in the columns x and rows y of an image; 0 outside of the map."""
     height, width = grid.shape
     column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
     image = grid[np.clip(row, 0, height - 1)[:, None], np.clip(column, 0, width - 1)[None, :]]
@@ -119,12 +119,12 @@ class RasterLayer:
         self.blank: list[Part] = [self._head, bytes(size)]
 
     def encode(self, image: NDArray[Any]) -> list[Part]:
-        """The field for an image, flat or [y, x]; the image is not to change until it is sent."""
+        """Return the field for an image, flat or [y, x]; the image must not change until it is sent."""
         packed = np.packbits(image, axis=None) if self.bits_per_pixel == 1 else np.ascontiguousarray(image, self._dtype)
         return [self._head, packed.data.cast("B")]
 
     def encode_pixels(self, pixels: NDArray[np.intp], values: NDArray[np.int32]) -> list[Part]:
-        """The field for an image that is 0 but at these pixels; of two values for one pixel the later one counts."""
+        """Return the field for an image that is 0 except at these pixels; for one pixel the last value counts."""
         image = np.zeros(self.area, self._dtype)
         image[pixels] = values
         return self.encode(image)

@@ -1,7 +1,7 @@
 """The units of `Observation.raw_data`, with every field that the game would send of them.
 
-Which field is present depends on whose unit it is and how it is perceived; the table of that was taken from 96
-real observations. Above: `observation.py`. Below: `sight.py`.
+Which field is present depends on the unit's owner and on how it is perceived; that table comes from 96 real
+observations. Above: `observation.py`. Below: `sight.py`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """What is to be told of the units: their perception, and where the player's interface has them."""
+    """The input for the units' fields: their perception, and their state in the player's interface."""
 
     world: World
     types: Types
@@ -48,11 +48,11 @@ class Units:
 
     @functools.cached_property
     def harvesters(self) -> dict[int, tuple[int, int]]:
-        """How many workers own town halls and gas structures (slots) have, and how many would be best."""
+        """The number of workers of own town halls and gas structures (slots), and the ideal number."""
         return harvesting.staffing(self.world, self.player)
 
     def write(self, raw: raw_pb2.ObservationRaw) -> None:
-        """Adds all units to an observation."""
+        """Add all units to an observation."""
         orders = self._orders()
         first = len(raw.units)
         for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
@@ -120,7 +120,7 @@ class Units:
             message.tag = rally.target
 
     def _write_cargo(self, unit: raw_pb2.Unit, slot: int) -> None:
-        """Who is inside, and how much room that takes."""
+        """Write the passengers and the room that they take."""
         world, inside = self.world, self.world.passengers(slot)
         unit.cargo_space_max = int(self.types.cargo[world.type[slot]])
         unit.cargo_space_taken = sum(world.unit_type(s).cargo_size for s in inside)
@@ -137,7 +137,7 @@ class Units:
             )
 
     def _write_durations(self, unit: raw_pb2.Unit, slot: int) -> None:
-        """How long its timed life, or else the buff that ends last, still goes on."""
+        """Write how long its timed life, or else the buff that ends last, still lasts."""
         world = self.world
         if world.expires[slot]:
             unit.buff_duration_remain = max(0, int(world.expires[slot]) - world.loop)
@@ -162,7 +162,7 @@ class Units:
             point.z = height
 
     def _orders(self) -> dict[int, list[tuple[Order, float]]]:
-        """The orders of own units by slot, each with the ground height at its point, if it has one."""
+        """Return the orders of own units by slot, each with the ground height at its point, if it has one."""
         own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
         orders = {slot: self.world.orders_of(slot) for slot in own}
         points = [order.point for some in orders.values() for order in some if order.point is not None]
@@ -230,7 +230,7 @@ def _write_side(  # a row of the table, in the order of its columns
 
 
 def write_image(image: common_pb2.ImageData, grid: NDArray[Any], bits_per_pixel: int) -> None:
-    """Fills an image with a grid [y, x] of the map; raw images start at the bottom-left, as the grids do."""
+    """Fill an image with a grid [y, x] of the map; raw images start at the bottom-left, as the grids do."""
     image.bits_per_pixel = bits_per_pixel
     image.size.y, image.size.x = grid.shape
     packed = np.packbits(grid.astype(np.bool_), axis=None) if bits_per_pixel == 1 else grid.astype(np.uint8)

@@ -1,4 +1,4 @@
-"""What `Observation.raw_data` has besides units: effects on the ground, sources of power, radar.
+"""The parts of `Observation.raw_data` other than units: effects on the ground, sources of power, radar.
 
 Above: `observation.py`. Below: `effects.py`, which decides what the player perceives.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def write_radar(raw: raw_pb2.ObservationRaw, seat: PlayerSeat) -> None:
-    """Adds the radars that the player knows of to the raw data."""
+    """Add the radars that the player knows of to the raw data."""
     for radar in seen_radars(seat.world, seat.player):
         ring = raw.radar.add(radius=radar.radius)
         x, y = radar.point
@@ -28,7 +28,7 @@ def write_radar(raw: raw_pb2.ObservationRaw, seat: PlayerSeat) -> None:
 
 
 def write_effects(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, *, through_fog: bool) -> None:
-    """Adds the effects that the player perceives to the raw data."""
+    """Add the effects that the player perceives to the raw data."""
     for area in seen_area_effects(seat.world, seat.player, through_fog=through_fog):
         side = int(alliance_of(np.array([area.owner]), seat.player)[0])
         effect = raw.effects.add(effect_id=area.effect, radius=area.radius, alliance=side)
@@ -38,7 +38,7 @@ def write_effects(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, *, through_fog:
 
 
 def write_power(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, sight: Sight) -> None:
-    """Adds the player's sources of power to the raw data."""
+    """Add the player's sources of power to the raw data."""
     sources = power(sight, seat.types)
     if sources is None:
         return

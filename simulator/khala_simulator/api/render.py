@@ -1,7 +1,7 @@
 """The rendered images of one client: its screen and its minimap in colour.
 
-What is shown is decided here, from what the player perceives; how it looks is `painting`. Importing this module loads
-OpenCV, so a seat does it only when a client asks for rendered images. Above: `observation.py`.
+This module decides what is shown, from what the player perceives; `painting` decides how it looks. Importing this
+module loads OpenCV, so a seat does it only when a client asks for rendered images. Above: `observation.py`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FIELDS = spatial_pb2.ObservationRender.DESCRIPTOR.fields_by_name
 
 
 class Renders:
-    """Paints what one client asked to see; keeps what stays the same from frame to frame."""
+    """Paints what one client asked to see; keeps the parts that stay the same from frame to frame."""
 
     def __init__(self, view: ImagePair, types: Types) -> None:
         screen, minimap = view.screen, view.minimap
@@ -40,13 +40,13 @@ class Renders:
         self._minimap_part = RasterLayer(_FIELDS["minimap"].number, BITS_PER_PIXEL, minimap.columns, minimap.rows)
 
     def encode(self, frame: Frame) -> list[Part]:
-        """The parts of an `ObservationRender`."""
+        """Return the parts of an `ObservationRender`."""
         return self._screen_part.encode(self.screen(frame)) + self._minimap_part.encode(self.minimap(frame))
 
     def screen(self, frame: Frame) -> NDArray[np.uint8]:
-        """The screen, [rows, columns, 3] RGB, row 0 at the top."""
+        """Return the screen, [rows, columns, 3] RGB, row 0 at the top."""
         return self._scene.paint(frame)
 
     def minimap(self, frame: Frame) -> NDArray[np.uint8]:
-        """The minimap, [rows, columns, 3] RGB, row 0 at the top."""
+        """Return the minimap, [rows, columns, 3] RGB, row 0 at the top."""
         return self._overview.paint(frame)

@@ -1,9 +1,9 @@
 """`Observation.score` and `player_common`: sums over a player's units and counters.
 
-Where the map gives a score of its own, or asks for what was gathered, that is the score, and its type is Curriculum.
+Where the map has a score of its own, or scores gathered resources, that is the score, and its type is Curriculum.
 
-The names are the API's. What the game's own total is made of was never published; here it is the value of what a
-player has plus the value of what he killed, which is an estimate. Values are the catalog's `score_make`.
+The names are the API's. How the game computes its own total was never published; here it is the value of the player's
+units plus the value of their kills, which is an estimate. Values are the catalog's `score_make`.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 RATE_LOOPS = 160
-"""Loops over which the rates of collection are told, as recorded games show."""
+"""Loops over which the rates of collection are measured, as recorded games show."""
 FASTER_LOOPS = 22.4
 TOWN_HALL_MINERALS = 300
-"""From this price on, a structure that provides supply is a town hall: no Pylon, depot or extractor is."""
+"""From this price on, a structure that provides supply is a town hall: Pylons, depots and extractors cost less."""
 
 CATEGORIES = ("army", "economy", "technology")
 
 
 class Holdings:
-    """What a player has at this loop."""
+    """The property of a player at this loop."""
 
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.player: Player = world.players[player]
         self.kind = world.map.scenario.score
-        slots = which(world.alive & (world.owner == player) & ~world.hallucination)  # those inside others count, too
+        slots = which(world.alive & (world.owner == player) & ~world.hallucination)  # passengers count, too
         rows = world.type[slots]
         names, columns = _columns(types)
         totals = np.bincount(rows, minlength=len(columns)) @ columns
@@ -51,12 +51,12 @@ class Holdings:
         self.lately = [60.0 * FASTER_LOOPS / RATE_LOOPS * sum(amounts) for amounts in self._recent(world.loop)]
 
     def _recent(self, loop: int) -> tuple[list[float], list[float]]:
-        """Minerals and vespene that were brought home in the last loops."""
+        """Return the minerals and vespene delivered in the last loops."""
         rows = [row for row in self.player.score.deliveries if row[0] > loop - RATE_LOOPS]
         return [minerals for _, minerals, __ in rows], [vespene for _, __, vespene in rows]
 
     def common(self) -> sc2api_pb2.PlayerCommon:
-        """The counters at the top of the player's screen; supply in whole points."""
+        """Return the counters at the top of the player's screen; supply in whole points."""
         player, totals = self.player, self.totals
         common = sc2api_pb2.PlayerCommon(
             player_id=player.id,
@@ -75,7 +75,7 @@ class Holdings:
         return common
 
     def score(self) -> score_pb2.Score:
-        """The score with its details."""
+        """Return the score with its details."""
         counted, totals = self.player.score, self.totals
         details = score_pb2.ScoreDetails(
             idle_production_time=counted.idle_production_s,
@@ -125,7 +125,7 @@ class Holdings:
 
 @functools.lru_cache(maxsize=4)
 def _columns(types: Types) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """Names and values [rows, k] of what is summed over a player's units."""
+    """Return names and values [rows, k] of the quantities that are summed over a player's units."""
     town_hall = types.structure & (types.provides > 0) & (types.minerals >= TOWN_HALL_MINERALS)
     economy = types.worker | town_hall
     categories = (~types.structure & ~types.worker, economy, types.structure & ~town_hall)

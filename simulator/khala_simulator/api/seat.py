@@ -1,6 +1,6 @@
-"""One client's place in a game: what it asked to see, its camera and selection, and what it is still to be told.
+"""One client's place in a game: what it asked to see, its camera and selection, and what to report to it next.
 
-State only. `actions.py` changes it, `observation.py` reads it and takes what is to be told once.
+State only. `actions.py` changes it, `observation.py` reads it and consumes what is reported once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _WITHOUT_IMAGES = Screen(1, 1, DEFAULT_WIDTH)
 
 @dataclasses.dataclass
 class Hands:
-    """What a player does at the interface: where he looks, what he holds, and what came of it."""
+    """A player's use of the interface: its camera, its selection, and the reports on its actions."""
 
     camera: tuple[float, float]
     camera_z: float  # of the ground there
@@ -38,7 +38,7 @@ class Hands:
     chat: list[sc.ChatReceived] = dataclasses.field(default_factory=list)
 
     def forget(self) -> None:
-        """What came of it has been told."""
+        """Forget the reports that have been sent."""
         self.echoes, self.errors, self.chat = [], [], []
 
 
@@ -65,10 +65,10 @@ class PlayerSeat:
             view = view_of(render, self.playable if crop or render.crop_to_playable_area else whole, otherwise)
             self.views["action_render"] = view
             self.renders = _renders(view, types)
-        self.reported = self.views  # in whose pixels clicks are reported: a viewer's, when one watches this seat
+        self.reported = self.views  # the view in whose pixels clicks are reported: a viewer's, if one watches
         self.view: ImagePair = next(iter(self.views.values()), ImagePair(_WITHOUT_IMAGES, Minimap(1, 1, whole)))
         self.sees_all = False  # looks through the fog, which a viewer of a replay may
-        self.unread = False  # nobody asks for what is to be told
+        self.unread = False  # no client asks for the reports
         camera = world.players[player].camera or world.map.camera
         self.hands = Hands(camera, self.ground_z(*camera))
         self._followed = 0  # selections of the map's script that have been made here
@@ -82,7 +82,7 @@ class PlayerSeat:
 
     @property
     def screen(self) -> Screen:
-        """The screen on which it counts whether a unit is in view."""
+        """The screen that decides whether a unit is in view."""
         return self.view.screen
 
     @property
@@ -101,7 +101,7 @@ class PlayerSeat:
         return self.hands.selection
 
     def follow_script(self) -> None:
-        """Selects what the map's script has selected for the player since this was last asked."""
+        """Apply the selections that the map's script has made for the player since the last call."""
         made = self.world.script.selections
         for player, tags in made[self._followed :]:
             if player == self.player:
@@ -109,7 +109,7 @@ class PlayerSeat:
         self._followed = len(made)
 
     def look(self, *, through_fog: bool = False) -> Sight:
-        """What the player perceives now."""
+        """Return what the player perceives now."""
         return look(
             self.world,
             self.types,
@@ -120,7 +120,7 @@ class PlayerSeat:
         )
 
     def on_screen(self, sight: Sight) -> NDArray[np.bool_]:
-        """[n] whether each unit's centre is in the camera's view."""
+        """Return [n] whether each unit's centre is in the camera's view."""
         column, row = self.screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], self.camera)
         shown: NDArray[np.bool_] = (
             (column >= 0) & (column < self.screen.columns) & (row >= 0) & (row < self.screen.rows)
@@ -128,16 +128,16 @@ class PlayerSeat:
         return shown
 
     def ground_z(self, x: float, y: float) -> float:
-        """Height of the ground at a world point."""
+        """Return the height of the ground at a world point."""
         return float(self.world.map.terrain.ground_z(np.array([[x, y]]))[0])
 
     def move_camera(self, x: float, y: float) -> None:
-        """Points the camera at a world point, or at the nearest one of the playable area."""
+        """Point the camera at a world point, or at the nearest one of the playable area."""
         self.hands.camera = self.playable.clamp(x, y)
         self.hands.camera_z = self.ground_z(*self.hands.camera)
 
     def report(self, loop: int) -> sc.Action:
-        """A new entry of the actions that the next observation reports."""
+        """Return a new entry of the actions that the next observation reports."""
         action = sc.Action(game_loop=loop)
         self.hands.echoes.append(action)
         return action

@@ -1,4 +1,4 @@
-"""Which units a player has selected, and what clicks, rectangles and hotkeys do to that.
+"""Which units a player has selected, and how clicks, rectangles and hotkeys change that.
 
 A selection is a list of tags: own units, or a single foreign one that is only looked at. It belongs to the player's
 interface, not to the world. Actions that make no sense change nothing and say so by their result.
@@ -38,35 +38,35 @@ class Selection:
         self.groups: list[list[int]] = [[] for _ in range(GROUPS)]
 
     def forget_dead(self, world: World) -> None:
-        """Drops units that are gone."""
+        """Drop units that are gone."""
         for tags in (self.tags, *self.groups):
             if any(world.slot_of(tag) < 0 for tag in tags):
                 tags[:] = [tag for tag in tags if world.slot_of(tag) >= 0]
 
     def slots(self, world: World) -> list[int]:
-        """Slots of the selected units that live."""
+        """Return the slots of the selected units that live."""
         return [slot for slot in map(world.slot_of, self.tags) if slot >= 0]
 
     def rows(self, sight: Sight) -> Bools:
-        """Which rows of a sight are selected."""
+        """Return which rows of a sight are selected."""
         if not self.tags:
             return np.zeros(len(sight), np.bool_)
         tags = frozenset(self.tags)  # np.isin takes 45 us for ten units
         return np.array([tag in tags for tag in sight.tag.tolist()], np.bool_)
 
     def choose(self, tags: Iterable[int], *, add: bool = False) -> None:
-        """Selects units, or adds them."""
+        """Select units, or add them."""
         kept = self.tags if add else []
         self.tags = list(dict.fromkeys([*kept, *tags]))
 
     def remove(self, tags: Iterable[int]) -> None:
-        """Deselects units."""
+        """Deselect units."""
         gone = set(tags)
         self.tags = [tag for tag in self.tags if tag not in gone]
 
 
 def panel_order(world: World, types: Types, tags: Iterable[int]) -> list[int]:
-    """Tags as the unit panel shows them: by the priority of their subgroup, then by type, then as they came."""
+    """Return tags in the order of the unit panel: by the priority of their subgroup, then by type, then by arrival."""
 
     def key(tag: int) -> tuple[int, int]:
         row = int(world.type[world.slot_of(tag)])
@@ -76,13 +76,13 @@ def panel_order(world: World, types: Types, tags: Iterable[int]) -> list[int]:
 
 
 def selectable(sight: Sight, types: Types) -> Bools:
-    """Rows that a click can select at all."""
+    """Return the rows that a click can select."""
     rows: Bools = types.selectable[sight.row] & (sight.display != Display.HIDDEN)
     return rows
 
 
 def at_point(sight: Sight, types: Types, point: tuple[float, float], reach: float) -> int | None:
-    """The row of the topmost unit under a world point, within `reach` of its edge; None on bare ground."""
+    """Return the row of the topmost unit under a world point, within `reach` of its edge; None on bare ground."""
     gap = ((sight.pos - point) ** 2).sum(axis=1)
     under = selectable(sight, types) & (gap <= (sight.radius + reach) ** 2)
     rows = np.flatnonzero(under)
@@ -90,7 +90,7 @@ def at_point(sight: Sight, types: Types, point: tuple[float, float], reach: floa
 
 
 def in_rectangle(sight: Sight, types: Types, corner: tuple[float, float], other: tuple[float, float]) -> Rows:
-    """Rows of own units whose bodies touch a rectangle of the world; of units and structures only the units."""
+    """Return the rows of own units whose bodies touch a rectangle of the world; structures only if no unit does."""
     low, high = np.minimum(corner, other), np.maximum(corner, other)
     nearest = np.clip(sight.pos, low, high)
     touched = ((sight.pos - nearest) ** 2).sum(axis=1) <= sight.radius**2
@@ -100,22 +100,22 @@ def in_rectangle(sight: Sight, types: Types, corner: tuple[float, float], other:
 
 
 def army(sight: Sight, types: Types) -> Rows:
-    """Rows of the player's army."""
+    """Return the rows of the player's army."""
     return _own(sight, types, types.army)
 
 
 def warp_gates(sight: Sight, types: Types) -> Rows:
-    """Rows of the player's warp gates."""
+    """Return the rows of the player's warp gates."""
     return _own(sight, types, types.warp_gate)
 
 
 def larvae(sight: Sight, types: Types) -> Rows:
-    """Rows of the player's larvae."""
+    """Return the rows of the player's larvae."""
     return _own(sight, types, types.larva)
 
 
 def idle_workers(world: World, sight: Sight, types: Types) -> Rows:
-    """Rows of the player's workers that have nothing to do."""
+    """Return the rows of the player's idle workers."""
     rows = _own(sight, types, types.worker)
     idle: Rows = rows[world.order_kind[sight.slot[rows]] == OrderKind.IDLE]
     return idle

@@ -1,7 +1,7 @@
 """What a player sees of the shooting: who has just fired at whom, and what is in the air.
 
-The API tells clients nothing of it; rendered images show it, as the game's own picture does. Above: `painting`.
-Below: `sight.py`, which says who is seen.
+The API does not report it; rendered images show it, as the game's own picture does. Above: `painting`. Below:
+`sight.py`, which says which units are visible.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FLASH_LOOPS = 5.0
-"""For so long after its damage point an attack is shown."""
+"""Loops for which an attack is shown after its damage point."""
 
 
 class Strikes(NamedTuple):
@@ -47,10 +47,10 @@ class InFlight(NamedTuple):
 
 
 def strikes(world: World, sight: Sight) -> Strikes:
-    """Attacks of the last loops between units that are both seen.
+    """Return the attacks of the last loops between units that are both visible.
 
-    When an attack took effect is told from its weapon's cooldown, which runs from the attack's start; the random
-    delay of up to two loops in it is not known here.
+    The weapon's cooldown, which runs from the attack's start, shows when an attack took effect; the random delay of up
+    to two loops in it is not known here.
     """
     clear = sight.display == Display.VISIBLE.value
     row_of = np.full(world.capacity, NOBODY)
@@ -67,7 +67,7 @@ def strikes(world: World, sight: Sight) -> Strikes:
 
 
 def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlight | None:
-    """The missiles that a player sees now, None if there are none."""
+    """Return the missiles that a player sees now, None if there are none."""
     if not len(world.missiles):
         return None
     rows = world.missiles.rows
@@ -80,7 +80,7 @@ def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlig
 
 @functools.cache
 def _rhythm(version: str) -> tuple[Floats, NDArray[np.bool_]]:
-    """By weapon: loops from start to damage point, and whether it is melee."""
+    """Return, by weapon, the loops from start to damage point, and whether it is melee."""
     weapons = load_catalog(version).weapons
     points = np.array([weapon.damage_point_loops for weapon in weapons])
     return points, np.array([weapon.melee for weapon in weapons], np.bool_)

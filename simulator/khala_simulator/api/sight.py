@@ -1,7 +1,7 @@
 """What one player perceives of all units at this loop, as columns: the source of every part of an observation.
 
-Rules of perception stand here and nowhere else: who is on whose side, what fog and cloak hide, what of a hidden
-unit is still told. Rows are in drawing order, ground units before flying ones.
+The rules of perception are here and nowhere else: the side of each unit, what fog and cloak hide, and what is still
+known of a hidden unit. Rows are in drawing order, ground units before flying ones.
 
 Above: `raw.py`, `layers.py`, `ui.py`. Below: the world's arrays.
 """
@@ -41,7 +41,7 @@ _VISIBLE_CELL = 2
 
 
 class Alliance(enum.IntEnum):
-    """Whose side a unit is on, with the API's numbers."""
+    """The side of a unit, with the API's numbers."""
 
     SELF = 1
     ALLY = 2
@@ -109,7 +109,7 @@ def look(
     show_placeholders: bool = False,
     through_fog: bool = False,
 ) -> Sight:
-    """The units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
+    """Return the units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
     seen = world.is_visible(player)
     owner = world.owner[world.live]
     own = (owner == player) & (player != OBSERVER)
@@ -131,7 +131,7 @@ def look(
 
 
 def _placeholders(world: World, player: int) -> list[RememberedUnit]:
-    """What the player's builders are under way to build, as if it stood there; the tags are made up."""
+    """Return the structures that the player's builders are on their way to build, with made-up tags."""
     return [
         RememberedUnit(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
         for i, (unit, point) in enumerate(building_sites.planned(world, player))
@@ -141,7 +141,7 @@ def _placeholders(world: World, player: int) -> list[RememberedUnit]:
 def _with_snapshots(
     sight: Sight, world: World, types: Types, player: int, shown: list[RememberedUnit], display: Display
 ) -> Sight:
-    """The sight with a row for each snapshot before the units; its slot is the empty one."""
+    """Return the sight with a row for each snapshot before the units; its slot is the empty one."""
     row = np.array([s.row for s in shown])
     owner = np.array([s.owner for s in shown])
     pos = np.array([s.pos for s in shown])
@@ -171,7 +171,7 @@ def _with_snapshots(
 
 
 def _fakes(world: World, player: int, slots: Ints, own: Bools) -> Bools:
-    """(k,) which units the player knows to be hallucinations: his own, and others' under his detectors."""
+    """Return (k,) which units the player knows to be hallucinations: its own, and others' under its detectors."""
     fakes: Bools = world.hallucination[slots]
     foreign = np.flatnonzero(fakes & ~own)
     if foreign.size and player != OBSERVER:
@@ -213,7 +213,7 @@ def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, 
 
 
 def _active(world: World) -> Bools:
-    """(capacity,) who has an order, fights by itself, or makes something."""
+    """Return (capacity,) which units have an order, fight by themselves, or make something."""
     active: Bools = (world.order_kind != OrderKind.IDLE.value) | (world.target != NOBODY)
     if world.jobs:
         active[list(world.jobs)] = True
@@ -226,7 +226,7 @@ def _alliance(owner: Ints, own: Bools) -> Ints:
 
 
 def _cloak(world: World, player: int, own: Bools) -> Ints:
-    """[live] what is known of each unit's cloak, seen or not."""
+    """Return [live] what is known of each unit's cloak, seen or not."""
     hiding = world.cloaked[world.live] | (world.burrowed[world.live] & ~own)
     detected = world.visible[player, world.live] | (player == OBSERVER)
     enemy = np.where(detected, Cloak.DETECTED.value, Cloak.CLOAKED.value)
@@ -234,12 +234,12 @@ def _cloak(world: World, player: int, own: Bools) -> Ints:
 
 
 def alliance_of(owner: Ints, player: int) -> Ints:
-    """Whose side these owners are on for a player, as `Alliance`."""
+    """Return the side of these owners for a player, as `Alliance`."""
     return _alliance(owner, owner == player)
 
 
 def sees(world: World, player: int, points: Floats) -> Bools:
-    """(n,) whether a player sees the ground at world points (n, 2) now; points off the map are not seen."""
+    """Return (n,) whether a player sees the ground at world points (n, 2) now; points off the map are not seen."""
     width, height = world.map.terrain.size
     x, y = np.floor(points[:, 0]).astype(np.intp), np.floor(points[:, 1]).astype(np.intp)
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)

@@ -30,7 +30,7 @@ _LEVEL = re.compile(r"Level[123]$")
 
 
 class Types:
-    """Columns by unit row; `levels` tells which upgrades count for whom."""
+    """Columns by unit row; `levels` says which upgrades count for which type."""
 
     def __init__(self, catalog: Catalog) -> None:
         self.catalog = catalog
@@ -64,7 +64,7 @@ class Types:
 
     @functools.lru_cache(maxsize=64)  # noqa: B019  # lives as long as its catalog, which is the process
     def levels(self, upgrades: tuple[int, ...]) -> Ints:
-        """[3, rows] levels of attack, armor and shield upgrades that these upgrades give to each type."""
+        """Return [3, rows] levels of attack, armor and shield upgrades that these upgrades give to each type."""
         levels = np.zeros((3, len(self.catalog.units)), np.int64)
         numbered = [u for u in map(self.catalog.upgrade, upgrades) if _LEVEL.search(u.name)]
         for unit in self.catalog.units:
@@ -84,10 +84,10 @@ def _count(upgrades: Iterable[Upgrade], catalog: str, entries: set[str], field: 
 
 @functools.cache
 def types_of(version: str) -> Types:
-    """The arrays of a shipped catalog."""
+    """Return the arrays of a shipped catalog."""
     return Types(load_catalog(version))
 
 
 def _field_of_power(unit: UnitType) -> float:
-    """Radius in which it powers structures; those that only hasten warping in have none."""
+    """Return the radius in which it powers structures; types that only hasten warping in have none."""
     return max(radius for radius, _ in unit.power) if unit.name in SUPPLIES else 0.0

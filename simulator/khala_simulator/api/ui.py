@@ -1,7 +1,7 @@
 """`Observation.ui_data`: the panel of the selection, and the control groups.
 
 Several selected units have the multi panel; one has the production panel when it makes something, the cargo panel when
-somebody is inside, and else the single panel.
+it has passengers, and else the single panel.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def panel(world: World, types: Types, selection: Selection, player: int) -> ui_pb2.ObservationUI:
-    """What the interface of a player shows of the selection."""
+    """Return what a player's interface shows of the selection."""
     ui = ui_pb2.ObservationUI()
     slots = selection.slots(world)
     if len(slots) == 1:
@@ -48,7 +48,7 @@ def _write_one(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, 
 
 
 def _write_production(panel: ui_pb2.ProductionPanel, world: World, types: Types, slot: int, player: int) -> None:
-    """The queue: units that are trained as units, and everything by its ability."""
+    """Write the queue: units that are trained as units, and everything by its ability."""
     panel.unit.CopyFrom(_unit(world, types, slot, player))
     for job in world.jobs[slot]:
         panel.production_queue.add(ability_id=job.ability, build_progress=job.progress)

@@ -1,8 +1,8 @@
-"""The seat of somebody who only watches: an observer of a game, or the viewer of a replay.
+"""The seat of a client that only watches: an observer of a game, or the viewer of a replay.
 
-It watches everything (player 0), or what one player sees and does: his fog, his selection, his reports, and his camera
-until it is told to look elsewhere. It changes nothing in the world. Which side a player's units are on for somebody who
-watches everything was never published: here they are all enemies, told apart by their owner.
+It watches everything (player 0), or one player's fog, selection, reports, and camera until its client looks elsewhere.
+It changes nothing in the world. The alliance of units for an observer of everything was never published: here they are
+all enemies, and their owners differ.
 
 Above: `joining.py`, `viewing.py`, `play.py`. Below: `seat.py`.
 """
@@ -29,12 +29,12 @@ class Viewer(PlayerSeat):
         super().__init__(game.world, game.types, player, options)
         self._seats = game.seats
         self._own = self.hands
-        self._guide = player  # whose camera this one follows
+        self._guide = player  # the player whose camera this one follows
         self._units: tuple[int, ...] = ()  # tags of those that the camera follows instead
         self.watch(player)
 
     def watch(self, player: int) -> None:
-        """Looks through the eyes of another player."""
+        """Watch another player."""
         self.player = player
         followed = self._seats.get(player)
         self.hands = followed.hands if followed is not None else self._own
@@ -59,7 +59,7 @@ class Viewer(PlayerSeat):
         return self.ground_z(*self.camera)
 
     def obey(self, action: sc.ObserverAction) -> None:
-        """Does what an observer asks of its own view; players and units that are not there change nothing."""
+        """Change the observer's own view as it asks; players and units that are not there change nothing."""
         match action.WhichOneof("action"):
             case "player_perspective":
                 player = action.player_perspective.player_id

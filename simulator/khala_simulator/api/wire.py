@@ -19,7 +19,7 @@ _LENGTH_DELIMITED = 2
 
 
 def varint(number: int) -> bytes:
-    """A number as a varint (7 bits a byte, lowest first)."""
+    """Return a number as a varint (7 bits a byte, lowest first)."""
     out = bytearray()
     while number > 0x7F:
         out.append(number & 0x7F | 0x80)
@@ -29,15 +29,15 @@ def varint(number: int) -> bytes:
 
 
 def scalar(field: int, number: int) -> bytes:
-    """A field that holds a non-negative integer, a bool or an enum."""
+    """Return a field that holds a non-negative integer, a bool or an enum."""
     return varint(field << 3) + varint(number)
 
 
 def head(field: int, size: int) -> bytes:
-    """What stands before the `size` bytes of a field that holds a message, a string or bytes."""
+    """Return the head before the `size` bytes of a field that holds a message, a string or bytes."""
     return varint(field << 3 | _LENGTH_DELIMITED) + varint(size)
 
 
 def embed(field: int, parts: list[Part]) -> list[Part]:
-    """Parts of a message, as parts of the message that holds it in this field."""
+    """Return parts of a message, as parts of the message that holds it in this field."""
     return [head(field, sum(map(len, parts))), *parts]

@@ -1,8 +1,8 @@
-"""Buffs: how one is laid on a unit and taken off it again.
+"""Buffs: apply one to a unit and remove it again.
 
-``buff_kinds`` says what each kind changes, ``active_buffs`` holds the ones in force. What they change is written into
-the trait columns by ``traits``, when a buff comes or goes and not in every loop; ``systems.buffs`` lets them run out.
-Who lays one on which unit is for the abilities to say.
+``buff_kinds`` says what each kind changes, ``active_buffs`` holds the ones in force. ``traits`` writes the changes into
+the trait columns when a buff comes or goes, not in every loop; ``systems.buffs`` removes those that run out. The
+abilities decide who applies one to which unit.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ FRENZIED: Final = frozenset({"Ultralisk", "UltraliskBurrowed"})
 def apply(
     world: World, slot: int, name: str, *, source: int = NOBODY, owner: int | None = None, loops: float | None = None
 ) -> None:
-    """Lay a buff on a unit, or begin its time anew when it bears one of the kind already.
+    """Apply a buff to a unit, or restart its time if the unit already has one of the kind.
 
     Args:
         world: The game.
-        slot: Who is to bear it; nobody bears one twice, but kinds that stack count.
+        slot: The unit that gets it; a unit has each kind only once, but kinds that stack count.
         name: Its name in the catalog.
         source: Slot of the unit that casts it.
-        owner: Whose unit that is, the source's owner by default.
+        owner: The owner of that unit, the source's owner by default.
         loops: How long it lasts, as the catalog says by default; 0 is without an end.
     """
     buff = world.catalog.buff(name)
@@ -56,12 +56,12 @@ def apply(
 
 
 def frenzied(world: World, slot: int) -> bool:
-    """Whether a unit can be neither slowed nor moved nor taken over: an Ultralisk."""
+    """Return whether a unit can't be slowed, moved or taken over: an Ultralisk."""
     return world.unit_type(slot).name in FRENZIED
 
 
 def remove(world: World, slot: int, name: str) -> bool:
-    """Take a buff off a unit; returns whether it bore one."""
+    """Remove a buff from a unit; return whether it had one."""
     row = world.catalog.buff(name).row
     rows = world.buffs.rows
     mine = (rows["slot"] == slot) & (rows["buff"] == row)
@@ -73,5 +73,5 @@ def remove(world: World, slot: int, name: str) -> bool:
 
 
 def has(world: World, slot: int, name: str) -> bool:
-    """Whether a unit bears a buff."""
+    """Return whether a unit has a buff."""
     return len(world.buffs) > 0 and world.buffs.find(slot, world.catalog.buff(name).row) >= 0

@@ -1,8 +1,8 @@
-"""Damage: what a hit takes from whom.
+"""Damage: what a hit takes from which unit.
 
 A hit on a unit takes the damage, with its bonus against the unit's attributes, less armor, at least 0.5: from the
-shields first, with the shields' armor, and what they do not hold from life, with the body's. Splash takes its ring's
-fraction before armor. The formula's source is in ``data/SOURCES.md``.
+shields first, with the shields' armor, and the rest from life, with the body's. Splash takes its ring's fraction before
+armor. The formula's source is in ``data/SOURCES.md``.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 BEHIND = 1e-9
 
 IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {}
-"""What a hit does to its target beside its damage, by the hit's effect: a function of the world, the attacker (a slot
-or NOBODY), its owner and the target."""
+"""What a hit does to its target in addition to its damage, by the hit's effect: a function of the world, the attacker
+(a slot or NOBODY), its owner and the target."""
 
 
 def hit_with(world: World, shot: Shot) -> None:
-    """Carry out one hit: on its target, in the rings around it, or on whom a second search finds."""
+    """Carry out one hit: on its target, in the rings around it, or on the units that a second search finds."""
     damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
     if damage.hit.kills_self:
         _give_life(world, shot.source)
@@ -58,7 +58,7 @@ def hit_target(world: World, shot: Shot) -> None:
 
 
 def _give_life(world: World, slot: int) -> None:
-    """A unit dies of its own attack; nobody is credited with that."""
+    """Kill a unit by its own attack; no player gets the credit."""
     if slot != NOBODY:
         world.life[slot] = 0.0
         world.spent[slot] = True
@@ -88,7 +88,7 @@ def apply_damage(
     ignores_armor: bool = True,
     shield_bonus: float = 0.0,
 ) -> None:
-    """Take an amount of damage from one unit: shields first, then life, and both players' scores remember it.
+    """Take an amount of damage from one unit: shields first, then life; both players' scores count it.
 
     Args:
         world: The game.
@@ -96,7 +96,7 @@ def apply_damage(
         owner: Whose damage it is.
         victim: Slot of the unit that takes it; one that can't be touched takes none.
         amount: Before armor, bonuses included.
-        kind: ``ranged``, ``melee``, ``splash`` or ``spell``; buffs answer to it.
+        kind: ``ranged``, ``melee``, ``splash`` or ``spell``; buffs depend on it.
         ignores_armor: Whether armor does not count.
         shield_bonus: More damage that only shields take.
     """
@@ -143,7 +143,7 @@ def _count(world: World, owner: int, side: int, absorbed: float, wounded: float)
 
 
 def _splash(world: World, shot: Shot, damage: Damage) -> None:
-    """Damage everybody in the rings around the impact, each with the fraction of the innermost ring it is in."""
+    """Damage every unit in the rings around the impact, with the fraction of its innermost ring."""
     hit = damage.hit
     near = affected(world, hit.area_affects, shot)
     offset = world.pos[near] - shot.goal
@@ -157,7 +157,7 @@ def _splash(world: World, shot: Shot, damage: Damage) -> None:
 
 
 def _in_arc(x: float, y: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
-    """Whether an offset lies within half an arc of the direction of the shot."""
+    """Return whether an offset lies within half an arc of the direction of the shot."""
     if arc_deg >= 360.0:
         return True
     along = x * forward_x + y * forward_y
@@ -166,9 +166,9 @@ def _in_arc(x: float, y: float, forward_x: float, forward_y: float, arc_deg: flo
 
 
 def found_by(world: World, search: Search, shot: Shot) -> list[int]:
-    """Slots that a second search finds, the nearest first; from the source its radius counts from the edge.
+    """Return the slots that a second search finds, nearest first; from the source the radius counts from the edge.
 
-    Where the shot bounced from is not found again.
+    The unit that the shot bounced from is not found again.
     """
     near = affected(world, search.affects, shot)
     forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
@@ -190,7 +190,7 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
 
 
 def affected(world: World, affects: Affects, shot: Shot) -> Ints:
-    """Living units that a splash, a search or a sweep may touch."""
+    """Return the living units that a splash, a search or a sweep may touch."""
     slots = world.live
     chosen = world.targetable[slots] & (world.life[slots] > 0.0)
     if not affects.allies:

@@ -24,7 +24,7 @@ VISIBLE: Final = 2
 
 
 def remember(world: World, player: int) -> None:
-    """Bring a player's memory up to date with what he sees in this loop."""
+    """Update a player's memory with the player's sight in this loop."""
     memory = world.memories[player]
     slots = world.live[_stays(world.catalog)[world.type[world.live]] & (world.owner[world.live] != player)]
     seen = world.visible[player, slots]
@@ -66,5 +66,5 @@ def _place_is_seen(world: World, player: int, snapshot: RememberedUnit) -> bool:
 
 @lru_cache(maxsize=4)
 def _stays(catalog: Catalog) -> NDArray[np.bool_]:
-    """[rows] which types leave snapshots: structures, resources and whatever else never moves."""
+    """Return [rows] which types leave snapshots: structures, resources and all others that never move."""
     return np.array([(u.structure or bool(u.resource)) and u.speed_n == 0.0 for u in catalog.units])

@@ -1,6 +1,6 @@
-"""Launchers: what happens at the damage point of weapons that send out units instead of hitting.
+"""Launchers: the rules at the damage point of weapons that send out units instead of hitting.
 
-Only the table; ``systems.weapons`` looks rules up here and the skills of the units that are sent out put theirs in.
+Only the table: ``systems.weapons`` looks rules up here, and the skills of the launched units add theirs.
 """
 
 from __future__ import annotations

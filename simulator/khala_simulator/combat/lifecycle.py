@@ -1,6 +1,6 @@
 """Life cycle: units come into the world, become another type and change hands.
 
-The world keeps the books of its slots; here is what a new or changed unit starts with. Above: everything that makes
+The world manages its slots; this module sets what a new or changed unit starts with. Above: everything that makes
 units. Below: ``traits``, ``targets``, the world.
 """
 
@@ -20,7 +20,7 @@ FACING: Final = 4.7124  # down, as most units of a map face
 
 
 def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], facing: float = FACING) -> int:
-    """Put a complete unit into the world, exactly at ``point``; returns its slot."""
+    """Put a complete unit into the world, exactly at ``point``; return its slot."""
     slot = world.add(unit, owner, point, facing)
     world.life[slot] = world.stats.life_max[owner, unit.row] if unit.life_start is None else unit.life_start
     world.shields[slot] = world.stats.shields_max[owner, unit.row]
@@ -31,7 +31,7 @@ def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], 
     if autocast and not unit.passive:
         world.autocast[slot] = autocast
     world.looks_around[slot] = True
-    world.visible[:, slot] = not (world.fog or unit.cloaked or unit.burrowed)  # vision looks closer
+    world.visible[:, slot] = not (world.fog or unit.cloaked or unit.burrowed)  # vision refines this
     world.visible[owner, slot] = True
     refresh(world, slot)
     world.stand(slot)
@@ -40,9 +40,9 @@ def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], 
 
 
 def become(world: World, slot: int, unit: UnitType) -> None:
-    """Make a unit one of another type: same tag and place, life in proportion, orders and fights kept.
+    """Change a unit's type: it keeps its tag and place, its share of life, its orders and fights.
 
-    What it was set to use by itself, or not to, stays so where its new type has it.
+    Its autocast settings stay where the new type has the ability.
     """
     old, had_energy = int(world.type[slot]), bool(world.energy_max[slot] > 0.0)
     share = float(world.life[slot]), float(world.life_max[slot]) or 1.0
@@ -68,7 +68,7 @@ def _keep_vitals(world: World, slot: int, unit: UnitType, life: float, life_max:
 
 
 def _keep_autocast(world: World, slot: int, old: int) -> None:
-    """Keep what the unit was set to use by itself; what only its new type has is as the tables say."""
+    """Keep the unit's autocast settings; abilities that only its new type has are as the tables say."""
     known = {ability.id for ability in world.catalog.cards[old]}
     chosen = world.autocast.pop(slot, ())
     wanted = tuple(

@@ -1,7 +1,7 @@
-"""Targets: a unit begins and ends a fight, with the weapon that fits the other one.
+"""Targets: a unit begins and ends a fight, with the weapon that fits the target.
 
-Used by commands (by order) and by the systems (by its own choice); whether and when it then fires is
-``systems.weapons``.
+Used by commands (by order) and by the systems (by its own choice); ``systems.weapons`` decides whether and when it
+fires.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ WIDEST_AIM_DEG = 180.0
 
 
 def weapon_for(world: World, slot: int, target: int) -> int:
-    """Row of the weapon that a unit can aim at ``target`` now, or -1."""
+    """Return the row of the weapon that a unit can aim at ``target`` now, or -1."""
     on_ground = bool(world.plane_bits[target] & GROUND_PLANE)
     row = int(world.ground_weapon[slot]) if on_ground else -1
     if row < 0 and (not on_ground or world.plane_bits[target] != GROUND_PLANE):
@@ -30,7 +30,7 @@ def weapon_for(world: World, slot: int, target: int) -> int:
 
 
 def engage(world: World, slot: int, target: int) -> bool:
-    """Make a unit fight ``target`` with the weapon that fits; False when it has none."""
+    """Make a unit fight ``target`` with the weapon that fits; return False when it has none."""
     row = weapon_for(world, slot, target)
     if row < 0:
         return False
@@ -62,7 +62,7 @@ def take_other_weapon(world: World, slot: int) -> None:
 def measure_reach(world: World, slot: int) -> None:
     """Write the reach of the weapon at hand, with what buffs add to it or take from it.
 
-    Bodies of some types, such as Siege Tanks and Sentries, keep others farther off than their edges are; whoever
+    Bodies of some types, such as Siege Tanks and Sentries, keep others farther off than their edges; a unit that
     touches one reaches it.
     """
     plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])
@@ -70,11 +70,11 @@ def measure_reach(world: World, slot: int) -> None:
     if target != NOBODY:
         bodies = world.separation[slot] + world.separation[target]
         touch = float(bodies - world.radius[slot] - world.radius[target])
-    world.reach[slot] = max(plain + more, min(plain, 0.0), touch)  # what is taken away leaves an arm's length
+    world.reach[slot] = max(plain + more, min(plain, 0.0), touch)  # reductions leave melee range
 
 
 def disengage(world: World, slot: int) -> None:
-    """Make a unit stop fighting; what it has fired stays on its way."""
+    """Make a unit stop fighting; its shots stay under way."""
     drop_attack(world, slot)
     world.target[slot] = NOBODY
     world.weapon[slot] = -1

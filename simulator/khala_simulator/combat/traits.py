@@ -27,7 +27,7 @@ DISGUISE: Final = "Changeling"  # types that look armed and are not
 
 
 def refresh(world: World, slot: int) -> None:
-    """Write the traits of a slot from its type, its owner, the owner's upgrades and the buffs that lie on it."""
+    """Write the traits of a slot from its type, its owner, the owner's upgrades and its buffs."""
     body_traits(world, slot)
     world.note_traits(slot)
 
@@ -37,7 +37,7 @@ def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:
     for index, found in enumerate(world.unit_type(slot).weapons):
         if found.id == weapon:
             bit = 1 << index
-            flips = on == found.disabled  # as the type says is no flip
+            flips = on == found.disabled  # the type's own setting is no flip
             world.weapon_toggles[slot] = int(world.weapon_toggles[slot]) & ~bit | (bit if flips else 0)
             refresh(world, slot)
             world.scan_now = True
@@ -100,7 +100,7 @@ def _rearm(world: World, slot: int, target: int) -> None:
 
 
 def _sheltered(world: World, slot: int) -> None:
-    """Who sits in a Bunker fires from its edge, one farther; nobody else fires from inside."""
+    """Make a unit in a Bunker fire from its edge, one farther; no other passenger fires."""
     carrier = int(world.carrier[slot])
     if world.unit_type(carrier).name == BUNKER:
         world.radius[slot] = world.radius[carrier]
@@ -126,7 +126,7 @@ def _braking(unit: UnitType) -> float:
 
 
 def kinds_on(world: World, slot: int) -> list[Buff]:
-    """The kinds of buffs on a unit, in the order in which they came."""
+    """Return the kinds of buffs on a unit, in the order in which they came."""
     if not len(world.buffs):
         return []
     return [world.catalog.buffs[row] for row in world.buffs.of(slot)["buff"].tolist()]
@@ -136,7 +136,7 @@ def kinds_on(world: World, slot: int) -> list[Buff]:
 
 
 def _plain(world: World, slot: int) -> None:
-    """What a unit is like without any buff."""
+    """Write the traits of a unit without any buff."""
     world.attack_rate[slot] = world.taken_factor[slot] = world.dealt_factor[slot] = world.air_taken_factor[slot] = 1.0
     for column in (
         world.range_add, world.armor_add, world.shield_armor_add, world.ranged_add, world.melee_add,

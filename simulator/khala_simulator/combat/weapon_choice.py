@@ -1,9 +1,9 @@
 """Armament: which weapons a unit can use now, as traits of its slot.
 
 A type's weapons that are switched off can be switched on, and the other way round, by a buff (an Oracle's beam) or by
-the unit's own setting (a Baneling that blows up structures). Of the usable weapons the one with the longest range is
-aimed; a hidden one with a shorter range takes over when the target stands close, as a Roach's bite does. ``traits``
-calls this, ``targets`` picks from what it writes.
+the unit's own setting (a Baneling that blows up structures). The usable weapon with the longest range is aimed; a
+hidden one with a shorter range takes over when the target stands close, as a Roach's bite does. ``traits`` calls this,
+``targets`` picks from what it writes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ WIDEST_TURN_DEG: Final = 180.0
 
 
 def usable_weapons(world: World, slot: int, kinds: Iterable[Buff] = ()) -> list[Weapon]:
-    """The weapons that are switched on and do something, the longest range first."""
+    """Return the weapons that are switched on and do something, the longest range first."""
     toggles = int(world.weapon_toggles[slot])
     on = {name for kind in kinds for name in kind.weapons_on}
     off = {name for kind in kinds for name in kind.weapons_off}

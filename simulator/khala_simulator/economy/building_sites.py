@@ -1,6 +1,6 @@
-"""Sites: where a structure may stand, asked by builders, by the API's query and by the computer player alike.
+"""Sites: where a structure may stand; builders, the API's query and the computer player ask here.
 
-The rules are those of the placement footprint in the tables: buildable ground, nobody on it, distance to resources,
+The rules are those of the placement footprint in the tables: buildable ground, no unit on it, distance to resources,
 creep, power, and gas structures on geysers only. Above: ``skills.construction``, ``skills.addons``, ``api.query``.
 """
 
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 CAPS: Final = "Footprint3x3CappedGeyser"
-VISIBLE: Final = 2  # in sight, 1 is explored; most structures may be placed where nobody has looked yet
+VISIBLE: Final = 2  # in sight, 1 is explored; most structures may be placed in unexplored places
 ON_GEYSER: Final = 0.5  # how far from a geyser's middle a gas structure may be asked for
 
 
 def footprint_of(world: World, unit: UnitType) -> UnitFootprint | None:
-    """The cells that a structure needs; for an add-on those of its own only."""
+    """Return the cells that a structure needs; for an add-on those of its own only."""
     name = unit.footprint if "AddOn" in unit.placement else unit.placement or unit.footprint
     found = world.catalog.footprints.get(name)
     return found if found is not None and found.cells else None
 
 
 def centre(world: World, unit: UnitType, point: Point) -> Point:
-    """Where exactly a structure that is asked for at a point would stand."""
+    """Return the exact centre of a structure that is requested at a point."""
     footprint = footprint_of(world, unit)
     return point if footprint is None else snapped(point, footprint.size)
 
 
 def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
-    """Why a player can't place a structure at a point, or success; who would build it is not looked at."""
+    """Return why a player can't place a structure at a point, or success, for any builder."""
     footprint = footprint_of(world, unit)
     if footprint is None:
         return ActionResult.NOT_SUPPORTED
@@ -78,7 +78,7 @@ def _of_ground(world: World, player: int, footprint: UnitFootprint, cells: Ints)
 
 
 def _enemies_on(world: World, player: int, cells: Ints) -> bool:
-    """Whether units of others stand in the way; one's own make room."""
+    """Return whether units of others stand in the way; own units make room."""
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
     live = world.live
     others = live[(world.owner[live] != player) & (world.layer_bits[live] != 0) & ~world.walled[live]]
@@ -88,7 +88,7 @@ def _enemies_on(world: World, player: int, cells: Ints) -> bool:
 
 
 def taken(world: World) -> Bools:
-    """(h, w) the cells on which structures and resources stand, those that can be walked over included."""
+    """Return (h, w) the cells with structures and resources on them, walkable ones included."""
     if world.taken is not None and world.taken[0] == world.population:
         return world.taken[1]
     width, height = world.map.terrain.size
@@ -134,7 +134,7 @@ def _of_power(world: World, player: int, unit: UnitType, point: Point) -> Action
 
 
 def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
-    """What a player's units are under way to build, and where, in the order of slots."""
+    """Return what a player's units are on their way to build, and where, in the order of slots."""
     found: list[tuple[UnitType, Point]] = []
     for slot in world.units_of(player).tolist():
         if not world.casts[slot] and not world.queue[slot]:
@@ -153,14 +153,14 @@ def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
 
 
 def is_free_geyser(world: World, slot: int) -> bool:
-    """Whether a gas structure may be built on a unit."""
+    """Return whether a gas structure may be built on a unit."""
     unit = world.unit_type(slot)
     bare = unit.resource == "vespene" and unit.harvest_loops == 0.0
     return bare and world.occupant[slot] == NOBODY
 
 
 def geyser_at(world: World, point: Point) -> int:
-    """The geyser without a gas structure whose middle is at a point, or NOBODY."""
+    """Return the geyser without a gas structure whose centre is at a point, or NOBODY."""
     live = world.live
     offset = np.abs(world.pos[live] - point)
     near = live[(offset <= ON_GEYSER).all(axis=1)]
@@ -168,6 +168,6 @@ def geyser_at(world: World, point: Point) -> int:
 
 
 def product(world: World, ability: Ability) -> UnitType | None:
-    """The structure that an ability builds, or None when the tables do not know it."""
+    """Return the structure that an ability builds, or None when the tables lack it."""
     row = world.catalog.row_of_name.get(ability.unit)
     return None if row is None else world.catalog.units[row]

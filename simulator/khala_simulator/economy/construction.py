@@ -28,15 +28,15 @@ NO_KILLER: Final = -1
 def begin(
     world: World, unit: UnitType, owner: int, point: Point, *, loops: float, paid: Cost, by_itself: bool = True
 ) -> int:
-    """Put an unfinished structure or unit into the world; returns its slot.
+    """Put an unfinished structure or unit into the world; return its slot.
 
     Args:
         world: The game.
         unit: What it will be.
-        owner: Whose.
+        owner: Its owner.
         point: Its exact centre.
         loops: Loops of work until it is finished.
-        paid: What was charged for it, of which a part comes back when it is called off.
+        paid: The price that was charged; a part comes back when it is called off.
         by_itself: Whether the work goes on without a builder.
     """
     slot = lifecycle.spawn(world, unit, owner, point, STRUCTURE_FACING)
@@ -64,7 +64,7 @@ def finish(world: World, slot: int) -> None:
 
 
 def call_off(world: World, slot: int) -> None:
-    """Take an unfinished structure or unit out of the world; a part of its price comes back, and the drone in it."""
+    """Take an unfinished structure or unit out of the world; refund a part of its price, and its drone."""
     owner, unit = int(world.owner[slot]), world.unit_type(slot)
     x, y = world.pos[slot].tolist()
     payments.refund(world, owner, world.invested.get(slot, (0.0, 0.0)), payments.CANCELLED)
@@ -76,6 +76,6 @@ def call_off(world: World, slot: int) -> None:
 
 
 def builder_of(world: World, site: int) -> int:
-    """The slot of the unit that is working on a site, or NOBODY."""
+    """Return the slot of the unit that is working on a site, or NOBODY."""
     found = (world.site[: world.top] == site).nonzero()[0]
     return int(found[0]) if found.size else NOBODY

@@ -1,9 +1,9 @@
-"""Harvesting: what workers, resources and town halls are to each other, and how a round of it begins and ends.
+"""Harvesting: how workers, resources and town halls belong together, and how a round begins and ends.
 
 A worker goes to its resource, stays there for the resource's time, carries what it took to the nearest town hall and
-begins again; ``systems.harvest`` leads it through the phases. Here are the questions (whose field is free, which town
-hall is nearest, who is assigned where) and the steps that orders share with the system. Above: ``commands``,
-``systems.harvest``, ``skills.harvest``, the API. Below: the world's columns.
+begins again; ``systems.harvest`` leads it through the phases. This module has the questions (which field is free, which
+town hall is nearest, which worker is assigned where) and the steps that orders share with the system. Above:
+``commands``, ``systems.harvest``, ``skills.harvest``, the API. Below: the world's columns.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Phase(IntEnum):
 
 @lru_cache(maxsize=4)
 def kinds(catalog: Catalog) -> tuple[Bools, Bools, Bools]:
-    """By unit row: what workers can harvest (fields and gas structures), what is a field, where they drop it off."""
+    """Return, by unit row, which types are harvestable (fields and gas structures), fields, and drop-offs."""
     fields = np.array([u.resource == MINERALS for u in catalog.units])
     gas = np.array([u.resource == "vespene" and u.harvest_loops > 0.0 for u in catalog.units])
     halls = np.array([u.structure and "DropOff" in u.placement and not u.flying for u in catalog.units])
@@ -57,7 +57,7 @@ def kinds(catalog: Catalog) -> tuple[Bools, Bools, Bools]:
 
 @lru_cache(maxsize=4)
 def _outlines(catalog: Catalog) -> Floats:
-    """(3, rows) of each type's footprint: half its width, half its height, and what |x| + |y| is at its corners."""
+    """Return (3, rows) of each type's footprint: half its width, half its height, and |x| + |y| at its corners."""
     return np.array([_outline(catalog, unit) for unit in catalog.units]).T
 
 
@@ -73,7 +73,7 @@ def _outline(catalog: Catalog, unit: UnitType) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=4)
 def harvesters(catalog: Catalog) -> tuple[tuple[Ability | None, Ability | None], ...]:
-    """By unit row: the abilities with which units of the type gather and return, None for those that do not."""
+    """Return, by unit row, the abilities with which units of the type gather and return, None for other types."""
     found = []
     for card in catalog.cards:
         gather = next((a for a in card if a.effect == "gather"), None)
@@ -83,7 +83,7 @@ def harvesters(catalog: Catalog) -> tuple[tuple[Ability | None, Ability | None],
 
 
 def can_harvest(world: World, slot: int, resource: int) -> bool:
-    """Whether a unit can take from a field, or from a finished gas structure of its owner."""
+    """Return whether a unit can take from a field, or from a finished gas structure of its owner."""
     if harvesters(world.catalog)[int(world.type[slot])][0] is None or resource == NOBODY:
         return False
     takes, fields, _ = kinds(world.catalog)
@@ -97,12 +97,12 @@ def can_harvest(world: World, slot: int, resource: int) -> bool:
 
 
 def is_drop_off(world: World, slot: int) -> bool:
-    """Whether workers can drop off resources at a unit."""
+    """Return whether workers can drop off resources at a unit."""
     return bool(kinds(world.catalog)[2][int(world.type[slot])] and world.build_progress[slot] >= 1.0)
 
 
 def nearest_hall(world: World, slot: int) -> int:
-    """The owner's nearest finished town hall on the ground, or NOBODY."""
+    """Return the owner's nearest finished town hall on the ground, or NOBODY."""
     live = world.live
     mine = kinds(world.catalog)[2][world.type[live]] & (world.owner[live] == world.owner[slot])
     mine &= world.build_progress[live] >= 1.0
@@ -117,7 +117,7 @@ def _nearest(world: World, slot: int, candidates: Ints) -> int:
 
 
 def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
-    """(k,) distance between centres at which workers touch their resource or town hall from where they are."""
+    """Return (k,) distance between centres at which workers touch their resource or town hall from where they are."""
     half_x, half_y, diagonal = _outlines(world.catalog)[:, world.type[targets]]
     offset = np.abs(world.pos[targets] - world.pos[slots])
     distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-9)
@@ -131,13 +131,13 @@ def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
 
 
 def assigned(world: World) -> Ints:
-    """(capacity,) how many workers each resource has, whatever phase they are in."""
+    """Return (capacity,) how many workers each resource has, whatever phase they are in."""
     patches = world.patch[(world.harvest > 0) & (world.patch != NOBODY)]
     return np.bincount(patches, minlength=world.capacity)
 
 
 def staffing(world: World, player: int) -> dict[int, tuple[int, int]]:
-    """How many workers a player's town halls and gas structures have (assigned, ideal), by slot.
+    """Return the workers of a player's town halls and gas structures (assigned, ideal), by slot.
 
     A town hall counts the workers on the mineral fields around it, and wants two for each.
     """
@@ -159,10 +159,10 @@ def staffing(world: World, player: int) -> dict[int, tuple[int, int]]:
 
 
 def another_field(world: World, slot: int, near: Floats, *, waiting: int = NOBODY) -> int:
-    """Which mineral field near a point a worker changes to, or NOBODY.
+    """Return the mineral field near a point that a worker changes to, or NOBODY.
 
-    A free one that nobody else is going to before one with the fewest workers; of equal ones the nearest. A worker
-    that stands before the field ``waiting`` leaves it only for one with fewer workers.
+    A free field that no other worker is going to comes first, then the one with the fewest workers, then the nearest. A
+    worker that stands before the field ``waiting`` leaves it only for one with fewer workers.
     """
     live = world.live
     near_by = kinds(world.catalog)[1][world.type[live]]
@@ -186,7 +186,7 @@ def another_field(world: World, slot: int, near: Floats, *, waiting: int = NOBOD
 
 
 def leave(world: World, slot: int) -> None:
-    """Let go of the resource that a worker is at."""
+    """Release the resource that a worker is at."""
     patch = int(world.patch[slot])
     if patch != NOBODY and world.occupant[patch] == slot:
         world.occupant[patch] = NOBODY
@@ -197,7 +197,7 @@ def leave(world: World, slot: int) -> None:
 
 
 def _door(world: World, slot: int, patch: int) -> tuple[float, float]:
-    """Where a worker comes out of a gas structure: on the side of its town hall."""
+    """Return where a worker comes out of a gas structure: on the side of its town hall."""
     hall = nearest_hall(world, slot)
     centre = world.pos[patch]
     towards = (world.pos[hall] if hall != NOBODY else world.pos[slot]) - centre
@@ -208,14 +208,14 @@ def _door(world: World, slot: int, patch: int) -> tuple[float, float]:
 
 
 def head_for_resource(world: World, slot: int, patch: int) -> None:
-    """Send a gathering worker to a resource; how it shows as an order."""
+    """Send a gathering worker to a resource, and write that as its order."""
     gather = harvesters(world.catalog)[int(world.type[slot])][0]
     world.patch[slot] = patch
     _head_for(world, slot, patch, Phase.TO_RESOURCE, gather)
 
 
 def head_for_hall(world: World, slot: int) -> bool:
-    """Send a worker with its load to the nearest town hall; False when there is none."""
+    """Send a worker with its load to the nearest town hall; return False when there is none."""
     hall = nearest_hall(world, slot)
     if hall == NOBODY:
         return False
@@ -232,7 +232,7 @@ def _head_for(world: World, slot: int, target: int, phase: Phase, ability: Abili
 
 
 def take_up(world: World, slot: int, amount: int, *, gas: bool, rich: bool) -> None:
-    """Let a worker carry resources; clients see it as a buff."""
+    """Make a worker carry resources; clients see it as a buff."""
     put_down(world, slot)
     world.load[slot] = amount
     name = GAS_BUFFS[world.unit_type(slot).race] if gas else MINERAL_BUFFS[rich]
@@ -240,7 +240,7 @@ def take_up(world: World, slot: int, amount: int, *, gas: bool, rich: bool) -> N
 
 
 def put_down(world: World, slot: int) -> None:
-    """Take what a worker carries away from it, without giving it to anybody."""
+    """Remove a worker's load, without giving it to a player."""
     if world.load[slot]:
         world.load[slot] = 0
         for name in CARRIED:
@@ -249,5 +249,5 @@ def put_down(world: World, slot: int) -> None:
 
 
 def carries_gas(world: World, slot: int) -> bool:
-    """Whether what a worker carries is vespene."""
+    """Return whether a worker's load is vespene."""
     return any(buffs.has(world, slot, name) for name in GAS_BUFFS.values())

@@ -2,8 +2,8 @@
 
 Where the workers stand is a rule that was measured on 96 recorded starts: of the 24 cells around the town hall those
 twelve that are nearest to the middle of its mineral fields (all twelve right in 87 starts, eleven in the other nine).
-All begin with an order for one and the same field, and the camera is at their mean. Above: ``systems.staging``.
-Below: ``world``.
+All begin with an order for the same field, and the camera is at their mean. Above: ``systems.staging``. Below:
+``world``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 WORKERS: Final = 12
 RING: Final = 3  # cells from the town hall's centre
-BASE_RADIUS: Final = 10.0  # how far from a town hall its own mineral fields lie at most
+BASE_RADIUS: Final = 10.0  # largest distance from a town hall to its own mineral fields
 FIRST_FIELD: Final = 5  # the workers' first field is usually the fifth or sixth nearest
 STRUCTURE_FACING: Final = 3.927
 HALL_AND_WORKER: Final = {
@@ -39,7 +39,7 @@ OVERLORD: Final = (0.0, 4.0)
 def start(world: World) -> Iterator[tuple[list[int], int]]:
     """Give every player of the scenario a base, by chance where the scenario names no place.
 
-    Yields, after each base, its workers (slots) and the mineral field (tag) they are to gather from.
+    Yield, after each base, its workers (slots) and the mineral field (tag) that they gather from.
     """
     scenario = world.map.scenario
     free = [scenario.start_locations[i] for i in world.rng.permutation(len(scenario.start_locations)).tolist()]
@@ -69,14 +69,14 @@ def _found_base(world: World, player: int, place: tuple[float, float]) -> Iterat
 
 
 def _hatch(world: World, player: int, place: tuple[float, float]) -> None:
-    """The first Overlord and Larvae; where exactly they are is an estimate."""
+    """Place the first Overlord and Larvae; their exact places are an estimate."""
     for name, offsets in (("Larva", LARVAE), ("Overlord", (OVERLORD,))):
         for dx, dy in offsets:
             lifecycle.spawn(world, world.catalog.unit(name), player, (place[0] + dx, place[1] + dy))
 
 
 def mineral_fields(world: World, place: tuple[float, float]) -> Ints:
-    """Slots of the mineral fields of the base at ``place``, nearest first."""
+    """Return the slots of the mineral fields of the base at ``place``, nearest first."""
     live = world.live
     minerals = np.array([unit.resource == "minerals" for unit in world.catalog.units])
     fields = live[minerals[world.type[live]] & (world.owner[live] == NEUTRAL)]
@@ -87,7 +87,7 @@ def mineral_fields(world: World, place: tuple[float, float]) -> Ints:
 
 
 def worker_places(hall: tuple[float, float], minerals: Floats) -> Floats:
-    """(12, 2) where the workers stand, nearest to the middle of the ``minerals`` first."""
+    """Return (12, 2) where the workers stand, nearest to the middle of the ``minerals`` first."""
     side = np.arange(-RING, RING + 1)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     on_ring = np.maximum(np.abs(x), np.abs(y)) == RING
@@ -99,7 +99,7 @@ def worker_places(hall: tuple[float, float], minerals: Floats) -> Floats:
 
 
 def judge(world: World) -> None:
-    """End the game when at most one of the players who started has a structure left."""
+    """End the game when at most one of the starting players has a structure left."""
     started = [player.id for player in world.players[1:] if player.start is not None]
     standing = set(_with_structures(world, started))
     if len(standing) == len(started) or len(standing) > 1:

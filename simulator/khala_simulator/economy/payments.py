@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 ALL: Final = 1.0
-"""Share of the price that comes back for what was only in a queue."""
+"""Share of the price that comes back for a job that was only queued."""
 CANCELLED: Final = 0.75
 """Share that comes back for a structure whose construction is called off, and for a morph (mechanics: refunds)."""
 
 
 def charge(world: World, player: int, cost: Cost) -> Cost:
-    """Take a price from a player; returns what was taken, nothing from one who plays for free."""
+    """Charge a player a price; return what was taken, nothing from one that plays for free."""
     purse = world.players[player]
     if "free" in purse.cheats:
         return 0.0, 0.0
@@ -30,7 +30,7 @@ def charge(world: World, player: int, cost: Cost) -> Cost:
 
 
 def refund(world: World, player: int, paid: Cost, share: float = ALL) -> None:
-    """Give a share of what was paid back, in whole points (that it is rounded down is an estimate)."""
+    """Refund a share of a payment, in whole points (rounding down is an estimate)."""
     purse = world.players[player]
     for index, amount in enumerate(paid):
         back = float(int(amount * share))

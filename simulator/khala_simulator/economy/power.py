@@ -1,7 +1,7 @@
 """Power: which Pylons and phasing Warp Prisms supply the structures of their owner, and where units warp in fast.
 
-Written into the column ``powered`` when somebody came, went or was finished; asked by production, weapons and the
-API. Above: ``systems.power``, ``building_sites``, ``skills.warpgate``.
+Written into the column ``powered`` when a unit comes, goes or is finished; read by production, weapons and the API.
+Above: ``systems.power``, ``building_sites``, ``skills.warpgate``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 SUPPLIES: Final = frozenset({"Pylon", "WarpPrismPhasing"})
-"""What powers structures; the others in the tables only hasten warping in."""
+"""Types that power structures; the others in the tables only hasten warping in."""
 ALWAYS_FAST: Final = frozenset({"WarpPrismPhasing"})
 CLIFF: Final = 0.5  # a Pylon does not power ground that lies so much higher than it
 
@@ -35,13 +35,13 @@ class PoweredArea:
 
 @lru_cache(maxsize=4)
 def _rows(catalog: Catalog) -> tuple[Bools, Bools]:
-    """By unit row: what has a field of any kind, and what works only with power."""
+    """Return, by unit row, which types have a field of any kind, and which work only with power."""
     fields = np.array([bool(u.power) for u in catalog.units])
     return fields, np.array([u.needs_power for u in catalog.units])
 
 
 def sources(world: World, player: int) -> list[PoweredArea]:
-    """A player's power fields, by ascending slot."""
+    """Return a player's power fields, by ascending slot."""
     live = world.live
     mine = live[_rows(world.catalog)[0][world.type[live]] & (world.owner[live] == player)]
     mine = mine[(world.build_progress[mine] >= 1.0) & ~world.hallucination[mine]]
@@ -61,7 +61,7 @@ def _source(world: World, slot: int, hasteners: list[int]) -> PoweredArea:
 
 
 def covered(world: World, source: PoweredArea, points: Floats) -> Bools:
-    """(k,) which points (k, 2) lie in a field; a Pylon's does not reach up a cliff."""
+    """Return (k,) which points (k, 2) lie in a field; a Pylon's does not reach up a cliff."""
     offset = points - np.array(source.point)
     inside: Bools = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= source.radius**2
     if not world.unit_type(source.slot).flying and inside.any():
@@ -71,14 +71,14 @@ def covered(world: World, source: PoweredArea, points: Floats) -> Bools:
 
 
 def best(world: World, player: int, point: tuple[float, float]) -> PoweredArea | None:
-    """The field over a point, a fast one if there is any; None without power."""
+    """Return the field over a point, a fast one if there is any; None without power."""
     at = np.array([point])
     found = [source for source in sources(world, player) if covered(world, source, at)[0]]
     return max(found, key=lambda source: source.fast, default=None)
 
 
 def supply(world: World) -> list[int]:
-    """Write ``powered`` of every structure that needs power; returns those for which it changed."""
+    """Write ``powered`` of every structure that needs power; return those for which it changed."""
     live = world.live
     slots = live[_rows(world.catalog)[1][world.type[live]]]
     if not slots.size:

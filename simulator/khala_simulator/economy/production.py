@@ -1,7 +1,7 @@
 """Production: the queues of structures and eggs, and how something gets into one and out of it again.
 
-A ``Job`` is one thing in the making; the first of a queue (the first two beside a reactor) are worked on, which is
-``systems.production``'s. What an ability means for a queue stands in ``skills.production`` and ``skills.research``.
+A ``Job`` is one product in a queue; ``systems.production`` works on the first one (with a reactor on the first two).
+What an ability means for a queue is in ``skills.production`` and ``skills.research``.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ REACTOR_PARALLEL: Final = 2
 
 
 def has_reactor(world: World, slot: int) -> bool:
-    """Whether a reactor stands at a structure's side."""
+    """Return whether a reactor stands at a structure's side."""
     side = int(world.addon[slot])
     return side != NOBODY and world.unit_type(side).name.endswith("Reactor")
 
 
 def parallel(world: World, slot: int) -> int:
-    """How many jobs of a queue are worked on at a time."""
+    """Return how many jobs of a queue are worked on at a time."""
     return REACTOR_PARALLEL if has_reactor(world, slot) else 1
 
 
 def room(world: World, slot: int) -> int:
-    """How many more jobs a queue takes: one for an egg, five for a structure, eight with a reactor."""
+    """Return how many more jobs a queue takes: one for an egg, five for a structure, eight with a reactor."""
     unit: UnitType = world.unit_type(slot)
     size = (REACTOR_QUEUE if has_reactor(world, slot) else QUEUE) if unit.structure else 1
     return max(0, size - len(world.jobs.get(slot, ())))
@@ -64,16 +64,16 @@ def drop(world: World, slot: int, job: Job) -> None:
 
 
 def forget(world: World, job: Job) -> None:
-    """Count a job's product as under way no longer."""
+    """Stop counting a job's product as under way."""
     underway = world.players[job.owner].underway
     if job.makes in underway:
         underway.remove(job.makes)
 
 
 def call_off(world: World, slot: int, index: int = -1) -> bool:
-    """Cancel the job at a place of a queue, by default the last; returns whether there was one.
+    """Cancel the job at a place of a queue, by default the last; return whether there was one.
 
-    What was only queued or in training gives all of its price back, a structure that was changing its kind a part.
+    A queued or training job refunds all of its price, a structure that was changing its kind a part.
     """
     queue = world.jobs.get(slot, [])
     if not -len(queue) <= index < len(queue):

@@ -1,6 +1,6 @@
 """Requirements: whether a player has what an ability needs, such as a finished structure or an upgrade.
 
-Counts what the tables ask for; what a requirement is stands in ``abilities.Need``.
+Counts what the tables ask for; ``abilities.Need`` defines a requirement.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ NATURES: Final[dict[str, Callable[[World, int], bool]]] = {
     "WidowMineArmed": lambda world, slot: world.unit_type(slot).name == "WidowMineBurrowed",
     "QueenMustBeOnCreep": lambda world, slot: world.on_creep(slot),
 }
-"""Behaviours that units have by their type or their place; they are never laid on as buffs."""
+"""Behaviours that units have by their type or their place; they are never applied as buffs."""
 COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
     "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
 }  # fmt: skip
 
 
 def met(world: World, slot: int, need: Need | None) -> bool:
-    """Whether the condition holds for a unit and its owner; a player with the debug tech tree needs nothing."""
+    """Return whether the condition holds for a unit and its owner; a player with the debug tech tree needs nothing."""
     if need is None or "tech_tree" in world.players[int(world.owner[slot])].cheats:
         return True
     return _count(world, slot, need) > 0
 
 
 def _count(world: World, slot: int, need: Need) -> float:
-    """The value of a condition: how many there are, or 1 and 0 for true and false."""
+    """Return the value of a condition: how many there are, or 1 and 0 for true and false."""
     return RULES[need.kind](world, slot, need)
 
 
@@ -65,7 +65,7 @@ def _compared(world: World, slot: int, need: Need) -> float:
 
 
 def _allowed(_: World, __: int, ___: Need) -> float:
-    """The tables' only operation allows what melee games always allow."""
+    """Return the value of the tables' only operation, which is always true in melee games."""
     return 1.0
 
 
@@ -101,7 +101,7 @@ def _units(world: World, slot: int, need: Need) -> float:
 
 
 def _tally(world: World) -> NDArray[np.int64]:
-    """[2, players, unit rows] how many finished units, and how many at all, each player has, passengers too."""
+    """Return [2, players, unit rows] each player's number of finished units, and of all units, passengers included."""
     if world.tally is None or world.tallied != world.loop:
         slots = np.flatnonzero(world.alive)
         shape = (len(world.players), len(world.catalog.units))
@@ -129,7 +129,7 @@ RULES: Final[dict[str, Callable[[World, int, Need], float]]] = {
 
 @lru_cache(maxsize=512)
 def counts_as(catalog: Catalog, name: str, *, alias: bool) -> frozenset[int]:
-    """Rows of the types that count as ``name``: its own, and with ``alias`` those that stand in for it."""
+    """Return the rows of the types that count as ``name``: its own, and with ``alias`` its substitutes."""
     own = catalog.row_of_name.get(name)
     rows = set() if own is None else {own}
     if alias:

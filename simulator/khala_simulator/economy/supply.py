@@ -1,6 +1,6 @@
-"""Supply: how much a player's units use, and how much his structures provide.
+"""Supply: how much a player's units use, and how much the structures provide.
 
-What is being trained counts from the moment it is begun, what only waits in a queue does not. Above: ``casting``,
+A unit in training counts from its start; one that only waits in a queue does not count. Above: ``casting``,
 ``production``, the API. Below: the world.
 """
 
@@ -21,19 +21,19 @@ LIMIT: Final = 200.0
 
 @lru_cache(maxsize=4)
 def _columns(catalog: Catalog) -> tuple[Floats, Floats]:
-    """By unit row: what one uses, and what one provides."""
+    """Return, by unit row, what one uses, and what one provides."""
     return np.array([u.supply for u in catalog.units]), np.array([u.provides for u in catalog.units])
 
 
 def used(world: World, player: int) -> float:
-    """What a player's units use, those in transports and those in the making included."""
+    """Return the supply that a player's units use, those in transports and in production included."""
     n = world.top
     mine = world.alive[:n] & (world.owner[:n] == player) & ~world.hallucination[:n]
     return float(_columns(world.catalog)[0][world.type[:n][mine]].sum()) + begun(world, player)
 
 
 def begun(world: World, player: int) -> float:
-    """What units use that structures and eggs are making, and what units use more that are growing into larger ones."""
+    """Return the supply of units in production, and the extra supply of units that grow into larger ones."""
     if not (world.jobs or world.channelling):
         return 0.0
     jobs = sum(job.supply for jobs in world.jobs.values() for job in jobs if job.begun and job.owner == player)
@@ -42,7 +42,7 @@ def begun(world: World, player: int) -> float:
 
 
 def cap(world: World, player: int) -> float:
-    """What a player's finished units and structures provide, at most the game's limit."""
+    """Return the supply that a player's finished units and structures provide, at most the game's limit."""
     slots = world.units_of(player)
     whole = slots[world.build_progress[slots] >= 1.0]
     provided = float(_columns(world.catalog)[1][world.type[whole]].sum())
@@ -54,7 +54,7 @@ def cap(world: World, player: int) -> float:
 
 
 def has_room(world: World, player: int, amount: float) -> bool:
-    """Whether so much more can be used; always for one with the debug food."""
+    """Return whether a player can use so much more supply; always true with the debug state for food."""
     if amount <= 0.0 or "food" in world.players[player].cheats:
         return True
     return used(world, player) + amount <= cap(world, player)

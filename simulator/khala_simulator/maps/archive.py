@@ -1,7 +1,7 @@
 """A user's own .SC2Map archive as a map that can be played.
 
-Terrain, playable area, start locations and what stands on the map are read from it. Its script is a program that nobody
-here can run: a map that is known by its name has the script of its scenario, any other one is a plain melee game.
+Terrain, playable area, start locations and units are read from it. The simulator can't run its script: a map with a
+known name has the script of its scenario, any other one is a plain melee game.
 
 Above: ``map_file``, ``install``. Below: ``terrain_file``, ``maps``.
 """
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 MAGIC: Final = b"MPQ"
 OBJECTS: Final = "Objects"
-CLOSED: Final = ("CellAttribute_Pnp", "CellAttribute_Pwd")  # paint that nobody walks on
+CLOSED: Final = ("CellAttribute_Pnp", "CellAttribute_Pwd")  # unwalkable paint
 QUARTER_TURN: Final = np.pi / 2.0  # from the editor's rotation, 0 downwards, to the API's facing, 0 eastwards
 FAMILY: Final = "user"
 
 
 class ArchiveError(ValueError):
-    """The bytes are no archive of a map, or one that can't be read; the text says why."""
+    """The bytes are no archive of a map, or an unreadable one; the text says why."""
 
 
 def read_archive(data: bytes, path: str) -> GameMap:
-    """The map in the bytes of an archive; ``path`` tells its name.
+    """Return the map in the bytes of an archive; ``path`` holds its name.
 
     Raises:
         ArchiveError: it can't be read, and its name is not that of a shipped map either.
@@ -62,7 +62,7 @@ def read_archive(data: bytes, path: str) -> GameMap:
 
 
 def _known(path: str) -> GameMap | None:
-    """The shipped map of this name."""
+    """Return the shipped map of this name."""
     try:
         return load_map(find_map(path if path.endswith(".SC2Map") else f"{path}.SC2Map"))
     except MapError:
@@ -71,7 +71,7 @@ def _known(path: str) -> GameMap | None:
 
 @lru_cache(maxsize=8)
 def _terrain_of(data: bytes) -> tuple[Terrain, bytes]:
-    """The terrain of an archive and a hash of the whole; a game is created from the same bytes again and again."""
+    """Return the terrain of an archive and a hash of the whole; cached, as many games use the same bytes."""
     archive = _open(data)
     try:
         info = terrain_file.read_map_info(_member(archive, "MapInfo"))
@@ -117,7 +117,7 @@ def _member(archive: Any, name: str) -> bytes:
 
 
 def _melee(objects: bytes, name: str) -> Scenario:
-    """A melee game on the start locations of a map, with what stands there."""
+    """Return a melee game on the start locations of a map, with the units of the map."""
     try:
         root = _tree(objects)
         starts = [_point(o) for o in root.iter("ObjectPoint") if o.get("Type") == "StartLoc"]
@@ -151,7 +151,7 @@ def _point(element: ET.Element) -> tuple[float, float]:
 
 
 def _unit(element: ET.Element, players: int) -> dict[str, Any] | None:
-    """A placed unit as a scenario tells it; None for a type that the tables do not have or a player who isn't there."""
+    """Return a placed unit in the form of a scenario; None for an unknown type or an absent player."""
     kind, owner = element.get("UnitType", ""), int(element.get("Player", "0"))
     if kind not in load_catalog().row_of_name or owner > players:
         return None

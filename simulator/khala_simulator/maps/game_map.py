@@ -1,7 +1,7 @@
 """Maps: terrain grids joined with the scenario that is played on them.
 
-Immutable and shared by every game on the map; what structures add to the terrain during a game is the world's.
-All grids are indexed ``[y, x]`` with row 0 at y = 0 (the bottom), cell (x, y) covering [x, x+1) x [y, y+1).
+Immutable and shared by every game on the map; the world holds what structures add to the terrain during a game. All
+grids are indexed ``[y, x]`` with row 0 at y = 0 (the bottom), cell (x, y) covering [x, x+1) x [y, y+1).
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ Grid = NDArray[np.bool_]
 Box = tuple[int, int, int, int]
 
 BASES = "bases"
-"""The folder beside the families whose files are only extended by others."""
+"""The folder next to the families; other files only extend its files."""
 FIRST_CHOICE = "llm_smac"
-"""The family that a bare name means when several have it: its maps end by themselves."""
+"""The family of a bare name that several have: its maps end by themselves."""
 FLAT_Z = 10.0
 FLAT_CLIFF = 128
 HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
@@ -56,7 +56,7 @@ class Terrain:
     vertices: NDArray[np.float32]  # (h + 1, w + 1) ground z at the cells' corners
 
     def ground_z(self, points: Floats) -> Floats:
-        """Ground height under world points (n, 2), interpolated between the corners of their cells."""
+        """Return the ground height under world points (n, 2), interpolated between the corners of their cells."""
         x = np.minimum(np.maximum(points[..., 0], 0.0), self.size[0] - 1e-6)
         y = np.minimum(np.maximum(points[..., 1], 0.0), self.size[1] - 1e-6)
         ix, iy = x.astype(np.intp), y.astype(np.intp)
@@ -73,7 +73,7 @@ class Terrain:
 class GameMap:
     """A map that can be played.
 
-    ``path`` is where an install keeps it below ``Maps`` (``llm_smac/2s3z.SC2Map``), ``digest`` a hash of scenario and
+    ``path`` is its path below ``Maps`` in an install (``llm_smac/2s3z.SC2Map``), ``digest`` a hash of scenario and
     terrain that names exactly this content.
     """
 
@@ -85,12 +85,12 @@ class GameMap:
 
     @property
     def path(self) -> str:
-        """Path below ``Maps`` in an install, with forward slashes."""
+        """The path below ``Maps`` in an install, with forward slashes."""
         return f"{self.family}/{self.name}.SC2Map"
 
     @property
     def camera(self) -> tuple[float, float]:
-        """Where the camera starts: the scenario's word, or the middle of the playable area."""
+        """Where the camera starts: the scenario's value, or the middle of the playable area."""
         if self.scenario.camera is not None:
             return self.scenario.camera
         x0, y0, x1, y1 = self.terrain.playable
@@ -99,14 +99,14 @@ class GameMap:
 
 @lru_cache(maxsize=1)
 def _families() -> tuple[str, ...]:
-    """The folders of shipped maps, sorted."""
+    """Return the folders of shipped maps, sorted."""
     root = resources.files("khala_simulator.data") / "maps"
     return tuple(sorted(folder.name for folder in root.iterdir() if folder.is_dir() and folder.name != BASES))
 
 
 @lru_cache(maxsize=32)
 def _sheets(family: str) -> Mapping[str, Sheet]:
-    """The scenarios of a family's shipped files as ``family/name``; none of a family that is not there."""
+    """Return the scenarios of a family's shipped files as ``family/name``; none of a family that is not there."""
     if family not in _families():
         return {}
     found: dict[str, Sheet] = {}
@@ -119,17 +119,17 @@ def _sheets(family: str) -> Mapping[str, Sheet]:
 
 @lru_cache(maxsize=1)
 def map_names() -> tuple[str, ...]:
-    """All shipped maps as ``family/name``, sorted."""
+    """Return all shipped maps as ``family/name``, sorted."""
     return tuple(sorted(name for family in _families() for name in _sheets(family)))
 
 
 def map_title(name: str) -> str:
-    """What the shipped map ``family/name`` is about."""
+    """Return the title of the shipped map ``family/name``."""
     return _sheets(name.partition("/")[0])[name].title
 
 
 def find_map(name: str) -> str:
-    """The shipped map that ``name`` means: ``family/name``, a bare name, or a path to an .SC2Map file of that name.
+    """Return the shipped map for ``name``: ``family/name``, a bare name, or a path to an .SC2Map file of that name.
 
     Raises:
         MapError: none is meant, or a bare name means several.
@@ -150,7 +150,7 @@ def find_map(name: str) -> str:
 
 
 def load_map(name: str) -> GameMap:
-    """The shipped map with this name (see ``find_map``); raises ``MapError`` when there is none."""
+    """Return the shipped map with this name (see ``find_map``); raise ``MapError`` when there is none."""
     return _load(find_map(name))
 
 
@@ -161,7 +161,7 @@ def _load(full_name: str) -> GameMap:
 
 
 def map_from(scenario: Scenario, text: str) -> GameMap:
-    """Join a scenario, which ``text`` tells completely, with its terrain."""
+    """Join a scenario, which ``text`` defines completely, with its terrain."""
     if isinstance(scenario.terrain, Flat):
         terrain, content = _flat(scenario.terrain.flat)
     else:
@@ -170,13 +170,13 @@ def map_from(scenario: Scenario, text: str) -> GameMap:
 
 
 def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
-    """The map of a scenario on a terrain, which ``content`` tells completely."""
+    """Return the map of a scenario on a terrain, which ``content`` defines completely."""
     narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
     return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
 
 
 def height_bytes(vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """(h, w) the API's height of every cell, which is that of its lower-left corner, from (h + 1, w + 1) z."""
+    """Return (h, w) the API's height of every cell (at its lower-left corner), from (h + 1, w + 1) z."""
     scaled = np.rint((vertices[:-1, :-1] - HEIGHT_LOW) * (HEIGHT_STEPS / HEIGHT_SPAN))
     result: NDArray[np.uint8] = np.clip(scaled, 0, HEIGHT_STEPS).astype(np.uint8)
     return result
@@ -210,7 +210,7 @@ def _shipped(name: str) -> tuple[Terrain, bytes]:
 
 @lru_cache(maxsize=32)
 def _flat(size: tuple[int, int]) -> tuple[Terrain, bytes]:
-    """Level ground on which everything may stand everywhere."""
+    """Return level ground that is free everywhere."""
     width, height = size
     free = np.ones((height, width), dtype=np.bool_)
     vertices = np.full((height + 1, width + 1), FLAT_Z, dtype=np.float32)
@@ -224,7 +224,7 @@ def _flat(size: tuple[int, int]) -> tuple[Terrain, bytes]:
 
 @lru_cache(maxsize=64)
 def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
-    """The terrain of which only a part is played on; heights are told of that part alone, as the game does."""
+    """Return the terrain with only a part in play; heights cover that part alone, as in the game."""
     x0, y0, x1, y1 = playable
     width, height = terrain.size
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):

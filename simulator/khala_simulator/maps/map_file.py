@@ -1,7 +1,7 @@
-"""What stands in the `.SC2Map` files of an install, and which map a client means.
+"""The content of the `.SC2Map` files of an install, and which map a client means.
 
-A map of ours is a text file: a first line that marks it, then the name of a shipped map, or a whole scenario in
-the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
+A map of the simulator is a text file: a first line that marks it, then the name of a shipped map, or a whole scenario
+in the language of `scenario.py`, which is how a user adds one. Clients read the file and send its bytes, or only its
 path. An archive of StarCraft II itself is read by `archive.py`.
 
 Above: `process/install.py`, `process/lobby.py`. Below: `game_map.py`, `archive.py`.
@@ -34,7 +34,7 @@ class MapDataError(ValueError):
 
 
 def placeholders() -> Iterator[tuple[str, bytes]]:
-    """Path below `Maps` and content of the file of every shipped map."""
+    """Yield the path below `Maps` and the content of the file of every shipped map."""
     for name in map_names():
         yield name + SUFFIX, _placeholder(name)
 
@@ -44,23 +44,23 @@ def _placeholder(name: str) -> bytes:
 
 
 def is_placeholder(data: bytes) -> bool:
-    """Whether this is the file of a shipped map, which an update may replace, and nothing that a user wrote."""
+    """Return whether this is the file of a shipped map, which an update may replace, and not a user's own."""
     return data.startswith(_MARK) and b"\n" not in data[len(_MARK) :].strip()
 
 
 def is_archive(data: bytes) -> bool:
-    """Whether this is an archive of StarCraft II itself."""
+    """Return whether this is an archive of StarCraft II itself."""
     return data.startswith(_ARCHIVE)
 
 
 def read_map(data: bytes, path: str) -> GameMap:
-    """The map in the bytes of a file; its path tells which map an archive of StarCraft II holds.
+    """Return the map in the bytes of a file; its path names the map in an archive of StarCraft II.
 
     Raises:
         MapDataError: with a sentence for the client.
     """
     if is_archive(data):
-        from khala_simulator.maps.archive import ArchiveError, read_archive  # noqa: PLC0415  # its libraries, for few games only
+        from khala_simulator.maps.archive import ArchiveError, read_archive  # noqa: PLC0415  # its libraries, for few games
 
         try:
             return read_archive(data, path)
@@ -84,7 +84,7 @@ def _read_text(data: bytes, source: str) -> GameMap:
 
 
 def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:
-    """The bytes of the map that a path means, or None.
+    """Return the bytes of the map that a path means, or None.
 
     It may be one that the client saved, a file of the install, any file, or the name of a shipped map.
     """

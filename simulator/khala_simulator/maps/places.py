@@ -1,8 +1,8 @@
-"""Places of a scenario: points, regions and the ways in which a file says where units shall be.
+"""Places of a scenario: points, regions and the ways in which a file places units.
 
-Models and plane geometry. Names are only names here: whether a point, a region, a player or a unit type exists is
-checked against ``Names``, which the reader of the file hands in as the context of the validation. Above: ``script``,
-``scenario``. Which random place it is, and which is free, is for ``systems``.
+Models and plane geometry. The models hold names; whether a point, a region, a player or a unit type exists is checked
+against ``Names``, which the reader of the file passes as the context of the validation. Above: ``script``,
+``scenario``. ``systems`` chooses random places and free ones.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class Model(BaseModel):
-    """A part of a scenario: nothing that is not foreseen, and it never changes."""
+    """A part of a scenario: immutable, with no unknown fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -59,7 +59,7 @@ def _known(value: Any, known: Collection[Any], what: str) -> Any:
 
 
 def _reference(what: str, *fields: str) -> AfterValidator:
-    """A check that the file has what a value names; without a context everything is taken for known."""
+    """Return a check that the file has what a value names; without a context every name is accepted."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
         names = info.context
@@ -71,7 +71,7 @@ def _reference(what: str, *fields: str) -> AfterValidator:
 
 
 def _in_tables(names: Callable[[Catalog], Collection[str]], what: str) -> AfterValidator:
-    """A check that any version of the game's tables has what a value names."""
+    """Return a check that any version of the game's tables has what a value names."""
 
     def check(value: str) -> str:
         if any(value in names(load_catalog(version)) for version in (DEFAULT_VERSION, *VERSION_OF_BUILD.values())):
@@ -102,7 +102,7 @@ Posed = Annotated[tuple[float, float] | tuple[float, float, float], BeforeValida
 
 
 def kind_of_place(value: Any) -> str | None:
-    """Which form of a place a value is meant to be."""
+    """Return the form of place that a value has."""
     if isinstance(value, str):
         return "name"
     if isinstance(value, list | tuple):
@@ -129,13 +129,13 @@ class Span(Model):
     step: Annotated[float, Field(gt=0)] = 1.0
 
     def values(self) -> tuple[float, ...]:
-        """The numbers, ascending."""
+        """Return the numbers, ascending."""
         count = round((self.to - self.start) / self.step) + 1
         return tuple(round(self.start + i * self.step, 4) for i in range(count))
 
 
 def _axis(value: Any) -> Any:
-    """One number, several, or a span, as the numbers that they stand for."""
+    """Return the numbers of one number, several, or a span."""
     if isinstance(value, dict):
         return Span.model_validate(value).values()
     return (value,) if isinstance(value, int | float) else _as_tuple(value)
@@ -153,7 +153,7 @@ class PlaceGrid(Model):
 
 
 class RandomPlace(Model):
-    """Anywhere in a region, at least so far from every unit of a type, centre to centre."""
+    """Anywhere in a region, with a minimum distance to every unit of a type, centre to centre."""
 
     random_in: RegionName
     away_from: dict[UnitName, float] = {}
@@ -197,7 +197,7 @@ class Shape(Model):
         return self
 
     def covers(self, points: Floats) -> Bools:
-        """(n,) whether each of the points (n, 2) is inside, edges included."""
+        """Return (n,) whether each of the points (n, 2) is inside, edges included."""
         x, y = points[:, 0], points[:, 1]
         if self.rect is not None:
             x0, y0, x1, y1 = self.rect
@@ -217,7 +217,7 @@ class Shape(Model):
 
 
 class Region(Model):
-    """A part of the map: what any of its shapes covers and none that is taken out."""
+    """A part of the map: the union of its shapes without those taken out."""
 
     shapes: Annotated[tuple[Shape, ...], Field(min_length=1)]
 
@@ -235,7 +235,7 @@ class Region(Model):
         return self
 
     def covers(self, points: Floats) -> Bools:
-        """(n,) whether each of the points (n, 2) lies in the region."""
+        """Return (n,) whether each of the points (n, 2) lies in the region."""
         inside: Bools = np.zeros(len(points), dtype=np.bool_)
         for shape in self.shapes:
             inside = inside & ~shape.covers(points) if shape.minus else inside | shape.covers(points)

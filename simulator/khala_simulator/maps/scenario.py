@@ -17,9 +17,9 @@ and an ordered list of triggers. A trigger says *when* it is looked at, *if* whi
         do:
           - result: {1: victory, 2: defeat}
 
-Triggers are looked at in the order of the file, and none after the one that ends the game. Here is only the model of
-the whole; its parts are in ``script`` and ``places``, ``scenario_file`` reads it, ``systems.triggers`` executes it and
-``maps`` joins it with its terrain.
+Triggers are looked at in the order of the file, and none after the one that ends the game. This module is only the
+model of the whole; its parts are in ``script`` and ``places``, ``scenario_file`` reads it, ``systems.triggers``
+executes it and ``maps`` joins it with its terrain.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Box = Annotated[
 
 
 class Visibility(Model):
-    """What the map's script switches off for everybody: the fog of war and the black mask."""
+    """What the map's script switches off for every player: the fog of war and the black mask."""
 
     fog: bool = True
     black_mask: bool = True
@@ -50,8 +50,8 @@ class Visibility(Model):
 class PlayerSpec(Model):
     """A player slot of the map.
 
-    An ``open`` slot is a player only if somebody sits there. Without a ``start`` a player of a melee game gets one of
-    the scenario's start locations by chance. ``ai: melee`` lets the game's own computer player lead what he has.
+    An ``open`` slot is a player only if a client takes it. Without a ``start`` a player of a melee game gets one of the
+    scenario's start locations by chance. With ``ai: melee`` the game's own computer player leads its units.
     """
 
     race: Literal["protoss", "terran", "zerg", "random"]
@@ -77,14 +77,14 @@ class Scenario(Model):
     title: str
     terrain: str | Flat
     playable: Box | None = None
-    """What part of the terrain is played on, ``[x0, y0, x1, y1]``; the terrain's own without it."""
+    """The playable part of the terrain, ``[x0, y0, x1, y1]``; by default the terrain's own."""
     visibility: Visibility = Visibility()
     camera: Point | None = None
-    """Where the camera starts; in a melee game at the player's workers, else in the middle without it."""
+    """Where the camera starts; by default at the player's workers in a melee game, else in the middle."""
     score: Literal["melee", "curriculum", "collected"] = "melee"
     """What the API calls the score: the game's own, the script's, or the resources that were gathered."""
     melee: bool = False
-    """Whether every player starts with a town hall and twelve workers, and loses with the last structure."""
+    """Whether every player starts with a town hall and twelve workers, and loses with their last structure."""
     start_locations: tuple[Point, ...] = ()
     players: dict[PlayerId, PlayerSpec]
     points: dict[str, Point] = Field(default_factory=dict)
@@ -126,7 +126,7 @@ class Scenario(Model):
 
 
 def names_of(raw: Any) -> Names:
-    """What the parts of a scenario may refer to, from its data before they are checked."""
+    """Return the names that the parts of a scenario may refer to, from its unchecked data."""
     raw = raw if isinstance(raw, dict) else {}
 
     def keys(field: str) -> set[Any]:
@@ -142,7 +142,7 @@ def names_of(raw: Any) -> Names:
 
 
 def _drawn(triggers: Any) -> list[str]:
-    """Names of the points that triggers draw."""
+    """Return the names of the points that triggers draw."""
     found: list[str] = []
     for trigger in triggers if isinstance(triggers, list) else ():
         actions = trigger.get("do") if isinstance(trigger, dict) else None

@@ -3,11 +3,11 @@
 A file may extend another one and may hold variants of itself:
 
 * ``extends: bases/smac`` takes a shipped file as the beginning;
-* ``variants: {3m: {...}, 8m: {...}}`` makes one map of each entry, which says only what is its own.
+* ``variants: {3m: {...}, 8m: {...}}`` makes one map of each entry, which holds only its differences.
 
-What is said later is laid over what was said before: mappings are merged key by key; ``units``, ``triggers`` and
-``estimates`` are joined, where a trigger takes the place of one of the same name; all else is replaced. That is done
-on the nodes of YAML, which keep their lines, so that an error points at the line that somebody wrote.
+Later values override earlier ones: mappings are merged key by key; ``units``, ``triggers`` and ``estimates`` are
+joined, where a trigger replaces one of the same name; all else is replaced. This happens on the nodes of YAML, which
+keep their lines, so that an error points at the written line.
 
 Above: ``maps``. Below: ``scenario``.
 """
@@ -42,13 +42,13 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True)
 class Sheet:
-    """One scenario's text, as nodes: what the file, its base and its variant say together."""
+    """One scenario's text, as nodes: the file, its base and its variant together."""
 
     node: yaml.MappingNode
     source: str
 
     def scenario(self) -> Scenario:
-        """The scenario.
+        """Return the scenario.
 
         Raises:
             ScenarioError: the text breaks the language.
@@ -68,14 +68,14 @@ class Sheet:
         return _scalar(self.node, "title")
 
     def data(self) -> Any:
-        """The plain data."""
+        """Return the plain data."""
         try:
             return yaml.constructor.SafeConstructor().construct_document(self.node)
         except yaml.MarkedYAMLError as error:
             raise _not_yaml(error, self.source) from error
 
     def canonical(self) -> str:
-        """The data as one text, the same for the same content."""
+        """Return the data as one text, the same for the same content."""
         return json.dumps(self.data(), sort_keys=True, default=str)
 
 
@@ -93,15 +93,15 @@ def read_scenario(path: Path) -> Scenario:
 
 
 def parse_scenario(text: str, source: str) -> Scenario:
-    """The scenario in ``text``, which must be a single one; ``source`` names it in errors."""
+    """Return the scenario in ``text``, which must be a single one; ``source`` names it in errors."""
     return single_sheet(text, source).scenario()
 
 
 def single_sheet(text: str, source: str) -> Sheet:
-    """The only scenario of a text.
+    """Return the only scenario of a text.
 
     Raises:
-        ScenarioError: it is no YAML, extends what is not there, or has several variants.
+        ScenarioError: it is no YAML, extends a missing file, or has several variants.
     """
     found = list(sheets(text, source))
     if len(found) != 1:
@@ -110,7 +110,7 @@ def single_sheet(text: str, source: str) -> Sheet:
 
 
 def sheets(text: str, source: str) -> Iterator[tuple[str, Sheet]]:
-    """Every scenario of a text with its name, in the order of the file."""
+    """Yield every scenario of a text with its name, in the order of the file."""
     node = _with_bases(_compose(text, source), source)
     variants = _take(node, VARIANTS)
     if variants is None:
@@ -128,7 +128,7 @@ def sheets(text: str, source: str) -> Iterator[tuple[str, Sheet]]:
 
 
 def base_text(name: str) -> str | None:
-    """The text of a shipped file below ``data/maps``, or None."""
+    """Return the text of a shipped file below ``data/maps``, or None."""
     path = resources.files("khala_simulator.data") / "maps" / f"{name}.yaml"
     return path.read_text(encoding="utf-8") if ".." not in name and path.is_file() else None
 
@@ -161,7 +161,7 @@ def _wrong(node: yaml.Node, text: str) -> ScenarioError:
 
 
 def _with_bases(node: yaml.MappingNode, source: str, depth: int = 0) -> yaml.MappingNode:
-    """The node laid over the files that it extends."""
+    """Return the node merged over the files that it extends."""
     base = _take(node, EXTENDS)
     if base is None:
         return node
@@ -172,7 +172,7 @@ def _with_bases(node: yaml.MappingNode, source: str, depth: int = 0) -> yaml.Map
 
 
 def _take(node: yaml.MappingNode, name: str) -> yaml.Node | None:
-    """Takes a field out of a mapping and returns its value, if it is there."""
+    """Take a field out of a mapping and return its value, if it is there."""
     found = next((pair for pair in node.value if pair[0].value == name), None)
     if found is not None:
         node.value = [pair for pair in node.value if pair is not found]
@@ -184,7 +184,7 @@ def _scalar(node: yaml.MappingNode, name: str) -> str:
 
 
 def _laid_over(base: yaml.MappingNode, own: yaml.MappingNode, field: str = "") -> yaml.MappingNode:
-    """A new mapping: ``base`` with what ``own`` says over it. ``field`` is "" at the top of the file."""
+    """Return a new mapping: ``own`` merged over ``base``. ``field`` is "" at the top of the file."""
     said = {key.value: (key, value) for key, value in own.value}
     pairs = []
     for key, value in base.value:
@@ -201,7 +201,7 @@ def _laid_over(base: yaml.MappingNode, own: yaml.MappingNode, field: str = "") -
 
 
 def _joined(base: yaml.SequenceNode, own: yaml.SequenceNode) -> yaml.SequenceNode:
-    """Both lists in one; entries of the same name take the place of the earlier one."""
+    """Return both lists in one; entries of the same name replace the earlier one."""
     entries, places = list(base.value), {_entry_name(entry): i for i, entry in enumerate(base.value)}
     for entry in own.value:
         name = _entry_name(entry)
@@ -217,7 +217,7 @@ def _entry_name(entry: yaml.Node) -> str:
 
 
 def _locate(root: yaml.Node, where: tuple[int | str, ...], *, missing: bool) -> tuple[Any, str]:
-    """The mark of the innermost part of ``where`` that the text has, and the field's name.
+    """Return the mark of the innermost part of ``where`` that the text has, and the field's name.
 
     Parts that are no key of the text are the validator's own names of alternatives; the last one may be ``missing``.
     """

@@ -1,7 +1,7 @@
 """The script of a scenario as data: triggers, what they wait for, what they ask, what they do.
 
-Models only; ``systems.triggers`` says when one is due and ``systems.staging`` carries out what it does. Above:
-``scenario``. Below: ``places``.
+Models only; ``systems.triggers`` says when one is due and ``systems.staging`` carries it out. Above: ``scenario``.
+Below: ``places``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Trait = Literal["structure", "worker", "caster", "flyer"]
 
 
 class Who(Model):
-    """Units by owner and type; what is left out is any."""
+    """Units by owner and type; an omitted field matches any."""
 
     player: Owner | None = None
     unit: UnitName | None = None
@@ -50,7 +50,7 @@ class Died(Model):
 
 
 class Made(Model):
-    """Once for each such unit that is finished, by whomever."""
+    """Once for each such unit that is finished, by any player."""
 
     made: Who
 
@@ -84,7 +84,7 @@ class Touches(Model):
 
 
 def only_key(value: Any) -> str | None:
-    """Which of several models a value is meant to be: the name of its only key, or ``event`` for a word."""
+    """Return which of several models a value is: the name of its only key, or ``event`` for a word."""
     if isinstance(value, str):
         return "event"
     keys = list(value) if isinstance(value, dict) else list(type(value).model_fields)
@@ -121,13 +121,13 @@ _COMPARISON = re.compile(r"^(<=|>=|==|<|>)\s*(\d+)$")
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A number that is asked about: ``6`` or ``"< 6"`` in a file."""
+    """A condition on a number: ``6`` or ``"< 6"`` in a file."""
 
     operator: str
     number: int
 
     def holds(self, value: float) -> bool:
-        """Whether a value fits."""
+        """Return whether a value fits."""
         return OPERATORS[self.operator](value, self.number)
 
     def __str__(self) -> str:
@@ -147,11 +147,11 @@ Asked = Annotated[Comparison, BeforeValidator(_comparison), PlainSerializer(str)
 
 
 class Condition(Model):
-    """All that is given must hold.
+    """All given fields must hold.
 
     ``alive`` asks for any living unit of a player, structures included; ``count`` for numbers of finished units of a
-    type, passengers included; ``count_unfinished`` counts those in the making, too; ``score`` asks for the
-    curriculum score; of ``any`` one must hold.
+    type, passengers included; ``count_unfinished`` also counts unfinished ones; ``score`` asks for the curriculum
+    score; one of ``any`` must hold.
     """
 
     alive: dict[Owner, Literal["some", "none"]] = Field(default_factory=dict)
@@ -168,7 +168,7 @@ class CreateSpec(Model):
     """Units of one type for a player.
 
     ``count`` of them at a point or a random place, spread around it when there are several; one at each of several
-    places. What ``cargo`` says is inside each of them.
+    places. Each of them carries its ``cargo``.
     """
 
     player: Owner
@@ -194,7 +194,7 @@ class Spawn(Model):
 
 
 class RegroupSpec(Model):
-    """Which units are made anew, how many more, and where."""
+    """Which units are replaced, how many more come, and where."""
 
     player: Owner
     unit: UnitName
@@ -203,13 +203,13 @@ class RegroupSpec(Model):
 
 
 class Regroup(Model):
-    """Take a player's units of a type away and make as many anew, each with the life it had, and ``more``."""
+    """Replace a player's units of a type by as many new ones, each with its former life, and add ``more``."""
 
     regroup: RegroupSpec
 
 
 class Remove(Model):
-    """Take units out of the game without a death: such units, or the one that was touched."""
+    """Take units out of the game without a death: matching units, or the touched one."""
 
     remove: Who | Literal["touched"]
 
@@ -218,7 +218,7 @@ ORDERS: Final = ("attack_move", "move", "attack_units_of", "unload_at", "gather_
 
 
 class OrderSpec(Model):
-    """One order to a player's units; which of them is narrowed by ``unit``, ``group``, ``inside`` and ``unless``.
+    """One order to a player's units; ``unit``, ``group``, ``inside`` and ``unless`` narrow them down.
 
     ``gather_near`` is for the mineral field nearest to the place, ``unload_at`` for transports. ``queue`` says whether
     it replaces what they do, goes before that, or after it.
@@ -251,7 +251,7 @@ class OrderUnits(Model):
 
 
 class Select(Model):
-    """Select units of a player at his interface."""
+    """Select units of a player in the player's interface."""
 
     select: Who
 

@@ -1,8 +1,8 @@
 """The terrain files inside an .SC2Map archive: bytes to grids, and grids to a ``Terrain``.
 
 Pure functions without any file. The formats are those of the editor's own files (``MapInfo``, ``t3SyncHeightMap``,
-``t3SyncCliffLevel``, ``t3CellFlags``, ``CellAttribute_*``), as far as they are known; the rest of a file is not
-looked at. Which cells can be walked on is no part of any file: ``walkability`` has the rule. Above: ``archive``.
+``t3SyncCliffLevel``, ``t3CellFlags``, ``CellAttribute_*``), as far as they are known; the rest of a file is ignored. No
+file says which cells are walkable: ``walkability`` has the rule. Above: ``archive``.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _TWO_WORDS = re.compile(rb"(?=([A-Za-z]\w*\x00[A-Za-z]\w*\x00))")  # may overlap
 
 
 class TerrainError(ValueError):
-    """A file inside an archive is not what it should be; the text says which and why."""
+    """A file inside an archive is invalid; the text says which and why."""
 
 
 @dataclass(frozen=True, slots=True)
 class MapInfo:
-    """What ``MapInfo`` tells: cells in all, and the part that is played on."""
+    """The data of ``MapInfo``: the size in cells, and the playable part."""
 
     size: tuple[int, int]
     playable: Box
@@ -58,10 +58,10 @@ class TerrainGrids:
 
 
 def read_map_info(data: bytes) -> MapInfo:
-    """The size and the playable area.
+    """Return the size and the playable area.
 
-    The area follows the names of the fog and the tile set; between the size and these names stands what differs from
-    version to version, so that they are looked for.
+    The area follows the names of the fog and the tile set. The fields between the size and these names differ from
+    version to version, so this searches for the names.
     """
     if not data.startswith(MAP_INFO_MAGIC) or len(data) < SIZE_AT + 8:
         raise TerrainError("MapInfo is not a map's info")
@@ -77,7 +77,7 @@ def read_map_info(data: bytes) -> MapInfo:
 
 
 def read_heights(data: bytes, size: tuple[int, int]) -> NDArray[np.float32]:
-    """(h + 1, w + 1) z of the vertices, from ``t3SyncHeightMap``."""
+    """Return (h + 1, w + 1) z of the vertices, from ``t3SyncHeightMap``."""
     width, height = size
     pairs = _numbers(data, HEIGHTS_MAGIC, HEIGHTS_AT, "<u2", (height + 1, width + 1, 2), "t3SyncHeightMap")
     z = pairs[:, :, 0] / Z_STEP
@@ -86,19 +86,19 @@ def read_heights(data: bytes, size: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def read_cliffs(data: bytes, size: tuple[int, int]) -> NDArray[np.uint16]:
-    """(h, w) cliff levels, from ``t3SyncCliffLevel``."""
+    """Return (h, w) cliff levels, from ``t3SyncCliffLevel``."""
     cells = _numbers(data, CLIFFS_MAGIC, CLIFFS_AT, "<u2", size[::-1], "t3SyncCliffLevel")
     return cells.astype(np.uint16)
 
 
 def read_flags(data: bytes, size: tuple[int, int]) -> Grid:
-    """(h, w) whether each cell belongs to a cliff's tile, from ``t3CellFlags``."""
+    """Return (h, w) whether each cell belongs to a cliff's tile, from ``t3CellFlags``."""
     cells: Grid = _numbers(data, FLAGS_MAGIC, FLAGS_AT, "u1", size[::-1], "t3CellFlags") & CLIFF_TILE != 0
     return cells
 
 
 def read_paint(data: bytes, size: tuple[int, int]) -> Grid:
-    """(h, w) whether any quarter of each cell is painted, from a ``CellAttribute_`` file."""
+    """Return (h, w) whether any quarter of each cell is painted, from a ``CellAttribute_`` file."""
     cells: Grid = _numbers(data, b"", ATTRIBUTE_AT, "u1", size[::-1], "CellAttribute") != 0
     return cells
 
@@ -114,7 +114,7 @@ def _numbers(data: bytes, magic: bytes, at: int, dtype: str, shape: tuple[int, .
 
 
 def terrain_of(info: MapInfo, ground: TerrainGrids) -> Terrain:
-    """The terrain that the files describe."""
+    """Return the terrain that the files describe."""
     width, height = info.size
     x0, y0, x1, y1 = info.playable
     inside = np.zeros((height, width), dtype=np.bool_)

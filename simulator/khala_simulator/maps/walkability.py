@@ -1,8 +1,8 @@
 """Walkability: which cells of a map a ground unit can be on, and where a structure can stand, from its cliff levels.
 
 The game computes this from its cliff models; the rule here was found by comparing the levels of five ladder maps with
-the pathing grids that the real game told: 97.6 to 99.7 % of the playable cells agree and none is closed wrongly (the
-rest is under structures, doodads and destructibles). Straight ramps did not occur there: theirs is extrapolation.
+the pathing grids of the real game: 97.6 to 99.7 % of the playable cells agree and none is closed wrongly (the rest is
+under structures, doodads and destructibles). Straight ramps did not occur there: theirs is extrapolation.
 
 All grids are (h, w), row 0 at the bottom. A level is 64 a step; in between are ramps, below 64 is nothing.
 """
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 Number = TypeVar("Number", np.bool_, np.int64)
 
 LEVEL: Final = 64
-EDGE: Final = 24  # difference of levels from which a neighbour is another level
+EDGE: Final = 24  # difference in height from which a neighbour is another level
 RAMP_EDGE: Final = 40  # the same, beside a ramp
-FARTHEST: Final = 2  # cells that are looked away
+FARTHEST: Final = 2  # how many cells away the rule looks
 RAMP_TIP: Final = 8  # above a whole level, the outermost cell of a diagonal ramp
 
 
 def solid(cliff: NDArray[np.uint16]) -> Grid:
-    """Cells that are ground at all."""
+    """Return the cells that are ground at all."""
     ground: Grid = cliff >= LEVEL
     return ground
 
 
 def walkable(cliff: NDArray[np.uint16], on_cliff_tile: Grid) -> Grid:
-    """Cells that are solid and not the foot, the corner or the edge of a cliff."""
+    """Return the cells that are solid and not the foot, the corner or the edge of a cliff."""
     level = cliff.astype(np.int64)
     ramp = level % LEVEL != 0
     east, west, north, south = _neighbours(level)
@@ -53,7 +53,7 @@ def walkable(cliff: NDArray[np.uint16], on_cliff_tile: Grid) -> Grid:
 
 
 def buildable(cliff: NDArray[np.uint16], walk: Grid) -> Grid:
-    """Cells that are walkable and no ramp, nor at the top of one, corners included, nor at its foot."""
+    """Return the walkable cells that are no ramp, nor at the top of one, corners included, nor at its foot."""
     level = cliff.astype(np.int64)
     ramp = level % LEVEL != 0
     beside = np.zeros_like(ramp)
@@ -67,7 +67,7 @@ def buildable(cliff: NDArray[np.uint16], walk: Grid) -> Grid:
 
 
 def _drop(level: NDArray[np.int64], ramp: Grid, other: NDArray[np.int64]) -> Grid:
-    """Where the neighbour lies a level lower; the top of a straight ramp is no drop."""
+    """Return where the neighbour is a level lower; the top of a straight ramp is no drop."""
     down = level - other
     onto_ramp = ~ramp & (other % LEVEL != 0) & (down == EDGE)
     lower: Grid = (down >= EDGE) & ~onto_ramp
@@ -75,12 +75,12 @@ def _drop(level: NDArray[np.int64], ramp: Grid, other: NDArray[np.int64]) -> Gri
 
 
 def _neighbours(level: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
-    """The levels to the east, west, north and south; beyond the map it goes on as at its edge."""
+    """Return the levels to the east, west, north and south; beyond the map they continue as at its edge."""
     return tuple(_shifted(level, dy, dx) for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)))
 
 
 def _shifted(grid: NDArray[Number], dy: int, dx: int) -> NDArray[Number]:
-    """For each cell the value of the one ``dy`` above and ``dx`` to the right."""
+    """Return for each cell the value of the one ``dy`` above and ``dx`` to the right."""
     height, width = grid.shape
     padded = np.pad(grid, FARTHEST, mode="edge")
     return padded[FARTHEST + dy : FARTHEST + dy + height, FARTHEST + dx : FARTHEST + dx + width]

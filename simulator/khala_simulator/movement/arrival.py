@@ -1,4 +1,4 @@
-"""Crowds: when a walker that others keep from its goal has come near enough.
+"""Crowds: when a walker whose way is blocked by others is near enough to its goal.
 
 The game's own rule is not known; this one is an estimate. Used by ``systems.orders``.
 """
@@ -19,10 +19,10 @@ BLOCKED_LOOPS = 2
 
 
 def packed(world: World, slots: Ints) -> Bools:
-    """(k,) whether each walker has come as near to its goal as the crowd there lets it.
+    """Return (k,) whether each walker has come as near to its goal as the crowd allows.
 
-    So when it stands before others close to the goal, when friends fill the ground between it and the goal, or when it
-    is within what all of them would fill and has come no nearer for long.
+    That is when it stands before others close to the goal, when friends fill the ground between it and the goal, or
+    when it is within the area that all of them would fill and has come no nearer for long.
     """
     offset = world.nav_goal.take(slots, 0) - world.pos.take(slots, 0)
     squared = offset[:, 0] ** 2 + offset[:, 1] ** 2
@@ -31,8 +31,8 @@ def packed(world: World, slots: Ints) -> Bools:
     arrived: Bools = (blocked >= MECHANICS.crowd_patience) & (squared < near**2)
     bodies = world.live
     area = world.separation.take(bodies) ** 2
-    could = ~arrived & (squared * MECHANICS.crowd_share <= area.sum())  # nobody is packed farther out than this
-    known = world.nav_loop.take(slots) > 0  # the way has been looked over since the order was given
+    could = ~arrived & (squared * MECHANICS.crowd_share <= area.sum())  # no walker is packed farther out than this
+    known = world.nav_loop.take(slots) > 0  # the way has been checked since the order
     arrived |= could & known & (world.loop - world.nav_best_loop.take(slots) > MECHANICS.crowd_stall)
     worth = np.flatnonzero(could & ~arrived & (blocked >= BLOCKED_LOOPS))
     if worth.size:

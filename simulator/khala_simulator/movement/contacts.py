@@ -1,8 +1,8 @@
 """Contacts: which bodies touch or nearly do.
 
-A look-up for ``systems.collision`` and ``avoidance``, which say what follows from it. Among a few bodies every pair is
-measured, with distances looked up in a table; among many they are put in order along the wider axis of the crowd and
-only neighbours are measured, so that the cost grows with the crowd and not with its square.
+A look-up for ``systems.collision`` and ``avoidance``, which act on it. Among a few bodies every pair is measured, with
+distances looked up in a table; many are sorted along the wider axis of the crowd and only neighbours are measured, so
+that the cost grows with the crowd and not with its square.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Pairs:
 
 @dataclass(slots=True)
 class Bodies:
-    """What the pairs of living bodies have in common until somebody is born, dies or changes."""
+    """The constants of the pairs of living bodies until a unit is born, dies or changes."""
 
-    rows: Ints  # (k,) those that can meet anybody
+    rows: Ints  # (k,) those that can meet other bodies
     separation: Floats  # (n,) of every living unit
     bits: Ints  # (n,) layers it collides in, 0 for what stands on a footprint: that is a wall, not a body
     flying: Bools  # (n,)
@@ -47,7 +47,7 @@ class Bodies:
 
     @classmethod
     def of(cls, world: World) -> Bodies:
-        """The bodies of a world's living units."""
+        """Return the bodies of a world's living units."""
         slots = world.live
         bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
         rows = which(bits != 0)
@@ -58,7 +58,7 @@ class Bodies:
         return cls(rows, separation, bits, flying, bool(flying.any()), widest, table)
 
     def near(self, at: Floats) -> Pairs | None:
-        """The pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch."""
+        """Return the pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch."""
         if self.table is None:
             return self._neighbours(at)
         touching, near, apart = self.table
@@ -75,7 +75,7 @@ class Bodies:
         return Pairs(one, other, apart.take(flat))
 
     def _neighbours(self, at: Floats) -> Pairs | None:
-        """As ``near``, without a table."""
+        """Do the same as ``near``, without a table."""
         if not len(self.rows):
             return None
         one, other, squared = within(at.take(self.rows, 0), 2.0 * self.widest + SKIN)
@@ -91,7 +91,7 @@ class Bodies:
 
 
 def bodies_of(world: World) -> Bodies:
-    """The bodies of a world's living units, put together now if something has changed."""
+    """Return the bodies of a world's living units, rebuilt now if something has changed."""
     known = world.bodies
     if not isinstance(known, Bodies):
         known = world.bodies = Bodies.of(world)
@@ -99,9 +99,9 @@ def bodies_of(world: World) -> Bodies:
 
 
 def within(at: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Every pair of points (n, 2) that are less than ``reach`` apart on both axes, once, and their distance squared.
+    """Return every pair of points (n, 2) less than ``reach`` apart on both axes, once, and their distance squared.
 
-    The points are put in order along the axis on which they spread wider, each is paired with those that follow.
+    The points are sorted along the axis on which they spread wider, and each is paired with those that follow.
     """
     axes = np.ascontiguousarray(at.T)
     along, across = axes if np.ptp(axes[0]) >= np.ptp(axes[1]) else axes[::-1]
@@ -120,7 +120,7 @@ def within(at: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
 
 
 def _table(separation: Floats, bits: Ints) -> tuple[Floats, Floats, Floats]:
-    """Of every pair: touching and worth looking at, squared, -1 if they never meet; and the distance to be kept."""
+    """Return for every pair: touching and near distance, squared, -1 if they never meet; and the distance to keep."""
     apart = separation[:, None] + separation
     meets = (bits[:, None] & bits) != 0
     np.fill_diagonal(meets, val=False)

@@ -1,8 +1,8 @@
-"""Which way round: free cells, connected parts and shortest ways over a terrain with its structures.
+"""Pathfinding: free cells, connected parts and shortest ways over a terrain with its structures.
 
 A ``Surface`` is one grid of free cells that never changes, so it remembers the ways it has found, across games too.
 ``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go. Positions are world
-units, cells are flat indices ``y * width + x``; a unit is a point here, its body is ``systems.collision``'s.
+units, cells are flat indices ``y * width + x``; a unit is a point here; ``systems.collision`` has its body.
 """
 
 from __future__ import annotations
@@ -63,13 +63,13 @@ class Surface:
         self._edges = _edges(self.width)
 
     def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
-        """(cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
+        """Return (cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
         padded = np.pad(self.free, 1)
         shifted = padded[1 + dy : 1 + dy + self.height, 1 + dx : 1 + dx + self.width]
         return ~shifted.ravel()
 
     def _free_steps(self, blocked: dict[tuple[int, int], Bools]) -> NDArray[np.uint8]:
-        """(cells,) the bits of ``_steps``."""
+        """Return (cells,) the bits of ``_steps``."""
         steps = np.zeros(self.flat.size, dtype=np.uint8)
         for bit, (dx, dy) in enumerate(NEIGHBOURS):
             free = self.flat & ~blocked[dx, dy]
@@ -81,7 +81,7 @@ class Surface:
     # cells --------------------------------------------------------------------------------------------------------
 
     def cell(self, points: Floats) -> Ints:
-        """Cells under points (..., 2); points outside count as the nearest cell inside."""
+        """Return the cells under points (..., 2); points outside count as the nearest cell inside."""
         at = points.astype(np.int64)
         np.maximum(at, 0, out=at)
         np.minimum(at, self._last, out=at)
@@ -89,11 +89,11 @@ class Surface:
         return result
 
     def centre(self, cells: Ints) -> Floats:
-        """Centres (..., 2) of cells."""
+        """Return the centres (..., 2) of cells."""
         return np.stack([cells % self.width + 0.5, cells // self.width + 0.5], axis=-1)
 
     def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
-        """The cell of a connected part nearest to ``point``; of nearly equal ones that on the side of ``start``."""
+        """Return the cell of a connected part nearest to ``point``; the side of ``start`` decides near ties."""
         members, centres = self._members[part], self._centres[part]
         distance = geometry.length(centres - point)
         if start is not None:
@@ -101,7 +101,7 @@ class Surface:
         return int(members[np.argmin(distance)])
 
     def nearest_free(self, point: Floats) -> int | None:
-        """The free cell nearest to ``point`` over all parts, or None when nothing is free."""
+        """Return the free cell nearest to ``point`` over all parts, or None when nothing is free."""
         candidates = [self.nearest(point, part) for part in range(len(self._members))]
         if not candidates:
             return None
@@ -110,7 +110,7 @@ class Surface:
     # lines --------------------------------------------------------------------------------------------------------
 
     def clear(self, start: Floats, end: Floats) -> Bools:
-        """(k,) whether a body of ordinary width gets straight from ``start`` (k, 2) to ``end`` (k, 2)."""
+        """Return (k,) whether a body of ordinary width gets straight from ``start`` (k, 2) to ``end`` (k, 2)."""
         result = self._box_is_free(start, end)
         if np.count_nonzero(result) < len(result):
             unsure = which(~result)
@@ -143,7 +143,7 @@ class Surface:
     # ways ---------------------------------------------------------------------------------------------------------
 
     def corners(self, start: Floats, goal_cell: Ints) -> Floats:
-        """(k, 2) the farthest cell centre on the way to each goal cell that can be walked to straight.
+        """Return (k, 2) the farthest cell centre on the way to each goal cell that can be walked to straight.
 
         Each start must lie in the connected part of its goal.
         """
@@ -157,9 +157,9 @@ class Surface:
         return result
 
     def _farthest(self, start: Floats, ahead: Floats) -> Ints:
-        """(k,) the last of the places ``ahead`` (k, m, 2) that each can walk to straight; the first one always is.
+        """Return (k,) the last of the places ``ahead`` (k, m, 2) that each can walk to straight, at least the first.
 
-        Found by halving: who can't get straight to one place is taken not to get to a later one.
+        Found by halving: a walker that can't reach one place straight is assumed not to reach a later one.
         """
         k, m = ahead.shape[:2]
         near = np.zeros(k, dtype=np.int64)
@@ -175,7 +175,7 @@ class Surface:
         return near
 
     def distance(self, start: Floats, goal: Floats) -> float:
-        """Length of the way between two points, 0 when there is none (the API's convention)."""
+        """Return the length of the way between two points, 0 when there is none (the API's convention)."""
         a, b = int(self.cell(start)), int(self.cell(goal))
         if not (self.flat[a] and self.flat[b]) or self.part[a] != self.part[b]:
             return 0.0
@@ -184,12 +184,12 @@ class Surface:
         return self._field(b, [a]).distance[a]
 
     def next_cells(self, cells: Ints, goal: int) -> Ints:
-        """(k,) the next cell on the way from each of ``cells`` to a goal cell of the same connected part."""
+        """Return (k,) the next cell on the way from each of ``cells`` to a goal cell of the same connected part."""
         result: Ints = self._field(goal, cells.tolist()).towards_array().take(cells)
         return result
 
     def _follow(self, cells: Ints, goal: int) -> Ints:
-        """(k, len(LOOK_AHEAD)) the cells that lie so many steps on the way from each of ``cells``."""
+        """Return (k, len(LOOK_AHEAD)) the cells so many steps along the way from each of ``cells``."""
         towards = self._field(goal, cells.tolist()).towards_array()
         steps, at = [], 0
         for wanted in LOOK_AHEAD:
@@ -200,7 +200,7 @@ class Surface:
         return np.stack(steps, axis=1)
 
     def _field(self, goal: int, cells: list[int]) -> _Field:
-        """The ways to ``goal``, as far as they are needed from ``cells``."""
+        """Return the ways to ``goal``, as far as they are needed from ``cells``."""
         found = self._fields.get(goal)
         if found is None:
             if len(self._fields) >= FIELDS_KEPT:
@@ -230,10 +230,10 @@ class Surface:
 
 
 def connected_parts(free: Grid) -> Ints:
-    """(h, w) number of the part that each free cell belongs to by straight steps, -1 where it is not free.
+    """Return (h, w) number of the part that each free cell belongs to by straight steps, -1 where it is not free.
 
     Runs of free cells in each row are joined to those they touch in the row above; parts are numbered in the order of
-    their first cell. A few hundred runs are what a map has, where it has thousands of cells.
+    their first cell. A map has a few hundred runs, but thousands of cells.
     """
     height, width = free.shape
     padded = np.zeros((height, width + 2), dtype=np.int8)
@@ -267,10 +267,10 @@ def connected_parts(free: Grid) -> Ints:
 
 
 class _Field:
-    """The shortest ways to one goal, found outwards from it only as far as somebody has asked (Dijkstra).
+    """The shortest ways to one goal, searched outwards only as far as requested (Dijkstra).
 
-    ``towards`` holds for every settled cell the next one on its way, ``distance`` how far it is; what is not settled
-    yet, or has no way, leads to itself.
+    For every settled cell, ``towards`` holds the next one on its way and ``distance`` its distance; a cell that is not
+    settled yet, or has no way, leads to itself.
     """
 
     def __init__(self, goal: int, cells: int) -> None:
@@ -282,7 +282,7 @@ class _Field:
         self._array: Ints | None = None
 
     def towards_array(self) -> Ints:
-        """(cells,) ``towards`` as an array; cells that are not settled have no meaning in it."""
+        """Return (cells,) ``towards`` as an array; cells that are not settled have no meaning in it."""
         if self._array is None:
             self._array = np.array(self.towards)
         return self._array
@@ -311,14 +311,14 @@ class _Field:
 
 @lru_cache(maxsize=64)
 def _edges(width: int) -> list[list[tuple[int, float]]]:
-    """For every set of free steps (8 bits): the offset of each in a flat grid of that width, and its length."""
+    """Return for every set of free steps (8 bits) the offset of each in a flat grid of that width, and its length."""
     moves = [(dy * width + dx, math.sqrt(dx * dx + dy * dy)) for dx, dy in NEIGHBOURS]
     return [[move for bit, move in enumerate(moves) if mask >> bit & 1] for mask in range(256)]
 
 
 @lru_cache(maxsize=64)
 def _bare_surface(terrain: Terrain, layer: Layer) -> Surface:
-    """The surface of a terrain without structures, shared by all games on it."""
+    """Return the surface of a terrain without structures, shared by all games on it."""
     return Surface(_layer_grid(terrain, layer))
 
 
@@ -332,7 +332,7 @@ def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
 
 
 def surface(ground: Ground, layer: Layer) -> Surface:
-    """What units of a layer move on now."""
+    """Return the surface that units of a layer move on now."""
     found = ground.surfaces.get(layer)
     if not isinstance(found, Surface):
         bare = layer is Layer.AIR or not ground.blocked

@@ -1,4 +1,4 @@
-"""Placement: where a new unit fits, as near as possible to where it is wanted.
+"""Placement: where a new unit fits, as near as possible to the wanted point.
 
 The game's own formation around a shared point is not known; here it is the nearest free place on a fine grid of
 candidates, the same every time.
@@ -28,10 +28,10 @@ BODY_GAP = 0.02
 
 
 def free_places(world: World, unit: UnitType, point: tuple[float, float], count: int) -> list[tuple[float, float]]:
-    """The places nearest to ``point`` where ``count`` new units touch no body and no wall, nor each other.
+    """Return the places nearest to ``point`` where ``count`` new units touch no body, no wall and not each other.
 
-    Units that find no place within the search radius stand on ``point``. Structures are put on the cell grid, where
-    their footprint fits it, and all on the same place.
+    Units that find no place within the search radius stand on ``point``. Structures go on the cell grid, where their
+    footprint fits it, all at the same place.
     """
     footprint = world.catalog.footprints.get(unit.footprint)
     if footprint is not None and footprint.cells:
@@ -61,9 +61,9 @@ def _places_within(
 def candidates(
     world: World, unit: UnitType, point: tuple[float, float], radius: float, *, ignoring: int = NOBODY
 ) -> Floats:
-    """(k, 2) places within ``radius`` of a point where one more unit touches no body and no wall, nearest first.
+    """Return (k, 2) places within ``radius`` of a point where one more unit touches no body and no wall, nearest first.
 
-    The body of the unit in the slot ``ignoring`` is in nobody's way.
+    The body of the unit in the slot ``ignoring`` does not count.
     """
     at = np.array(point) + _offsets(radius)
     at = at[_on_surface(world, unit, at)]
@@ -77,7 +77,7 @@ def candidates(
 
 
 def snapped(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
-    """The centre nearest to ``point`` at which a footprint of ``size`` cells lies on the grid."""
+    """Return the centre nearest to ``point`` at which a footprint of ``size`` cells lies on the grid."""
     x, y = (round(v - s / 2.0) + s / 2.0 for v, s in zip(point, size, strict=True))
     return x, y
 
@@ -94,7 +94,7 @@ def _on_surface(world: World, unit: UnitType, at: Floats) -> Bools:
 
 @lru_cache(maxsize=16)
 def _offsets(radius: float) -> Floats:
-    """Candidate offsets, nearest first; equally near ones from the east counter-clockwise."""
+    """Return candidate offsets, nearest first; equally near ones from the east counter-clockwise."""
     side = np.arange(-radius, radius + CANDIDATE_STEP / 2.0, CANDIDATE_STEP)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     squared = x * x + y * y

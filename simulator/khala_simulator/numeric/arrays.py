@@ -1,4 +1,4 @@
-"""Array shorthands for short arrays, where a call costs more than its work.
+"""Shorthands for short arrays, where a call costs more than its work.
 
 A loop of a ten-unit battle is some hundred array calls; ``flatnonzero`` and ``any`` go through several Python layers
 and cost three to ten times what these do.
@@ -13,10 +13,10 @@ Bools = NDArray[np.bool_]
 
 
 def which(mask: Bools) -> NDArray[np.int64]:
-    """Indices at which a one-dimensional mask is true, ascending."""
+    """Return the indices at which a one-dimensional mask is true, ascending."""
     return mask.nonzero()[0]
 
 
 def some(mask: Bools) -> bool:
-    """Whether the mask is true anywhere."""
+    """Return whether the mask is true anywhere."""
     return b"\x01" in mask.tobytes()

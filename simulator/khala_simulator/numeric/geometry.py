@@ -15,19 +15,19 @@ Floats = NDArray[np.float64]
 
 
 def length(vector: Floats) -> Floats:
-    """Euclidean length of each row of ``vector`` (..., 2)."""
+    """Return the Euclidean length of each row of ``vector`` (..., 2)."""
     squared = vector * vector
     result: Floats = np.sqrt(squared[..., 0] + squared[..., 1])
     return result
 
 
 def heading(angle: float) -> tuple[float, float]:
-    """The unit vector of an API facing (radians, 0 is east, counter-clockwise)."""
+    """Return the unit vector of an API facing (radians, 0 is east, counter-clockwise)."""
     return math.cos(angle), math.sin(angle)
 
 
 def facing(vector: Floats) -> Floats:
-    """API facing of unit vectors (..., 2), in [0, 2 pi)."""
+    """Return the API facing of unit vectors (..., 2), in [0, 2 pi)."""
     result: Floats = np.arctan2(vector[..., 1], vector[..., 0]) % (2.0 * math.pi)
     return result
 
@@ -58,7 +58,7 @@ def turn_towards(current: Floats, wanted: Floats, cos_step: Floats, sin_step: Fl
 
 
 def disc_cells(radius: float) -> NDArray[np.int64]:
-    """Offsets ``(dx, dy)`` (k, 2) of the cells whose centre is within ``radius`` of a cell's centre."""
+    """Return the offsets ``(dx, dy)`` (k, 2) of the cells whose centre is within ``radius`` of a cell's centre."""
     reach = int(radius) + 1
     side = np.arange(-reach, reach + 1)
     dx, dy = np.meshgrid(side, side)

@@ -1,4 +1,4 @@
-"""Computer players: what leads a side that nobody sits at.
+"""Computer players: they lead the sides that no client plays.
 
 How the game's own ones play is not known; these are estimates.
 """

@@ -1,7 +1,7 @@
 """How hard a computer player plays, by the API's difficulty. All of it is an estimate.
 
 A level says how many workers, production structures and gas structures it wants, how many units it waits for before it
-attacks, and how often it looks at what it has. It gets nothing that a player would not get.
+attacks, and how often it looks at what it has. A computer player has no advantages.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """What a computer player wants.
+    """The aims of a computer player.
 
     ``period_loops`` is how often it thinks, ``peace_loops`` how long it stays at home.
     """
@@ -38,5 +38,5 @@ HARDEST: Final = LEVELS[7]
 
 
 def level_of(difficulty: int) -> Level:
-    """The level for a difficulty; who plays without one is of medium strength, the cheating ones do not cheat."""
+    """Return the level for a difficulty, by default a medium one; the cheating ones do not cheat."""
     return LEVELS.get(difficulty or 3, HARDEST)

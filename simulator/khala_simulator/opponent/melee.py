@@ -1,8 +1,8 @@
 """A computer player of melee games: it mines, keeps supply ahead, builds a few production structures, and attacks.
 
-It acts only through the orders that every player has, looks at its own units as they are, and keeps nothing in mind but
-whether it is attacking. It knows where enemy structures stand. All of this is an estimate: how the game's own
-computer players play is not known. Above: ``systems.opponents``. Below: ``casting``, ``commands``, ``building_sites``.
+It acts only through the orders that every player has, reads its own units directly, and remembers only whether it is
+attacking. It knows where enemy structures stand. All of this is an estimate: how the game's own computer players play
+is not known. Above: ``systems.opponents``. Below: ``casting``, ``commands``, ``building_sites``.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ RETREAT_SHARE: Final = 0.25  # of a wave: with so few left it waits for the next
 
 
 class OpponentSide:
-    """One look at what a player has."""
+    """A view of a player's units."""
 
     def __init__(self, world: World, player: int) -> None:
         self.world, self.player = world, player
@@ -50,11 +50,11 @@ class OpponentSide:
         self.workers = [s for s in self.slots if self.names[s] == self.plan.worker]
 
     def named(self, *names: str) -> list[int]:
-        """Own units of some types."""
+        """Return own units of some types."""
         return [slot for slot in self.slots if self.names[slot] in names]
 
     def army(self) -> list[int]:
-        """Own units that fight, workers left out."""
+        """Return own units that fight, except workers."""
         world = self.world
         return [
             s for s in self.slots
@@ -62,21 +62,21 @@ class OpponentSide:
         ]  # fmt: skip
 
     def planned(self, name: str) -> int:
-        """How many of a type there are, are in the making, or are ordered to be built."""
+        """Return how many of a type exist, are in production, or are ordered."""
         ordered = [order.ability for w in self.workers for order in self.world.orders_of(w)]
         build = self.ability_for(name)
         on_the_way = 0 if build is None else ordered.count(build.id)
         return len(self.named(name)) + self.owner.underway.count(name) + on_the_way
 
     def ability_for(self, name: str) -> Ability | None:
-        """What makes units of a type, if the tables say."""
+        """Return the ability that makes units of a type, if the tables have one."""
         ways = self.world.catalog.unit(name).made_by
         found = [self.world.catalog.ability_of_id.get(way.ability) for way in ways if way.kind in ("train", "build")]
         return next((ability for ability in found if ability is not None), None)
 
 
 def think(world: World, player: int) -> None:
-    """Do what a computer player does when it looks at what it has."""
+    """Play one turn of a computer player."""
     side = OpponentSide(world, player)
     if not side.slots:
         return
@@ -110,7 +110,7 @@ def _mine(side: OpponentSide) -> None:
 
 
 def _free_worker(side: OpponentSide, point: list[float]) -> int:
-    """The nearest worker on its way to minerals, or NOBODY."""
+    """Return the nearest worker on its way to minerals, or NOBODY."""
     world = side.world
     fields = harvesting.kinds(world.catalog)[1]
     free = [
@@ -122,7 +122,7 @@ def _free_worker(side: OpponentSide, point: list[float]) -> int:
 
 
 def _keep_supply_ahead(side: OpponentSide) -> bool:
-    """Make more supply when it runs out; True while that has to come first."""
+    """Make more supply when it runs out; return True while that has to come first."""
     world, plan = side.world, side.plan
     cap = supply.cap(world, side.player)
     room = cap - supply.used(world, side.player)
@@ -144,7 +144,7 @@ def _train_workers(side: OpponentSide) -> None:
 
 
 def _train(side: OpponentSide, makers: list[int], name: str) -> bool:
-    """Have the first of some units that can train a unit."""
+    """Make the first of some units that can train a unit do so."""
     ability = side.ability_for(name)
     if ability is None:
         return False
@@ -189,7 +189,7 @@ def _raise(side: OpponentSide, name: str) -> bool:
 
 
 def _geyser(side: OpponentSide) -> int:
-    """A free geyser of the base, or NOBODY."""
+    """Return a free geyser of the base, or NOBODY."""
     world, hall = side.world, side.halls[0]
     free = [s for s in world.live.tolist() if building_sites.is_free_geyser(world, s)]
     away = {s: float(np.hypot(*(world.pos[s] - world.pos[hall]))) for s in free}
@@ -198,7 +198,7 @@ def _geyser(side: OpponentSide) -> int:
 
 
 def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | None:
-    """The nearest place for a structure around a town hall that leaves a way around it and the minerals free."""
+    """Return the nearest place for a structure around a town hall that keeps the minerals and a way around it free."""
     centre = world.pos[hall]
     footprint = building_sites.footprint_of(world, unit)
     if footprint is None:
@@ -216,7 +216,7 @@ def site_near(world: World, player: int, unit: UnitType, hall: int) -> Point | N
 
 
 def _has_margin(world: World, point: Point, size: tuple[int, int]) -> bool:
-    """Whether the cells around a place are free, so that units get past."""
+    """Return whether the cells around a place are free, so that units get past."""
     taken = building_sites.taken(world)
     (x, y), (width, height) = point, size
     low_x, low_y = int(x - width / 2) - 1, int(y - height / 2) - 1
@@ -245,7 +245,7 @@ def _train_army(side: OpponentSide) -> None:
 
 
 def _fight(side: OpponentSide) -> None:
-    """Attack with a wave when it is large enough; come home when hardly anybody is left."""
+    """Attack with a wave when it is large enough; retreat when hardly any unit is left."""
     world, owner = side.world, side.owner
     army = side.army()
     if len(army) >= side.level.wave and world.loop >= side.level.peace_loops:
@@ -261,7 +261,7 @@ def _fight(side: OpponentSide) -> None:
 
 
 def _goal(side: OpponentSide) -> Point | None:
-    """The enemy structure nearest to home, or where an enemy started."""
+    """Return the enemy structure nearest to home, or where an enemy started."""
     world = side.world
     live = world.live
     foes = live[(world.owner[live] != side.player) & (world.owner[live] > 0)]

@@ -8,9 +8,9 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class ArmyPlan:
-    """Names of unit types: what gives supply, gathers gas, makes units, comes before better units, and fights.
+    """Names of unit types: those that give supply, gather gas, make units, come before better units, and fight.
 
-    ``army`` is in the order of preference; what is not allowed or affordable yet is passed over.
+    ``army`` is in the order of preference; types not allowed or affordable yet are skipped.
     """
 
     worker: str

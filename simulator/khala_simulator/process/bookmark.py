@@ -1,6 +1,6 @@
-"""Quick save and quick load: a game kept in memory as it is now, to be gone on with from there.
+"""Quick save and quick load: a game kept in memory, to continue from there.
 
-What never changes (tables, the map, what images look like) is shared between the copies.
+The copies share what never changes (tables, the map, the looks of images).
 
 Above: `play.py`. Below: `process.py`.
 """
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 def keep(playing: Playing) -> None:
-    """Marks the present of a game, in place of what was marked before."""
+    """Mark the present state of a game, in place of an earlier mark."""
     playing.bookmark = None
     playing.bookmark = _copy(playing)
 
 
 def reopen(playing: Playing) -> Playing | None:
-    """The game as it was when it was marked, any number of times; None if it never was."""
+    """Return the game in its marked state, any number of times; None without a mark."""
     if playing.bookmark is None:
         return None
     game = _copy(playing.bookmark)

@@ -1,6 +1,6 @@
 """A client without a socket: asks a session directly, for tests and measurements.
 
-It speaks the same bytes as a client on the wire. What a real client does is not imitated here; that is PySC2's.
+It speaks the same bytes as a client on the wire. It does not imitate a real client's behaviour; PySC2 does that.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class ResponseError(Exception):
 
 
 def interface(*, screen: int = 128, minimap: int = 64, raw: bool = True) -> sc.InterfaceOptions:
-    """The interface that PySC2 asks for by default, with square layers; 0 leaves the layers out."""
+    """Return the interface that PySC2 asks for by default, with square layers; 0 leaves the layers out."""
     options = sc.InterfaceOptions(raw=raw, score=True, raw_affects_selection=True)
     if screen:
         layers = options.feature_layer
@@ -40,7 +40,7 @@ class Client:
         self.session = session or Session(data_dir=".")
 
     def ask(self, **request: Any) -> sc.Response:
-        """The response to one request, given as `kind=message`.
+        """Return the response to one request, given as `kind=message`.
 
         Raises:
             ResponseError: it was a usage error.
@@ -51,7 +51,7 @@ class Client:
         return response
 
     def create(self, map_name: str, *, seed: int | None = 1, disable_fog: bool = False) -> sc.ResponseCreateGame:
-        """Creates a game of one participant against the computer on a shipped map."""
+        """Create a game of one participant against the computer on a shipped map."""
         request = sc.RequestCreateGame(
             local_map=sc.LocalMap(map_path=map_name),
             player_setup=[
@@ -67,26 +67,26 @@ class Client:
     def play(
         self, map_name: str = "2s3z", options: sc.InterfaceOptions | None = None, *, seed: int | None = 1
     ) -> sc.ResponseObservation:
-        """Creates and joins a game, and gives the first observation."""
+        """Create and join a game, and return the first observation."""
         self.create(map_name, seed=seed)
         self.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=options or interface()))
         return self.observe()
 
     def observe(self) -> sc.ResponseObservation:
-        """An observation."""
+        """Return an observation."""
         return self.ask(observation=sc.RequestObservation()).observation
 
     def step(self, count: int = 1) -> sc.ResponseObservation:
-        """Steps, and observes."""
+        """Step, and observe."""
         self.ask(step=sc.RequestStep(count=count))
         return self.observe()
 
     def act(self, *actions: sc.Action) -> list[error_pb2.ActionResult.ValueType]:
-        """Sends actions, and gives their result codes."""
+        """Send actions, and return their result codes."""
         return list(self.ask(action=sc.RequestAction(actions=actions)).action.result)
 
     def debug(self, *commands: debug_pb2.DebugCommand) -> None:
-        """Sends debug commands."""
+        """Send debug commands."""
         self.ask(debug=sc.RequestDebug(debug=commands))
 
 
@@ -98,7 +98,7 @@ def command(
     point: tuple[float, float] | None = None,
     queue: bool = False,
 ) -> sc.Action:
-    """A raw command to units, at a unit, a point or nothing."""
+    """Return a raw command to units, at a unit, a point or nothing."""
     action = sc.Action()
     raw = action.action_raw.unit_command
     raw.ability_id, raw.queue_command = ability, queue

@@ -1,8 +1,8 @@
-"""Real time: how far a game that nobody steps has run by the clock on the wall.
+"""Real time: how far a game without steps has run by the wall clock.
 
-A game of one process is advanced when its client asks for something, by as many loops as have passed since; so nothing
-runs in the background, and a log of such a game replays like any other. Where several processes play one game, none may
-wait for its client to ask, and `lan.py` advances it.
+A game of one process advances when its client sends a request, by as many loops as have passed since; so nothing runs
+in the background, and a log of such a game replays like any other. A game over several processes can't wait for
+requests, so `lan.py` advances it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class RealtimeClock:
         self.go_on()
 
     def go_on(self) -> None:
-        """Lets the time go on from where the game is now."""
+        """Restart the time from the game's present loop."""
         self._start_s = self._now() - self._game.world.loop / LOOPS_PER_SECOND
 
     @property
@@ -42,25 +42,25 @@ class RealtimeClock:
         return int((self._now() - self._start_s) * LOOPS_PER_SECOND)
 
     def catch_up(self) -> None:
-        """Advances the game to the present."""
+        """Advance the game to the present."""
         if self.due > self._game.world.loop:
             self._game.step(self.due - self._game.world.loop)
 
     async def wait_for(self, loop: int) -> None:
-        """Returns when the game has reached a loop, or its end."""
+        """Wait until the game has reached a loop, or its end."""
         self.catch_up()
         while self._game.world.loop < loop and not self._game.over:
             await self.sleep_until(loop)
             self.catch_up()
 
     async def sleep_until(self, loop: int) -> None:
-        """Returns when a loop is due."""
+        """Wait until a loop is due."""
         ahead_s = self._start_s + loop / LOOPS_PER_SECOND - self._now()
         await self._sleep(max(ahead_s, _POLL_S))
 
 
 class SharedClock(RealtimeClock):
-    """Tells the time of a game that is advanced together with other processes."""
+    """Keeps the time of a game that advances together with other processes."""
 
     def catch_up(self) -> None:
-        """Does nothing: the game is as far as all of them let it go."""
+        """Do nothing: the game is as far as all processes allow."""

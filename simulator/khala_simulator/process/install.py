@@ -1,8 +1,8 @@
-"""Lays out a directory like a StarCraft II install whose game is this simulator.
+"""Lay out a directory like a StarCraft II install whose game is this simulator.
 
-Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that turns into the
-process of `__main__.py`. Nothing of a real StarCraft II is ever replaced, and maps that a user puts beside ours
-stay. A user's own maps are linked, not copied: they stay where they are.
+Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that becomes the process of
+`__main__.py`. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are
+linked, not copied: they stay where they are.
 
 Above: `cli.py`. Below: the list of scenarios.
 """
@@ -21,7 +21,7 @@ BASE_BUILD = 75689
 """Build of 4.10.0: the newest for Linux that both PySC2 and python-sc2 know."""
 
 OWN_FOLDER = "user"
-"""Folder below `Maps` of maps that lie in no folder of their own."""
+"""Folder below `Maps` for maps without a folder of their own."""
 
 _EXECUTABLE = Path("Versions") / f"Base{BASE_BUILD}" / "SC2_x64"
 _MARK = "# The simulator of Khala stands in for the game here."
@@ -33,9 +33,9 @@ class InstallError(Exception):
 
 
 def install(directory: Path | str) -> Path:
-    """Makes a directory that clients take for a StarCraft II install, and returns its absolute path.
+    """Make a directory that clients take for a StarCraft II install, and return its absolute path.
 
-    Doing it again repairs and updates the launcher and the maps, and leaves everything else alone.
+    Calling it again repairs and updates the launcher and the maps, and leaves everything else alone.
 
     Raises:
         InstallError: a real StarCraft II is there, or something cannot be written.
@@ -53,7 +53,7 @@ def install(directory: Path | str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class OwnMap:
-    """A map of the user's: where it lies, its path below `Maps`, and why it can't be played, if so."""
+    """A map of the user: where it is, its path below `Maps`, and why it can't be played, if so."""
 
     source: Path
     path: str
@@ -61,10 +61,10 @@ class OwnMap:
 
 
 def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
-    """Links every .SC2Map file below a directory into an install, and says which ones can be played.
+    """Link every .SC2Map file below a directory into an install, and return which ones can be played.
 
-    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. A map of the user's
-    takes the place of a shipped one of the same path; none takes the place of what the user put there himself.
+    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. A map of the user
+    replaces a shipped one of the same path; none replaces a file that the user put there.
 
     Raises:
         InstallError: there is no such directory, no map in it, or something cannot be written.
@@ -83,7 +83,7 @@ def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
 
 
 def is_installed(directory: Path | str) -> bool:
-    """Whether a directory holds an install of the simulator."""
+    """Return whether a directory holds an install of the simulator."""
     return _is_ours(Path(directory).expanduser() / _EXECUTABLE)
 
 
@@ -134,7 +134,7 @@ def _write_maps(maps: Path) -> None:
 
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:
-    """Links one map; clients look for maps exactly one folder below `Maps`."""
+    """Link one map; clients look for maps exactly one folder below `Maps`."""
     from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     folder = file.parent.name if file.parent != top else OWN_FOLDER
@@ -150,7 +150,7 @@ def _link(maps: Path, top: Path, file: Path) -> OwnMap:
     if not target.exists():
         try:
             target.symlink_to(file)
-        except OSError:  # not everybody may make links on Windows
+        except OSError:  # Windows does not allow links to every user
             shutil.copyfile(file, target)
     return OwnMap(file, path)
 

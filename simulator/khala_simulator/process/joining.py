@@ -1,4 +1,4 @@
-"""Requests that start a game: join it, alone or with other processes, as a player or as an observer; start it anew.
+"""Requests that start a game: join it, alone or with other processes, as a player or as an observer; restart it.
 
 Above: `requests.py`. Below: `game.py`, `viewer.py`, `lan.py`.
 """
@@ -35,7 +35,7 @@ _TAKEN, _REFUSED = b"+", b"-"  # first byte of the host's answer
 
 
 async def join_game(process: Process, request: sc.RequestJoinGame) -> sc.ResponseJoinGame:
-    """Takes a place, and starts the game when everybody is there."""
+    """Take a place, and start the game when all members are there."""
     _check(request)
     setup = process.setup
     over_lan = request.HasField("server_ports")
@@ -56,7 +56,7 @@ async def join_game(process: Process, request: sc.RequestJoinGame) -> sc.Respons
 
 
 def restart_game(process: Process, _: sc.RequestRestartGame) -> sc.ResponseRestartGame:
-    """The same game from its start, with other random draws."""
+    """Restart the same game, with other random draws."""
     before = process.table
     if before.party is None or before.peers is not None:
         text = "A replay is not restarted" if before.replay else "Only a game of one process can be restarted"
@@ -69,7 +69,7 @@ def restart_game(process: Process, _: sc.RequestRestartGame) -> sc.ResponseResta
 
 
 def begin(process: Process, party: Party) -> Playing:
-    """A game at its first loop, with everybody in their seats."""
+    """Return a game at its first loop, with all members in their seats."""
     try:
         game = HostedGame(party.setup, process.tables)
     except CatalogError as error:
@@ -103,7 +103,7 @@ def _check(request: sc.RequestJoinGame) -> None:
 
 
 class Seating:
-    """Who takes which place of a game that was created; members are numbered as the players are, then the observers."""
+    """The places of a created game and their members; members are numbered like the players, then the observers."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -113,11 +113,11 @@ class Seating:
 
     @property
     def full(self) -> bool:
-        """Whether everybody is there."""
+        """Whether all members are there."""
         return not self.free
 
     def take(self, request: sc.RequestJoinGame) -> int:
-        """Gives the first free place of the right kind, and returns its number; raises Failure if there is none."""
+        """Take the first free place of the right kind, and return its number; raise Failure if there is none."""
         observes, players = request.HasField("observed_player_id"), len(self._setup.players)
         if observes and request.observed_player_id > players:
             raise _failure(_JoinError.InvalidObservedPlayerId, f"There is no player {request.observed_player_id}")
@@ -130,12 +130,12 @@ class Seating:
         return number
 
     def release(self, number: int) -> None:
-        """Frees a place."""
+        """Free a place."""
         del self._joined[number]
         self.free = sorted([*self.free, number])
 
     def party(self, me: int) -> Party:
-        """Everybody in their places, as one of them sees it."""
+        """Return all members in their places, as one of them sees it."""
         players = list(self._setup.players)
         interfaces = {}
         for number, request in self._joined.items():
@@ -159,7 +159,7 @@ def _party(setup: Setup, interfaces: dict[int, sc.InterfaceOptions], me: int, re
 
 
 async def _host(process: Process, table: Seating, me: int, port: int) -> Playing:
-    """Waits for the guests, and starts the game for all."""
+    """Wait for the guests, and starts the game for all."""
     build = process.base_build
 
     def admit(message: bytes) -> int:
@@ -186,7 +186,7 @@ async def _host(process: Process, table: Seating, me: int, port: int) -> Playing
 
 
 def _share(playing: Playing, me: int, members: list[int], links: dict[Link, frozenset[int]]) -> Playing:
-    """The same game, played together with other processes."""
+    """Share the game with other processes."""
     playing.peers = Peers(Lockstep(playing.game, me, members), links)
     if playing.clock is not None:
         playing.clock = SharedClock(playing.game)
@@ -200,7 +200,7 @@ def _invitation(table: Seating, me: int) -> bytes:
 
 
 async def _visit(process: Process, request: sc.RequestJoinGame) -> sc.ResponseJoinGame:
-    """Joins the game that another process hosts."""
+    """Join the game that another process hosts."""
     join = f"{process.base_build}\n".encode() + request.SerializeToString()
     try:
         link, answer = await knock(request.server_ports.game_port, PATIENCE_S, join)

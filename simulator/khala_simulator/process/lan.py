@@ -1,8 +1,8 @@
-"""Games over several processes on one machine: how the processes find each other, and what they say in between.
+"""Games over several processes on one machine: how the processes find each other, and their messages.
 
-The process that created the game is the host. It listens on the port that all clients named when they joined, until
-everybody is there; guests try until they find it. From then on each guest is linked to the host, and the host passes
-on what one guest says to the others. A link that breaks, for whatever reason, is a member that has left.
+The process that created the game is the host. It listens on the port that all clients named when they joined, until all
+guests are there; guests try until they find it. From then on each guest has a link to the host, and the host forwards
+one guest's messages to the others. A broken link, for whatever reason, means that a member has left.
 
 Above: `joining.py`, `play.py`. Below: `lockstep.py`, which knows what the messages mean.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 CHUNK_LOOPS = 22
-"""Loops at a time, about a second of the game: in between, the process hears signals, other clients and its peers."""
+"""Loops at a time, about a second of the game: in between, the process handles signals, other clients and its peers."""
 
 _HEAD = struct.Struct("<I")
 _MAX_BYTES = 1 << 28  # of one message; the longest holds a map
@@ -37,7 +37,7 @@ class NobodyCameError(Exception):
 
 
 class JoinRefused(Exception):
-    """A guest cannot be taken; `answer` tells it why."""
+    """A guest cannot be accepted; `answer` is the reason that it gets."""
 
     def __init__(self, answer: bytes) -> None:
         super().__init__(answer)
@@ -45,9 +45,9 @@ class JoinRefused(Exception):
 
 
 class Link(asyncio.Protocol):
-    """Messages to and from another process; None is heard when it is gone.
+    """Messages to and from another process; None arrives when it is gone.
 
-    What comes before anybody listens is kept.
+    Messages that come before a listener are kept.
     """
 
     def __init__(self) -> None:
@@ -57,14 +57,14 @@ class Link(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
 
     def listen(self, listener: Callable[[bytes | None], None]) -> None:
-        """From now on `listener` is called with each message, first with those that came already."""
+        """Call `listener` with each message from now on, first with those that have already come."""
         self._listener = listener
         kept, self._kept = self._kept, []
         for message in kept:
             listener(message)
 
     async def hear(self) -> bytes | None:
-        """The next message."""
+        """Return the next message."""
         heard: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
 
         def listener(message: bytes | None) -> None:
@@ -80,27 +80,27 @@ class Link(asyncio.Protocol):
             self._listener = None
 
     def send(self, message: bytes) -> None:
-        """Sends a message, if the other one is still there."""
+        """Send a message, if the other process is still there."""
         if self._transport is not None:
             self._transport.write(_HEAD.pack(len(message)) + message)
 
     def close(self) -> None:
-        """Hangs up, after what was sent."""
+        """Hang up after the sent messages."""
         if self._transport is not None:
             self._transport.close()
             self._transport = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Called by the event loop."""
+        """Keep the transport."""
         self._transport = cast("asyncio.Transport", transport)
 
     def data_received(self, data: bytes) -> None:
-        """Called by the event loop."""
+        """Pass on the complete messages."""
         self._buffer += data
         while len(self._buffer) >= _HEAD.size:
             (size,) = _HEAD.unpack_from(self._buffer)
             if size > _MAX_BYTES:
-                self.close()  # whoever that is, it is none of us
+                self.close()  # not one of our processes
                 return
             if len(self._buffer) < _HEAD.size + size:
                 return
@@ -109,7 +109,7 @@ class Link(asyncio.Protocol):
             self._tell(message)
 
     def connection_lost(self, _: Exception | None) -> None:
-        """Called by the event loop."""
+        """Tell the listener that the link is gone."""
         self._transport = None
         self._tell(None)
 
@@ -121,16 +121,16 @@ class Link(asyncio.Protocol):
 
 
 async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]:
-    """A link to the host of the game on this port, and what it answered when it was asked to let us in.
+    """Return a link to the host of the game on this port, and its answer to the request to join.
 
     Raises:
-        NobodyCameError: no host let anybody in for so long.
+        NobodyCameError: no host accepted a guest for so long.
     """
     loop = asyncio.get_running_loop()
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(patience_s):
             while True:
-                with contextlib.suppress(OSError):  # nobody there yet, or a host that went away again
+                with contextlib.suppress(OSError):  # no host yet, or one that went away again
                     _, link = await loop.create_connection(Link, HOST, port)
                     link.send(join)
                     try:
@@ -145,23 +145,23 @@ async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]
 
 
 class Door:
-    """Where the host takes in guests, until everybody is there.
+    """Where the host accepts guests, until all are there.
 
-    `admit` is given what a guest said and returns its member number, or raises `JoinRefused`; `release` is given the
-    number of a guest that went away again.
+    `admit` takes a guest's message and returns its member number, or raises `JoinRefused`; `release` takes the number
+    of a guest that went away again.
     """
 
     def __init__(self, admit: Callable[[bytes], int], release: Callable[[int], None]) -> None:
         self.guests: dict[int, Link] = {}
         self._admit, self._release = admit, release
-        self._strangers: set[Link] = set()  # who has not said yet what they want
+        self._strangers: set[Link] = set()  # guests without a request so far
         self._changed = asyncio.Event()
 
     async def wait(self, port: int, patience_s: float, full: Callable[[], bool]) -> None:
-        """Returns when everybody is there.
+        """Wait until all guests are there.
 
         Raises:
-            NobodyCameError: not everybody came.
+            NobodyCameError: not all guests came.
             OSError: the port is taken.
         """
         server = await asyncio.get_running_loop().create_server(self._open, HOST, port)
@@ -182,7 +182,7 @@ class Door:
                 link.close()
 
     def send_away(self) -> None:
-        """Hangs up on all guests."""
+        """Hang up on all guests."""
         for link in self.guests.values():
             link.close()
         self.guests.clear()
@@ -196,7 +196,7 @@ class Door:
     def _hear(self, link: Link, message: bytes | None) -> None:
         self._strangers.discard(link)
         number = next((number for number, guest in self.guests.items() if guest is link), None)
-        if number is not None:  # gone, or it does not know its manners
+        if number is not None:  # gone, or not following the protocol
             del self.guests[number]
             self._release(number)
             link.close()
@@ -213,7 +213,7 @@ class Peers:
     """The other processes of a game that has begun."""
 
     def __init__(self, lockstep: Lockstep, links: dict[Link, frozenset[int]]) -> None:
-        """Takes part in a game; `links` tells which members are behind each link."""
+        """Take part in a game; `links` maps each link to the members behind it."""
         self._lockstep, self._links = lockstep, links
         self._news = asyncio.Event()
         self._keeper: asyncio.Task[None] | None = None
@@ -221,7 +221,7 @@ class Peers:
             link.listen(lambda message, link=link: self._hear(link, message))  # type: ignore[misc]  # of a lambda with a default mypy infers nothing
 
     async def step(self, count: int) -> None:
-        """Advances the game by up to `count` loops from here, together with the others."""
+        """Advance the game by up to `count` loops from here, together with the others."""
         game = self._lockstep.game
         commit = self._lockstep.commit(game.world.loop + count)
         self._tell(commit)
@@ -231,7 +231,7 @@ class Peers:
                 await self._news.wait()
 
     def keep_time(self, clock: RealtimeClock) -> None:
-        """Advances the game by the clock from now on, until it is over or left."""
+        """Advance the game by the clock from now on, until it is over or left."""
         self._keeper = asyncio.create_task(self._keep_time(clock))
 
     async def _keep_time(self, clock: RealtimeClock) -> None:
@@ -243,7 +243,7 @@ class Peers:
             await clock.sleep_until(due + 1)
 
     def close(self) -> None:
-        """Leaves the game."""
+        """Leave the game."""
         if self._keeper is not None:
             self._keeper.cancel()
         links, self._links = tuple(self._links), {}
@@ -251,7 +251,7 @@ class Peers:
             link.close()
 
     async def _advance(self) -> bool:
-        """Advances the game a little, if the others let it go on; tells whether they do."""
+        """Advance the game a little, if the others allow it; return whether they do."""
         game = self._lockstep.game
         if self._lockstep.horizon <= game.world.loop or game.over:
             return False
@@ -283,7 +283,7 @@ class Peers:
         self._news.set()
 
     def _part(self, error: LockstepError) -> None:
-        """Ends the game for everybody: it is no longer one game."""
+        """End the game for every member: it is no longer one game."""
         print(f"StarCraft II simulator: {error}; the game ends", file=sys.stderr)  # noqa: T201  # there is no other log
         for link in tuple(self._links):
             link.close()

@@ -1,7 +1,7 @@
 """Requests around a game: create, leave, maps, ping and quit.
 
-Each function takes the process and a request and gives the body of the response, or raises `Failure` with it.
-Above: `requests.py`. Below: `game.py`, `map_file.py`.
+Each function takes the process and a request and returns the body of the response, or raises `Failure` with it. Above:
+`requests.py`. Below: `game.py`, `map_file.py`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MAX_PLAYERS = 15
 
 
 def ping(process: Process, _: sc.RequestPing) -> sc.ResponsePing:
-    """Which game this is."""
+    """Return which game this is."""
     return sc.ResponsePing(
         game_version=process.game_version,
         data_version=process.data_version,
@@ -32,18 +32,18 @@ def ping(process: Process, _: sc.RequestPing) -> sc.ResponsePing:
 
 
 def end(process: Process, _: sc.RequestQuit) -> sc.ResponseQuit:
-    """Leaves the game; the server ends when it sees the state."""
+    """Leave the game; the server ends when it sees the state."""
     process.play(None)
     return sc.ResponseQuit()
 
 
 def available_maps(_: Process, __: sc.RequestAvailableMaps) -> sc.ResponseAvailableMaps:
-    """The shipped maps; there is no cache of battle.net."""
+    """Return the shipped maps; there is no cache of battle.net."""
     return sc.ResponseAvailableMaps(local_map_paths=[name + SUFFIX for name in map_names()])
 
 
 def save_map(process: Process, request: sc.RequestSaveMap) -> sc.ResponseSaveMap:
-    """Keeps a map's bytes under its path, for this process."""
+    """Keep a map's bytes under its path, for this process."""
     if not request.map_data:
         raise Failure(sc.ResponseSaveMap(error=sc.ResponseSaveMap.InvalidMapData))
     process.maps[request.map_path] = request.map_data
@@ -54,7 +54,7 @@ def save_map(process: Process, request: sc.RequestSaveMap) -> sc.ResponseSaveMap
 
 
 def create_game(process: Process, request: sc.RequestCreateGame) -> sc.ResponseCreateGame:
-    """Chooses map and players; a game that is being played is dropped."""
+    """Choose map and players; drop a game in progress."""
     game_map, map_data = _find_map(process, request)
     players = _check_players(request, game_map)
     process.setup = Setup(
@@ -105,7 +105,7 @@ def _check_players(request: sc.RequestCreateGame, game_map: GameMap) -> tuple[sc
 
 
 def leave_game(process: Process, _: sc.RequestLeaveGame) -> sc.ResponseLeaveGame:
-    """Leaves the game; what was saved stays."""
+    """Leave the game; saved maps stay."""
     process.play(None)
     process.setup = None
     return sc.ResponseLeaveGame()

@@ -1,9 +1,9 @@
 """Lock-step: one game that several processes simulate, each of them the whole of it.
 
-Members are the players and observers that have a process of their own. What travels between them is what clients do,
-and how far each client lets the world go; a world never goes further than the most hesitant member allows. As the same
-setup and the same log give the same world, that is all there is to agree on. Digests of the worlds are compared now and
-then, because a world that has gone astray is worse than one that has ended.
+Members are the players and observers that have a process of their own. They exchange what their clients do, and how far
+each client allows the world to go; a world never goes further than the most hesitant member allows. The same setup and
+the same log produce the same world, so they need to agree on nothing else. They compare digests of the worlds now and
+then, because a world that has diverged is worse than one that has ended.
 
 No I/O: `lan.py` carries the messages. Below: `game.py`.
 """
@@ -44,28 +44,28 @@ class Commit:
     digests: dict[int, str] = dataclasses.field(default_factory=dict)  # of its world, by loop
 
     def encode(self) -> bytes:
-        """The bytes of the message."""
+        """Return the bytes of the message."""
         head = {"member": self.member, "through": self.through, "digests": self.digests}
         return json.dumps(head).encode() + b"\n" + pack(self.entries)
 
 
 @dataclasses.dataclass(frozen=True)
 class Leave:
-    """A member is gone: nobody waits for it after `loop`, at which a player surrenders."""
+    """A member is gone: no other waits for it after `loop`, at which a player surrenders."""
 
     member: int
     loop: int
 
     def encode(self) -> bytes:
-        """The bytes of the message."""
+        """Return the bytes of the message."""
         return json.dumps({"member": self.member, "leaves": self.loop}).encode() + b"\n"
 
 
 def decode(data: bytes, members: frozenset[int]) -> Commit | Leave:
-    """The message in bytes, which may be about one of these members.
+    """Return the message in bytes, which must be about one of these members.
 
     Raises:
-        LockstepError: there is none, or it is about somebody else.
+        LockstepError: there is none, or it is about another member.
     """
     head, _, log = data.partition(b"\n")
     try:
@@ -87,10 +87,10 @@ class Lockstep:
         self.game, self.me = game, me
         self._through = dict.fromkeys(members, 0)
         self._digests: dict[int, str] = {}  # of the own world, by loop
-        self._untold: dict[int, str] = {}  # those that the others have not been told
+        self._untold: dict[int, str] = {}  # those not yet sent to the others
         self._unchecked: list[Commit] = []  # with digests of loops that the own world has not reached
         game.unsent = []
-        game.delay = 1  # what a client does needs a loop to reach the others, as in the game
+        game.delay = 1  # an action needs a loop to reach the others, as in the game
 
     @property
     def horizon(self) -> int:
@@ -99,11 +99,11 @@ class Lockstep:
 
     @property
     def members(self) -> frozenset[int]:
-        """Who is still there."""
+        """The members that are still there."""
         return frozenset(self._through)
 
     def commit(self, loop: int) -> Commit:
-        """Lets the world go up to a loop as far as the own client is concerned; the message is for all others."""
+        """Allow the world to go up to a loop for the own client; return the message for all others."""
         through = self._through[self.me] = max(loop, self._through[self.me])
         message = Commit(self.me, through, tuple(self.game.unsent or ()), self._untold)
         self.game.unsent, self._untold = [], {}
@@ -111,10 +111,10 @@ class Lockstep:
         return message
 
     def receive(self, message: Commit | Leave) -> None:
-        """Takes over what another member said; whoever has left is not listened to.
+        """Apply another member's message; ignore members that have left.
 
         Raises:
-            LockstepError: it cannot have said that, or its world is another one.
+            LockstepError: it cannot have sent that, or its world differs.
         """
         if message.member not in self._through:
             return
@@ -133,16 +133,16 @@ class Lockstep:
         self._through[message.member] = message.through
 
     def leave(self, member: int) -> Leave:
-        """Waits no more for a member that is gone; the message is for all others."""
+        """Stop waiting for a member that is gone; return the message for all others."""
         message = Leave(member, self.horizon)  # no world can be further than that
         self._drop(member, message.loop)
         return message
 
     def advance(self, loops: int) -> None:
-        """Advances the own world by up to so many loops, as far as it may go.
+        """Advance the own world by up to so many loops, as far as it may go.
 
         Raises:
-            LockstepError: another member's world was another one.
+            LockstepError: another member's world differed.
         """
         world = self.game.world
         target = min(world.loop + loops, self.horizon)

@@ -1,7 +1,7 @@
 """Archives in the MPQ format, which StarCraft II keeps its replays in: written here, read through mpyq.
 
-Only what a reader needs: members are stored as they are, and the two tables are scrambled as the format wants. Clients
-look into a replay for the version of the game before they ask the game itself.
+Only what a reader needs: members are stored uncompressed, and the two tables are scrambled as the format requires.
+Clients look into a replay for the version of the game before they ask the game itself.
 
 Above: `process/replay.py`.
 """
@@ -35,7 +35,7 @@ class MpqError(ValueError):
 
 
 def pack(members: Mapping[str, bytes]) -> bytes:
-    """An archive with these members, and the list of their names."""
+    """Return an archive with these members, and the list of their names."""
     files = {**members, _LISTFILE: "\r\n".join(members).encode()}
     blocks, at = [], _HEADER.size
     for data in files.values():
@@ -55,7 +55,7 @@ def pack(members: Mapping[str, bytes]) -> bytes:
 
 
 def member(archive: bytes, name: str) -> bytes | None:
-    """A member of an archive, or None; raises MpqError if it can't be read."""
+    """Return a member of an archive, or None; raise MpqError if it can't be read."""
     try:
         data: bytes | None = mpyq.MPQArchive(io.BytesIO(archive), listfile=False).read_file(name)
     except (ValueError, TypeError, LookupError, struct.error, zlib.error, RuntimeError) as error:
@@ -65,7 +65,7 @@ def member(archive: bytes, name: str) -> bytes | None:
 
 @functools.cache
 def _table() -> list[int]:
-    """The format's table of 5 x 256 numbers, from its own random generator."""
+    """Return the format's table of 5 x 256 numbers, from its own random generator."""
     table, seed = [0] * 0x500, 0x00100001
     for column in range(0x100):
         for row in range(5):
@@ -76,7 +76,7 @@ def _table() -> list[int]:
 
 
 def _hash(name: str, kind: int) -> int:
-    """Kind 0 says where in the table a name stands, 1 and 2 that it is this name, 3 is a key."""
+    """Return the hash of a name: kind 0 is its place in the table, 1 and 2 verify the name, 3 is a key."""
     one, two = 0x7FED7FED, 0xEEEEEEEE
     for letter in name.upper().encode():
         one = (_table()[kind * 0x100 + letter] ^ (one + two)) & _MASK

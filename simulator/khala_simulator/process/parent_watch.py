@@ -1,6 +1,6 @@
 """Exit when the parent process is gone and no client is connected for a minute.
 
-A client that is killed (SIGKILL, the out-of-memory killer) ends no game, and the next one starts a game of its own, so
+A killed client (SIGKILL, the out-of-memory killer) does not end its game, and the next client starts another one, so
 that games would pile up. A game that was started by hand lives as long as the shell that started it, or its clients.
 """
 
@@ -21,7 +21,7 @@ PATIENCE_LOOKS = 12
 async def orphaned(
     has_client: Callable[[], bool], *, parent: Callable[[], int] = os.getppid, look_s: float = LOOK_S
 ) -> None:
-    """Returns when the process has lost its parent and nobody has been connected for `PATIENCE_LOOKS` looks.
+    """Wait until the process has lost its parent and no client has been connected for `PATIENCE_LOOKS` looks.
 
     Args:
         has_client: whether a client is connected now.

@@ -1,7 +1,7 @@
 """Requests while a game is played or a replay is watched.
 
-Each function takes the process and a request and gives the body of the response: a message, or for the large ones
-the parts of its bytes. Above: `requests.py`. Below: `game.py`, `observation.py` and their neighbours.
+Each function takes the process and a request and returns the body of the response: a message, or for the large ones the
+parts of its bytes. Above: `requests.py`. Below: `game.py`, `observation.py` and their neighbours.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
 
 def game_info(process: Process, _: sc.RequestGameInfo) -> list[Part]:
-    """Players, options and the map."""
+    """Return players, options and the map."""
     return process.table.info.encode()
 
 
 def tables(process: Process, request: sc.RequestData) -> sc.ResponseData:
-    """Abilities, unit types, upgrades, buffs and effects."""
+    """Return abilities, unit types, upgrades, buffs and effects."""
     return data.answer(process.table.game.catalog, request)
 
 
 async def observation(process: Process, request: sc.RequestObservation) -> list[Part]:
-    """What the player knows now; with a game loop in real time, not before that loop."""
+    """Return what the player knows now; with a game loop in real time, not before that loop."""
     table = process.table
     if table.clock is not None:
         await table.clock.wait_for(request.game_loop)
@@ -44,7 +44,7 @@ async def observation(process: Process, request: sc.RequestObservation) -> list[
 
 
 async def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
-    """Advances the game, by one loop unless the request says how many; together with the other processes, if any."""
+    """Advance the game, by one loop unless the request says how many; together with the other processes, if any."""
     table, count = process.table, request.count or 1
     if table.clock is not None:
         raise UsageError("step is not possible in a game in real time")
@@ -65,7 +65,7 @@ async def _advance(game: HostedGame, count: int) -> None:
 
 
 def action(process: Process, request: sc.RequestAction) -> sc.ResponseAction:
-    """Notes actions of the player, and says of each how it looks as things stand."""
+    """Note actions of the player, and return how each would go at present."""
     table = process.table
     if isinstance(table.seat, Viewer):
         return sc.ResponseAction(result=[error_pb2.NotSupported] * len(request.actions))
@@ -74,7 +74,7 @@ def action(process: Process, request: sc.RequestAction) -> sc.ResponseAction:
 
 
 def obs_action(process: Process, request: sc.RequestObserverAction) -> sc.ResponseObserverAction:
-    """Turns the view of an observer, or of the viewer of a replay; a player has no such view, and nothing happens."""
+    """Turn the view of an observer, or of the viewer of a replay; a player has no such view, and nothing happens."""
     seat = process.table.seat
     if isinstance(seat, Viewer):
         for action in request.actions:
@@ -83,12 +83,12 @@ def obs_action(process: Process, request: sc.RequestObserverAction) -> sc.Respon
 
 
 def ask(process: Process, request: query_pb2.RequestQuery) -> query_pb2.ResponseQuery:
-    """Ways, places to build, abilities of units."""
+    """Return ways, places to build, abilities of units."""
     return query.answer(process.table.seat, request)
 
 
 def debug(process: Process, request: sc.RequestDebug) -> sc.ResponseDebug:
-    """Notes debug commands; they take effect with the next loop. An observer's do nothing."""
+    """Note debug commands; they take effect with the next loop. An observer's do nothing."""
     table = process.table
     if isinstance(table.seat, Viewer):
         return sc.ResponseDebug()
@@ -98,12 +98,12 @@ def debug(process: Process, request: sc.RequestDebug) -> sc.ResponseDebug:
 
 
 def map_command(_: Process, __: sc.RequestMapCommand) -> sc.ResponseMapCommand:
-    """Accepted; no map has commands."""
+    """Accept the command and do nothing; no map has commands."""
     return sc.ResponseMapCommand()
 
 
 def save_replay(process: Process, _: sc.RequestSaveReplay) -> sc.ResponseSaveReplay:
-    """The game up to now, as the bytes of a replay."""
+    """Return the game up to now, as the bytes of a replay."""
     table = process.table
     if table.replay:
         raise UsageError("A replay of a replay cannot be saved")
@@ -111,13 +111,13 @@ def save_replay(process: Process, _: sc.RequestSaveReplay) -> sc.ResponseSaveRep
 
 
 def quick_save(process: Process, _: sc.RequestQuickSave) -> sc.ResponseQuickSave:
-    """Keeps the game as it is now, in memory."""
+    """Keep the present state of the game, in memory."""
     bookmark.keep(_alone(process, "quick_save"))
     return sc.ResponseQuickSave()
 
 
 def quick_load(process: Process, _: sc.RequestQuickLoad) -> sc.ResponseQuickLoad:
-    """Goes back to the last quick save of this game."""
+    """Go back to the last quick save of this game."""
     kept = bookmark.reopen(_alone(process, "quick_load"))
     if kept is None:
         raise UsageError("quick_load needs a quick_save of the same game")

@@ -1,4 +1,4 @@
-"""What one game process holds from one request to the next: its build, the maps it was given, the game it plays.
+"""The state of one game process between requests: its build, its saved maps, its game.
 
 Above: the handlers of requests. Below: `game.py`.
 """
@@ -27,7 +27,7 @@ _DATA_OF_BUILD = {75689: "B89B5D6FA7CBF6452E721311BFBC6CB2"}
 
 
 class Failure(Exception):
-    """A legal request that fails: it is answered by its own body with its own error, and changes nothing."""
+    """A legal request that fails: the answer is its own body with its own error, and nothing changes."""
 
     def __init__(self, body: Message) -> None:
         super().__init__(body)
@@ -36,7 +36,7 @@ class Failure(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Party:
-    """Who is there when a game begins, as one of them sees it."""
+    """The members of a game at its start, as one of them sees it."""
 
     setup: Setup
     interfaces: dict[int, sc.InterfaceOptions]  # of the participants
@@ -69,13 +69,13 @@ class Process:
         self.game_version = f"{_PATCH_OF_BUILD.get(base_build, '0.0.0')}.{base_build}"
         self.data_version = data_version or _DATA_OF_BUILD.get(base_build, "")
         self.tables = VERSION_OF_BUILD.get(base_build, "4.10")
-        self.maps: dict[str, bytes] = {}  # saved by the client, under the path that it gave
+        self.maps: dict[str, bytes] = {}  # saved by the client, under its path
         self.setup: Setup | None = None  # of the game that is created and not yet joined
         self.playing: Playing | None = None
 
     @property
     def about(self) -> dict[str, str]:
-        """The version, as the game's own replays tell it."""
+        """The version, in the form of the game's own replays."""
         return {
             "GameVersion": self.game_version,
             "DataBuild": str(self.base_build),
@@ -84,7 +84,7 @@ class Process:
         }
 
     def play(self, playing: Playing | None) -> None:
-        """Turns to another game, or to none; the other processes of the one before are left."""
+        """Turn to another game, or to none; leave the other processes of the one before."""
         before, self.playing = self.playing, playing
         if before is not None and before.peers is not None:
             before.peers.close()
@@ -96,7 +96,7 @@ class Process:
 
     @property
     def table(self) -> Playing:
-        """The game that is played or watched, at the present; the state machine lets nobody ask without one."""
+        """The game that is played or watched, at the present; the state machine refuses requests without one."""
         if self.playing is None:
             raise RuntimeError("no game is being played")
         if self.playing.clock is not None:
@@ -105,5 +105,5 @@ class Process:
 
     @staticmethod
     def fresh_seed() -> int:
-        """A seed for a game that was created without one."""
+        """Return a seed for a game that was created without one."""
         return int.from_bytes(os.urandom(4), "little")

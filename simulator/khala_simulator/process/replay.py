@@ -1,8 +1,8 @@
-"""Replays: the setup of a game and all that was done to it, to be simulated again.
+"""Replays: the setup of a game and its log, to be simulated again.
 
-The format is ours: a line that marks it, one line of JSON with the setup, then for each entry of the log its loop,
-player and kind with the bytes of the message, all of it compressed. A map of a user's own travels inside. In a file it
-is the member of an archive like the game's, because clients look there for the version of the game.
+The format is the simulator's own: a line that marks it, one line of JSON with the setup, then for each entry of the log
+its loop, player and kind with the bytes of the message, all of it compressed. A user's own map is included. In a file
+it is the member of an archive like the game's, because clients look there for the version of the game.
 
 Above: `viewing.py`, `lockstep.py`. Below: `game.py`.
 """
@@ -52,14 +52,14 @@ class Replay:
     log: tuple[LogEntry, ...]
 
     def file(self, version: dict[str, str]) -> bytes:
-        """The file; `version` is what it says of the game in the words of the game's own files."""
+        """Return the file; `version` is its description of the game, in the form of the game's own files."""
         title, duration_s = self.setup.game_map.name, int(self.loops / LOOPS_PER_SECOND)
         players = [{"PlayerID": player} for player in self.results]
         about = {"Title": title, **version, "Duration": duration_s, "Players": players}
         return mpq.pack({METADATA: json.dumps(about).encode(), _MEMBER: self.encode()})
 
     def encode(self) -> bytes:
-        """The replay without the archive around it."""
+        """Return the replay without the archive around it."""
         setup = self.setup
         head = {
             "path": setup.path,
@@ -78,7 +78,7 @@ class Replay:
 
     @classmethod
     def decode(cls, data: bytes) -> Replay:
-        """The replay in the bytes of a file, or without the archive around it; raises ReplayError if there is none."""
+        """Return the replay in the bytes of a file, with or without its archive; raise ReplayError if there is none."""
         if data.startswith(mpq.MAGIC):
             try:
                 data = mpq.member(data, _MEMBER) or b""
@@ -120,7 +120,7 @@ def _hex(message: Message) -> str:
 
 
 def pack(log: Iterable[LogEntry]) -> bytes:
-    """Entries of a log as bytes."""
+    """Return entries of a log as bytes."""
     parts = []
     for entry in log:
         data = entry.act.SerializeToString(deterministic=True)
@@ -129,10 +129,10 @@ def pack(log: Iterable[LogEntry]) -> bytes:
 
 
 def unpack(log: bytes) -> Iterator[LogEntry]:
-    """The entries in bytes that `pack` made.
+    """Yield the entries in bytes that `pack` made.
 
     Raises:
-        struct.error, LookupError, DecodeError: they are no such bytes.
+        struct.error, LookupError, DecodeError: the bytes are invalid.
     """
     at = 0
     while at < len(log):
@@ -143,7 +143,7 @@ def unpack(log: bytes) -> Iterator[LogEntry]:
 
 
 def record(game: HostedGame) -> Replay:
-    """The replay of a game up to now."""
+    """Return the replay of a game up to now."""
     players = range(1, len(game.setup.players) + 1)
     return Replay(
         setup=game.setup,
@@ -156,7 +156,7 @@ def record(game: HostedGame) -> Replay:
 
 
 def rerun(replay: Replay, version: str) -> HostedGame:
-    """A game that plays a replay, with the players in their seats."""
+    """Return a game that plays a replay, with the players in their seats."""
     game = HostedGame(replay.setup, version, log=replay.log, end_loop=replay.loops)
     for number, recorded in replay.interfaces.items():
         game.sit(number, recorded)

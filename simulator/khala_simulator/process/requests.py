@@ -1,7 +1,7 @@
 """Which function answers which request.
 
-Each takes the process and the request and gives the body of the response, at once or as an awaitable: a message, or the
-parts of its bytes. Above: `session.py`. Below: `lobby.py`, `joining.py`, `play.py`, `viewing.py`.
+Each takes the process and the request and returns the body of the response, at once or as an awaitable: a message, or
+the parts of its bytes. Above: `session.py`. Below: `lobby.py`, `joining.py`, `play.py`, `viewing.py`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The websocket at `/sc2api`: frames in, frames out.
 
-Requests come as text frames from PySC2 and as binary frames from python-sc2; both carry raw protobuf, so text is
-not decoded. Connections come and go while the session lives on: the newest one is served, and whatever was open
-before it is dropped, so that a client that vanished without a word locks nobody out.
+Requests come as text frames from PySC2 and as binary frames from python-sc2; both carry raw protobuf, so text is not
+decoded. Connections come and go while the session lives on: the newest one is served, and older ones are dropped, so
+that a client that vanished silently does not lock others out.
 
-A client that goes away while its request is being answered takes the request with it.
+If a client disconnects while its request is being answered, the request is dropped.
 
 It knows nothing of the game: that is `session.py`, called with the bytes of one request at a time.
 """
@@ -36,10 +36,10 @@ class Server:
         self.session = session
         self.done = asyncio.Event()
         self._transport: asyncio.Transport | None = None
-        self._turn = asyncio.Lock()  # a client that was replaced still has to hear that its request is dropped
+        self._turn = asyncio.Lock()  # a client that was replaced still has to learn that its request is dropped
 
     async def connect(self, request: web.Request) -> web.WebSocketResponse:
-        """Answers one client until it leaves, is replaced, or ends the process with quit."""
+        """Answer one client until it leaves, is replaced, or ends the process with quit."""
         client = web.WebSocketResponse(decode_text=False, max_msg_size=0, compress=False, timeout=0.1)
         await client.prepare(request)
         before, self._transport = self._transport, request.transport
@@ -50,7 +50,7 @@ class Server:
         return client
 
     def has_client(self) -> bool:
-        """Whether a client is connected now."""
+        """Return whether a client is connected now."""
         return self._transport is not None and not self._transport.is_closing()
 
     async def _answer(self, client: web.WebSocketResponse) -> None:
@@ -67,7 +67,7 @@ class Server:
 
 
 def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: str | None) -> None:
-    """Serves on a listening socket until a client says quit."""
+    """Serve on a listening socket until a client says quit."""
     session = Session(data_dir=data_dir, base_build=base_build, data_version=data_version)
     gc.collect()
     gc.freeze()  # tables and modules stay; collections in a game need not look at them again
@@ -75,7 +75,7 @@ def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: st
 
 
 async def serve(sock: socket.socket, session: Session) -> None:
-    """Serves the session on a listening socket until a client says quit, or nobody is left who could."""
+    """Serve the session on a listening socket until a client says quit, or no client is left that could."""
     server = Server(session)
     app = web.Application()
     app.router.add_get(ENDPOINT, server.connect)

@@ -1,7 +1,7 @@
 """One game process without its socket: the bytes of a request in, the bytes of its response out.
 
 Most answers are there at once. Some wait: for the other processes of a game, for the wall clock, or, in a long step,
-for the event loop to look after everything else.
+for the event loop to handle everything else.
 
 Every response carries the status and the request's id. A request that is not legal now, or that is no request at
 all, is a usage error: `Response.error` and no body. A legal request that fails has its own body with its own error.
@@ -48,7 +48,7 @@ class Session:
         return self._machine.status
 
     def handle(self, data: bytes) -> bytes:
-        """`answer` for a caller without an event loop, who plays alone.
+        """Answer a request of a caller without an event loop that plays alone.
 
         Raises:
             RuntimeError: the answer has to wait for something outside of this process.
@@ -64,7 +64,7 @@ class Session:
         raise RuntimeError("this request waits for other processes or for the time: use Session.answer")
 
     async def answer(self, data: bytes) -> bytes:
-        """Answers one request, one at a time; never raises. Cancelled, it leaves the process in the state it was in."""
+        """Answer one request, one at a time; never raise. If cancelled, it leaves the process in its former state."""
         try:
             request = sc.Request.FromString(data)
         except DecodeError:

@@ -1,8 +1,8 @@
 """Which request is legal in which state, as a table.
 
-The states and the numbers are those of the SC2 API's `Status`. A missing entry of `LEGAL` *is* the usage
-error; nothing else in the simulator asks what state it is in. The machine has no I/O: above it is
-`session.py`, which feeds it one request after another; below it is nothing.
+The states and the numbers are those of the SC2 API's `Status`. A missing entry of `LEGAL` *is* the usage error; nothing
+else in the simulator reads the state. The machine has no I/O: above it is `session.py`, which feeds it one request
+after another; below it is nothing.
 """
 
 from __future__ import annotations
@@ -75,10 +75,10 @@ class Machine:
         self.status = Status.launched
 
     def check(self, kind: str) -> None:
-        """Refuses a request of this kind, if it is not legal now.
+        """Refuse a request of this kind, if it is not legal now.
 
         Raises:
-            UsageError: with the sentence that the client is to read.
+            UsageError: with the sentence for the client.
         """
         if kind in LEGAL[self.status]:
             return
@@ -90,10 +90,10 @@ class Machine:
         raise UsageError(f"{kind} is not possible in state {self.status.name}, only in: {states}")
 
     def succeeded(self, kind: str) -> None:
-        """Moves to the state that follows a successful request of this kind."""
+        """Move to the state that follows a successful request of this kind."""
         self.status = AFTER.get(kind, self.status)
 
     def end(self) -> None:
-        """The game that is being played or watched is over."""
+        """Note that the game that is played or watched is over."""
         if self.status in {Status.in_game, Status.in_replay}:
             self.status = Status.ended

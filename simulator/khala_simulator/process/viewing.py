@@ -25,7 +25,7 @@ StartError, InfoError = sc.ResponseStartReplay.Error, sc.ResponseReplayInfo.Erro
 
 
 class _Unreadable(Exception):
-    """No replay came of a request; `name` is that of an error which both enums have."""
+    """A request without a usable replay; `name` is that of an error in both enums."""
 
     def __init__(self, name: str, details: str) -> None:
         super().__init__(details)
@@ -33,10 +33,10 @@ class _Unreadable(Exception):
 
 
 def start_replay(process: Process, request: sc.RequestStartReplay) -> sc.ResponseStartReplay:
-    """Simulates a game anew, seen by one of its players (his camera, his selection, his actions) or, by 0, all of it.
+    """Simulate a game again, as one of its players sees it (camera, selection, actions) or, with 0, all of it.
 
-    The players sit at their own interfaces, because what a click means depends on the size of the screen; to the
-    viewer clicks are reported in pixels of its own.
+    The players have their own interfaces, because the meaning of a click depends on the size of the screen; the viewer
+    gets reports of clicks in its own pixels.
     """
     try:
         replay = _read(process, request)
@@ -65,7 +65,7 @@ def _cannot_start(name: str, details: str) -> Failure:
 
 
 def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseReplayInfo:
-    """Map, players and length of a replay."""
+    """Return the map, players and length of a replay."""
     try:
         replay = _read(process, request)
     except _Unreadable as error:
@@ -99,7 +99,7 @@ def _actions_per_minute(replay: Replay, player: int) -> int:
 
 
 def _places(process: Process, path: str) -> list[Path]:
-    """Where a replay may be: in the install, or where the game itself looks on Linux."""
+    """Return where a replay may be: in the install, or where the game itself looks on Linux."""
     return [process.data_dir / "Replays" / path, Path.home() / "Documents/StarCraft II/Replays" / path]
 
 

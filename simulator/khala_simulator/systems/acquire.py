@@ -1,9 +1,9 @@
-"""Acquiring: whom a unit fights without being told, and when it gives up.
+"""Acquiring: which targets a unit chooses by itself, and when it gives up.
 
-Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk look at nobody. The
-best target is the one with the highest attack priority, then one that threatens the unit before one that is harmless to
-it, then the nearest. Who fires at something of a lower rank looks up now and then for something better. An idle unit
-remembers where it stood and goes back there; at the end of its leash it gives up and looks at nobody until it is nearly
+Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk do not. The best target
+is the one with the highest attack priority, then one that threatens the unit before one that is harmless to it, then
+the nearest. A unit that fires at something of a lower rank checks now and then for something better. An idle unit
+remembers where it stood and goes back there; at the end of its leash it gives up and ignores enemies until it is nearly
 back. One that is attacked from farther than it looks turns on the attacker, and so do its idle friends; a type that
 does not fight back runs.
 """
@@ -37,7 +37,7 @@ OUT_OF_SIGHT = -1e9
 
 
 def choose_targets(world: World) -> None:
-    """Answer attacks, give up lost causes, and let whoever is due look for a target."""
+    """Answer attacks, give up lost targets, and look for targets with the units that are due."""
     if world.hurt:
         _answer(world)
     period = MECHANICS.scan_period
@@ -69,7 +69,7 @@ def choose_targets(world: World) -> None:
 
 
 def _give_up(world: World, seekers: Ints) -> None:
-    """Let go of targets that went out of sight, can't be reached by one who holds, or led too far away."""
+    """Drop targets that went out of sight, that a holding unit can't reach, or that led too far away."""
     chasing = seekers[world.target.take(seekers) != NOBODY]
     if not chasing.size:
         return
@@ -83,7 +83,7 @@ def _give_up(world: World, seekers: Ints) -> None:
 
 
 def _slip_leash(world: World) -> None:
-    """Let units that gave a chase up look around again when they are nearly back, or were told something else."""
+    """End the leash of units that gave up a chase when they are nearly back, or have another order."""
     slots = which(world.leashed[: world.top])
     offset = world.guard.take(slots, 0) - world.pos.take(slots, 0)
     away = offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_reset**2
@@ -91,13 +91,13 @@ def _slip_leash(world: World) -> None:
 
 
 def _stays(world: World, slots: Ints) -> Bools:
-    """Whether each unit goes after nobody: it holds its place, or fires only at what it passes."""
+    """Return whether each unit chases no target: it holds its place, or fires only at what it passes."""
     stays: Bools = world.holds.take(slots) | ~world.looks_around.take(slots)
     return stays
 
 
 def _seen(world: World, slots: Ints) -> Bools:
-    """Whether each unit's owner sees its target."""
+    """Return whether each unit's owner sees its target."""
     target = world.target[slots]
     seen: Bools = world.visible[world.owner[slots], target]
     return seen
@@ -127,21 +127,21 @@ def _seek(world: World, player: int, seekers: Ints) -> None:
 
 
 def _rank(world: World, seekers: Ints, foes: Ints) -> Floats:
-    """What comes before the distance: each foe's priority, and whether it threatens the seeker beside it."""
+    """Return the ranks that come before distance: each foe's priority, and whether it threatens its seeker."""
     rank: Floats = world.priority.take(foes) * PRIORITY_WEIGHT
     rank += THREAT_WEIGHT * ((_threatened_planes(world, foes) & world.plane_bits.take(seekers)) != 0)
     return rank
 
 
 def _threatened_planes(world: World, foes: Ints) -> Ints:
-    """The planes each foe threatens; workers threaten nobody as long as they do not fight."""
+    """Return the planes that each foe threatens; workers are no threat as long as they do not fight."""
     calm = world.defensive.take(foes) & (world.target.take(foes) == NOBODY)
     planes: Ints = np.where(calm, 0, world.threat_bits.take(foes))
     return planes
 
 
 def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
-    """(k, m) edge distances, and the worth of every foe to every seeker."""
+    """Return (k, m) edge distances, and the worth of every foe to every seeker."""
     at, there = world.pos.take(seekers, 0), world.pos.take(foes, 0)
     dx = at[:, 0, None] - there[:, 0]
     dy = at[:, 1, None] - there[:, 1]
@@ -179,7 +179,7 @@ def _longest_reach(world: World, slots: Ints) -> Floats:
 
 
 def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
-    """Whether each seeker could fire at its foe from where it stands."""
+    """Return whether each seeker could fire at its foe from where it stands."""
     owner = world.owner[seekers]
     on_ground = (world.plane_bits[foes] & GROUND_PLANE != 0) & (world.ground_weapon[seekers] >= 0)
     weapon = np.where(on_ground, world.ground_weapon[seekers], world.air_weapon[seekers])
@@ -192,12 +192,12 @@ def _take(world: World, slot: int, target: int) -> None:
     if world.order_kind[slot] == IDLE and world.target[slot] == NOBODY and not world.returning[slot]:
         world.guard[slot] = world.pos[slot]
         world.returning[slot] = True
-    world.rank[slot] = OUT_OF_SIGHT  # a scan that found it says better
+    world.rank[slot] = OUT_OF_SIGHT  # a scan that found it knows better
     engage(world, slot, target)
 
 
 def _answer(world: World) -> None:
-    """Units under attack turn on their attackers and call their idle friends."""
+    """Turn attacked units on their attackers, and call their idle friends."""
     hurt, world.hurt = world.hurt, []
     for victim, attacker in hurt:
         if not (world.alive[victim] and world.alive[attacker]) or world.owner[victim] == world.owner[attacker]:
@@ -214,7 +214,7 @@ def _answer(world: World) -> None:
 
 
 def _flee(world: World, victim: int, attacker: int) -> None:
-    """Let an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
+    """Make an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
     x0, y0, x1, y1 = world.map.terrain.playable
     offset = world.pos[victim] - world.pos[attacker]
     away = offset / max(float(np.sqrt(offset[0] ** 2 + offset[1] ** 2)), 1e-9)

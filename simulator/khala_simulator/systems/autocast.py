@@ -1,7 +1,7 @@
-"""Autocast: units use abilities by themselves where their player lets them.
+"""Autocast: units use abilities by themselves where their player allows it.
 
-Looked over every few loops. A unit that walks or fights on order interrupts only for abilities that leave its orders
-alone; one that idles, patrols or attack-moves does it as an order of its own and goes on afterwards.
+Checked every few loops. A unit that walks or fights on order interrupts only for abilities that leave its orders alone;
+one that idles, patrols or attack-moves does it as an order of its own and goes on afterwards.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FREE = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, Or
 
 
 def look_out(world: World) -> None:
-    """Let every unit with autocast use what it may, in the order of slots."""
+    """Make every unit with autocast use its abilities, in the order of slots."""
     if not world.autocast or world.loop % MECHANICS.scan_period:
         return
     for slot in sorted(world.autocast):
@@ -54,7 +54,7 @@ def _try(world: World, slot: int, ability: Ability) -> bool:
 
 
 def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
-    """The cast that a unit would make of an ability now, or None."""
+    """Return the cast that a unit would make of an ability now, or None."""
     if casting.refusal(world, slot, ability) is not ActionResult.SUCCESS:
         return None
     pick = casting.skill_of(ability).pick
@@ -67,7 +67,7 @@ def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
 
 
 def _tempted(world: World, slot: int, ability: Ability) -> bool:
-    """Whether somebody is near who makes a unit use what is aimed at nobody, as when it comes out of the ground."""
+    """Return whether a unit is near that triggers an untargeted autocast, such as coming out of the ground."""
     filters = ability.autocast_filters
     return any(
         casting.fits(world, slot, other, filters) is ActionResult.SUCCESS for other in _near(world, slot, ability)
@@ -75,7 +75,7 @@ def _tempted(world: World, slot: int, ability: Ability) -> bool:
 
 
 def nearest(world: World, slot: int, ability: Ability) -> int:
-    """The nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
+    """Return the nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
     if Aim.UNIT not in ability.aim:
         return NOBODY
     for other in _near(world, slot, ability):
@@ -89,7 +89,7 @@ def nearest(world: World, slot: int, ability: Ability) -> int:
 
 
 def _near(world: World, slot: int, ability: Ability) -> list[int]:
-    """The units that autocast looks at, the nearest first: no foes or no friends where the filters leave these out."""
+    """Return the units that autocast considers, nearest first: no foes or no friends where the filters exclude them."""
     slots = world.live
     excluded = (*ability.filters.excluded, *ability.autocast_filters.excluded)
     if "Player" in excluded:

@@ -1,9 +1,9 @@
 """Avoidance: how a walker that bodies block finds a heading around them.
 
-A blocked walker looks in a fan of headings around its way, takes the free one that turns it least, and keeps to the
-side it has once chosen until it has got on for a while. Bodies that stand or come towards it and the terrain count as
-obstacles, those that go the same way are left to ``collision``. The game's own local avoidance is not known; all of
-this is an estimate.
+A blocked walker looks in a fan of headings around its way, takes the free one that turns it least, and keeps to its
+chosen side until it has made progress for a while. Bodies that stand or come towards it and the terrain count as
+obstacles, ``collision`` handles those that go the same way. The game's own local avoidance is not known; all of this is
+an estimate.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ AIR = Layer.AIR
 
 
 def find_headings(world: World) -> None:
-    """Write ``aside`` of walkers that have to go around somebody; it is looked over every few loops."""
+    """Write ``aside`` of walkers that have to go around others; it is checked every few loops."""
     n = world.top
     if not np.count_nonzero(world.detour[:n]):
         return
@@ -51,7 +51,7 @@ def find_headings(world: World) -> None:
 
 
 def begin(world: World, slots: Ints, shift: Floats) -> None:
-    """Let blocked walkers look for a way around, first on the side to which ``shift`` (k, 2) pushed them."""
+    """Make blocked walkers look for a way around, first on the side to which ``shift`` (k, 2) pushed them."""
     intended = world.intended.take(slots, 0)
     pushed = intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0]
     side = np.where(pushed >= 0.0, 1, -1)
@@ -77,14 +77,14 @@ def _look(world: World, slots: Ints) -> None:
 
 
 def _fan(way: Floats, side: Floats) -> Floats:
-    """(k, fan, 2) headings turned further and further to a side (1 is left)."""
+    """Return (k, fan, 2) headings turned further and further to a side (1 is left)."""
     sine = FAN_SIN * side[:, None]
     x, y = way[:, 0, None], way[:, 1, None]
     return np.stack([x * FAN_COS - y * sine, y * FAN_COS + x * sine], axis=2)
 
 
 def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Floats) -> Bools:
-    """(k, h) whether ``SEEN_AHEAD`` along each heading there is no wall and no body that stands or comes nearer."""
+    """Return (k, h) whether each heading is free for ``SEEN_AHEAD``: no wall, no body that stands or comes nearer."""
     free = np.ones(headings.shape[:2], dtype=np.bool_)
     k, body, apart = _in_the_way(world, slots, start, way)
     if k.size:
@@ -98,7 +98,7 @@ def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Float
 
 
 def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
-    """Bodies near ``slots`` that do not go their way: (p,) index into these, (p, 2) offset, (p,) distance to keep."""
+    """Return bodies near ``slots`` that block them: (p,) index into ``slots``, (p, 2) offset, (p,) distance to keep."""
     bodies = world.live[~world.walled[world.live]]
     number = np.full(world.top, -1)
     number[slots] = np.arange(len(slots))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run_out(world: World) -> None:
-    """Run the rules of buffs that are due, and take off those whose time is over."""
+    """Run the rules of buffs that are due, and remove those whose time is over."""
     if not len(world.buffs):
         return
     _tick(world)
@@ -31,7 +31,7 @@ def run_out(world: World) -> None:
 
 
 def _tick(world: World) -> None:
-    """Run the rules of buffs whose period has come; one that another rule takes off meanwhile does nothing more."""
+    """Run the rules of buffs whose period has come; a buff that another rule removes meanwhile does nothing more."""
     due = which(world.buffs.rows["due"] <= world.loop)
     for row in world.buffs.rows[due]:
         slot, kind = int(row["slot"]), world.catalog.buffs[int(row["buff"])]

@@ -1,4 +1,4 @@
-"""Casts: units come into reach, prepare, let their ability take effect, and hold what goes on from there.
+"""Casts: units come into reach, prepare, carry out their ability, and hold the channel that follows.
 
 A unit with an ability as its order walks until it is near enough (``engagement`` says where to), stands while it
 prepares, pays when the ability takes effect, and is then free again or holds a channel until the skill, a new order
@@ -34,7 +34,7 @@ def carry_on(world: World) -> None:
 
 
 def current(world: World, slot: int) -> Cast:
-    """The cast that a unit's current order asks for."""
+    """Return the cast of a unit's current order."""
     ability = casting.as_is(world, slot, world.catalog.ability(int(world.order_ability[slot])))
     x, y = world.order_point[slot].tolist()
     point = (x, y) if world.order_aimed[slot] else None
@@ -96,7 +96,7 @@ def _take_effect(world: World, cast: Cast) -> None:
 
 
 def finish(world: World, slot: int) -> None:
-    """End a unit's cast and begin what waits behind it."""
+    """End a unit's cast and begin the next order."""
     _end_channel(world, slot)
     commands.begin_next(world, slot)
 
@@ -122,7 +122,7 @@ def _end_channel(world: World, slot: int) -> None:
 
 
 def _face(world: World, cast: Cast) -> None:
-    """Turn to what the ability is aimed at; how long that takes in the game is not known."""
+    """Turn to the ability's target; how long that takes in the game is not known."""
     goal = world.pos[cast.target] if cast.target != NOBODY else cast.point
     if goal is None or world.unit_type(cast.slot).unturnable:
         return

@@ -1,10 +1,10 @@
 """Collision: bodies are pushed apart and kept off cliffs, structures and the edge of the map.
 
-All bodies take their intended step, overlapping pairs are pushed apart along the line between their centres a few
-times over, and finally everybody is put where its layer allows. Who gives way: a walker before one that fights, an
-idle unit before a friend that comes through, nobody before an enemy, and one that holds its place before nobody.
-Flyers pass through each other and drift apart where they stop. How much is an estimate (see ``data/mechanics.yaml``);
-that nobody ends inside a wall is not.
+All bodies take their intended step, overlapping pairs are pushed apart along the line between their centres a few times
+over, and finally every body is put where its layer allows. A walker gives way to a unit that fights, and an idle unit
+to a friend that comes through. No unit gives way to an enemy, and one that holds its place gives way to none. Flyers
+pass through each other and drift apart where they stop. How much is an estimate (see ``data/mechanics.yaml``), but no
+body ever ends inside a wall.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EIGHT_DIRECTIONS = np.array([(math.cos(i * math.pi / 4), math.sin(i * math.pi / 
 
 
 def separate(world: World) -> None:
-    """Carry out this loop's steps, push bodies apart and remember who could not get on."""
+    """Carry out this loop's steps, push bodies apart and remember blocked walkers."""
     if not world.anyone_moved and world.resting_version == world.population:
         return
     slots = world.live
@@ -58,10 +58,10 @@ def separate(world: World) -> None:
 
 
 def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> bool:
-    """Move overlapping bodies apart in place; returns whether anybody was touched.
+    """Move overlapping bodies apart in place; return whether any body was touched.
 
-    Walkers that are still inside somebody afterwards take their step back and are pushed from where they stood, so
-    that a crowd does not press itself together.
+    Walkers that still overlap afterwards take their step back and are pushed from where they stood, so that a crowd
+    does not press itself together.
     """
     bodies = bodies_of(world)
     found = bodies.near(after)
@@ -95,7 +95,7 @@ def _only(pairs: Pairs, chosen: Bools) -> Pairs:
 
 
 def _drift_apart(world: World, slots: Ints, at: Floats, pairs: Pairs) -> bool:
-    """Part flyers that hover over each other little by little, in place; those on their way pass through."""
+    """Separate flyers that hover over each other little by little, in place; those on their way pass through."""
     still = ~world.wants.take(slots) & ~world.holds.take(slots) & (world.step_max.take(slots) > 0.0)
     gives = still.take(pairs.one) & ~world.wants.take(slots).take(pairs.other)
     if not some(gives):
@@ -117,10 +117,10 @@ class _Pairs:
     one: Ints
     other: Ints
     apart: Floats  # distance to keep
-    share: Floats  # part of an overlap that ``one`` gives way
+    share: Floats  # part of an overlap by which ``one`` gives way
 
     def relax(self, at: Floats, rounds: int) -> Ints:
-        """Push overlapping pairs apart up to ``rounds`` times, in place; returns those that stay deep in each other."""
+        """Push overlapping pairs apart up to ``rounds`` times, in place; return those that stay deep in each other."""
         axes = np.ascontiguousarray(at.T)  # (2, n)
         one, other, n = self.one, self.other, len(at)
         while True:
@@ -141,7 +141,7 @@ class _Pairs:
 
 
 def _part(at: Floats, pairs: Pairs) -> None:
-    """Give bodies on the very same point a direction to part in: one of eight, by their numbers."""
+    """Give bodies on the very same point a direction to separate in: one of eight, by their numbers."""
     offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
     offset *= offset
     same = offset[:, 0] + offset[:, 1] < SAME_POINT
@@ -151,7 +151,7 @@ def _part(at: Floats, pairs: Pairs) -> None:
 
 
 def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
-    """How much of an overlap the first of each pair gives way; what is left is the other one's."""
+    """Return the share of an overlap by which the first of each pair gives way; the other takes the rest."""
     yielding, yielding_to_friend = _yielding(world, slots)
     mine, theirs = yielding.take(one), yielding.take(other)
     if yielding_to_friend is not None:
@@ -171,7 +171,7 @@ def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
 
 
 def _left(world: World, slots: Ints) -> Floats:
-    """How far each of ``slots`` has to its next corner, squared; who is nearer goes first."""
+    """Return the distance of each of ``slots`` to its next corner, squared; the nearer unit goes first."""
     offset = world.nav_point.take(slots, 0) - world.pos.take(slots, 0)
     offset *= offset
     left: Floats = offset[:, 0] + offset[:, 1]
@@ -179,7 +179,7 @@ def _left(world: World, slots: Ints) -> Floats:
 
 
 def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
-    """How easily each of ``slots`` is pushed by an enemy, and by a friend; None when that is the same for all."""
+    """Return how easily each of ``slots`` is pushed by an enemy, and by a friend; None when it is the same for all."""
     firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
     if census(world).low_priority_bodies:
         firm *= world.lightness.take(slots)
@@ -213,14 +213,14 @@ def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) 
 
 
 def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
-    """Those that are not where they were; only they are put right."""
+    """Return the bodies that have moved; only they need correction."""
     changed = before.take(bodies, 0) != after.take(bodies, 0)
     moved: Ints = bodies[changed[:, 0] | changed[:, 1]]
     return moved
 
 
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
-    """Positions (k, 2) kept a body's clearance away from blocked cells; what can't be helped stays where it was."""
+    """Return positions (k, 2) kept a body's clearance away from blocked cells; where there is no room they stay."""
     cell = surface.cell(after)
     corner = np.floor(after)
     room = clearance[:, None]
@@ -238,7 +238,7 @@ def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Float
 
 
 def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
-    """Where the new place is blocked: slide along one axis, else stay, else leave towards the nearest free cell."""
+    """Slide along one axis where the new place is blocked, else stay, else leave towards the nearest free cell."""
     after = np.minimum(np.maximum(after, 0.0), (surface.width - EDGE_MARGIN, surface.height - EDGE_MARGIN))
     bad = ~surface.flat.take(surface.cell(after))
     for axes in ((0,), (1,), ()):
@@ -258,7 +258,7 @@ def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
 
 
 def _note_blocked(world: World, slots: Ints, before: Floats, after: Floats) -> None:
-    """Count the loops in which walkers made no headway, and send those that are stuck around the obstacle."""
+    """Count the loops in which walkers made no headway, and send stuck ones around the obstacle."""
     intended = world.intended.take(slots, 0)
     real = after - before
     squared, along = intended * intended, real * intended

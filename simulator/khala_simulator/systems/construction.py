@@ -1,7 +1,7 @@
-"""Construction: unfinished structures get on, by themselves or while somebody works on them.
+"""Construction: unfinished structures progress, by themselves or while a builder works on them.
 
 A Terran builder has the order to follow its site, under the id of what it builds, and works when it is beside it; so
-anybody who is sent to an unfinished structure goes on with it. What is done grows life and shields evenly.
+any builder that is sent to an unfinished structure continues it. Life and shields grow evenly with the progress.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def run(world: World) -> None:
 
 
 def _note_builders(world: World, sites: Ints) -> None:
-    """Say which sites have somebody at work, and who that is."""
+    """Write which sites have a builder at work, and which one."""
     n = world.top
     world.site[:n] = -1
     is_site = np.zeros(world.capacity, dtype=np.bool_)
@@ -59,7 +59,7 @@ def _note_builders(world: World, sites: Ints) -> None:
 
 
 def is_work(world: World, slot: int) -> bool:
-    """Whether a unit's order is to build."""
+    """Return whether a unit's order is to build."""
     ability = world.catalog.ability_of_id.get(int(world.order_ability[slot]))
     return ability is not None and ability.effect == "build"
 

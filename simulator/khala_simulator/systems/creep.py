@@ -26,7 +26,7 @@ WITHERING: Final = "ZergBuildingNotOnCreep"
 
 
 def spread(world: World) -> None:
-    """Look for new and lost sources, let all take the steps that are due, and harm what has lost its creep."""
+    """Look for new and lost sources, take the steps that are due, and harm structures that have lost their creep."""
     creep = world.growth
     if creep.looked_at != world.population or (creep.sources and world.loop % LOOK_PERIOD == 0):
         _look_over(world)
@@ -37,7 +37,7 @@ def spread(world: World) -> None:
 
 
 def _look_over(world: World) -> None:
-    """Compare the sources with the units that are there."""
+    """Compare the sources with the present units."""
     creep = world.growth
     creep.looked_at = world.population
     slots = world.live[makers(world.catalog)[world.type[world.live]]]
@@ -60,7 +60,7 @@ def _look_over(world: World) -> None:
 
 
 def _generates(world: World, slot: int) -> bool:
-    """Whether creep comes from a unit now: a finished structure, or an Overlord told so that has stood long enough."""
+    """Return whether creep comes from a unit: a finished structure, or a generating Overlord that stood long enough."""
     spread = world.growth.spreads[world.unit_type(slot).name]
     if not spread.delay_loops:
         return bool(world.build_progress[slot] >= 1.0)
@@ -75,7 +75,7 @@ def _generates(world: World, slot: int) -> bool:
 
 
 def _old(world: World, slot: int) -> bool:
-    """Whether a source stands since the game began, and has all its creep."""
+    """Return whether a source exists since the game began, and has all its creep."""
     return bool(world.born_loop[slot] == 0) and not world.growth.spreads[world.unit_type(slot).name].delay_loops
 
 
@@ -85,7 +85,7 @@ def _cell(world: World, slot: int) -> tuple[int, int]:
 
 
 def _step(world: World) -> None:
-    """Let every source that is due cover a few cells more, or less."""
+    """Make every source that is due cover a few cells more, or less."""
     creep = world.growth
     changed = False
     for source in creep.sources:
@@ -116,12 +116,12 @@ def _wither(world: World) -> None:
 
 @lru_cache(maxsize=4)
 def makers(catalog: Catalog) -> Bools:
-    """(unit rows,) whether creep can come from units of the type."""
+    """Return (unit rows,) whether units of the type can generate creep."""
     known = spreads(catalog.version)
     return np.array([unit.name in known for unit in catalog.units])
 
 
 @lru_cache(maxsize=4)
 def needy(catalog: Catalog) -> Bools:
-    """(unit rows,) whether structures of the type wither off creep: those that need it and make none."""
+    """Return (unit rows,) whether structures of the type wither off creep: those that need it and make none."""
     return np.array([unit.structure and unit.needs_creep and not unit.makes_creep for unit in catalog.units])

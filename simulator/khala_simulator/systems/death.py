@@ -18,7 +18,7 @@ NO_KILLER = -1
 
 
 def bury(world: World) -> None:
-    """Remove every unit whose life is used up, in the order of slots, and whom their deaths kill in turn."""
+    """Remove every unit without life, in the order of slots, and those that their deaths kill in turn."""
     killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
     while True:
         slots = world.live
@@ -48,7 +48,7 @@ def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
 
 
 def _last_of_buffs(world: World, slot: int) -> None:
-    """Let what lies on a dying unit have its last effect."""
+    """Run the last effect of a dying unit's buffs."""
     for row in world.buffs.of(slot):
         rule = FINALS.get(world.catalog.buffs[int(row["buff"])].name)
         if rule is not None:

@@ -1,4 +1,4 @@
-"""Engagement: how far away every fight is, and where everybody wants to be this loop.
+"""Engagement: the distance of every fight, and where every unit wants to be this loop.
 
 Between choosing targets (``acquire``, orders) and acting on them (``weapons``, ``movement``). Writes the columns
 ``gap``, ``toward``, ``in_reach``, ``wants``, ``goal`` and ``stop_at``, which later systems of the same loop read.
@@ -29,7 +29,7 @@ ON_TARGET = 1e-9
 ARMS_LENGTH = 0.5
 """Weapons that reach no farther hit structures at their walls."""
 BESIDE_WALLS = 0.5
-"""So far from a wall the ways of small units lead past it."""
+"""Distance at which the ways of small units pass a wall."""
 FOLLOW_GAP = 0.5
 HARVEST_OVERLAP = 0.05
 FOLLOW = int(OrderKind.FOLLOW)
@@ -37,7 +37,7 @@ TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
 
 
 def measure(world: World) -> None:
-    """Measure the distance of every fight and say who wants to walk where."""
+    """Measure the distance of every fight and write which units want to walk where."""
     n = world.top
     target = world.target[:n]
     fighters = world.fighters = which(target >= 0)
@@ -66,7 +66,7 @@ def measure(world: World) -> None:
 
 
 def _close_in(world: World, slots: Ints) -> None:
-    """Distances, goals and reach of the units that fight."""
+    """Write the distances, goals and reach of the units that fight."""
     target = world.target.take(slots)
     goal = world.pos.take(target, 0)
     offset = goal - world.pos.take(slots, 0)
@@ -103,7 +103,7 @@ def _close_in(world: World, slots: Ints) -> None:
     beyond &= ~world.holds.take(slots)
     if kinds.guns_walking:
         rest = which(~world.walks.take(slots) | world.looks_around.take(slots))
-        if len(rest) < len(slots):  # who fires while it walks stays on its way
+        if len(rest) < len(slots):  # a unit that fires while it walks stays on its way
             slots, goal, bodies = slots[rest], goal[rest], bodies[rest]
             reach, beyond = reach[rest], beyond[rest]
     world.goal[slots] = goal
@@ -112,13 +112,13 @@ def _close_in(world: World, slots: Ints) -> None:
 
 
 def _to_walls(world: World, slots: Ints, targets: Ints) -> Floats:
-    """(k,) from the edges of units to the walls of structures, which may keep them out of reach of the middle."""
+    """Return (k,) the distances from edges of units to walls of structures, which may keep the middle out of reach."""
     beside = np.abs(world.pos.take(slots, 0) - world.pos.take(targets, 0)) - world.walls.take(targets, 0)
     return geometry.length(np.maximum(beside, 0.0)) - np.maximum(world.radius.take(slots), BESIDE_WALLS)
 
 
 def inside_zone(world: World, slots: Ints, targets: Ints) -> Bools:
-    """(k,) whether each target touches the circle in which alone the unit fires; most fire anywhere."""
+    """Return (k,) whether each target touches the only circle in which the unit fires; most units fire anywhere."""
     radius = world.zone_radius.take(slots)
     offset = world.pos.take(targets, 0) - world.zone.take(slots, 0)
     inside: Bools = geometry.length(offset) <= radius + world.radius.take(targets)
@@ -126,7 +126,7 @@ def inside_zone(world: World, slots: Ints, targets: Ints) -> Bools:
 
 
 def _follow(world: World) -> None:
-    """Units that follow another one walk until they are beside it."""
+    """Make units that follow another one walk until they are beside it."""
     n = world.top
     following = world.order_kind[:n] == FOLLOW
     if some(following):
@@ -140,7 +140,7 @@ def _follow(world: World) -> None:
 
 
 def _haul(world: World) -> None:
-    """Workers on their way to a resource or a town hall walk until they are there."""
+    """Make workers walk until they are at their resource or town hall."""
     n = world.top
     phase = world.harvest[:n]
     slots = which(((phase == TO_RESOURCE) | (phase == TO_HALL)) & (world.order_target[:n] >= 0))
@@ -155,7 +155,7 @@ def _haul(world: World) -> None:
 
 
 def _approach(world: World) -> None:
-    """Units that are to use an ability walk until it reaches, and stand from then on unless they have to follow."""
+    """Make casters walk until their ability reaches, and stand from then on unless they have to follow."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])
         ability = casting.as_is(world, slot, world.catalog.ability(int(world.order_ability[slot])))
@@ -177,7 +177,7 @@ def _approach(world: World) -> None:
 
 
 def _go_back(world: World) -> None:
-    """Idle units return to where they stood before a fight, and forget that place when they are there."""
+    """Send idle units back to where they stood before a fight; once there, they forget that place."""
     n = world.top
     slots = which(world.returning[:n] & (world.target[:n] == NOBODY))
     if slots.size:

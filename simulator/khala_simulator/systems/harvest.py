@@ -1,8 +1,8 @@
-"""Harvesting: workers take from their resources, carry it home, and change to another field when theirs is taken.
+"""Harvesting: workers take from their resources, deliver their loads, and change to another field when theirs is taken.
 
-What a round consists of stands in ``harvesting``; the way is ``engagement``'s and ``movement``'s. A mineral field has
-room for one worker at a time, except for those whose ability ``shares_patch``; in a gas structure one is out of sight
-while it works. How workers choose between fields is an estimate.
+``harvesting`` defines a round; ``engagement`` and ``movement`` have the way. A mineral field has room for one worker at
+a time, except for those whose ability ``shares_patch``; in a gas structure one is out of sight while it works. How
+workers choose between fields is an estimate.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def run(world: World) -> None:
 
 
 def _arrive(world: World, slot: int) -> None:
-    """A worker stands before its resource: it begins, waits, or looks for another one."""
+    """Make a worker at its resource begin, wait, or look for another one."""
     patch = int(world.order_target[slot])
     if patch == NOBODY or not harvesting.can_harvest(world, slot, patch) or world.contents[patch] <= 0:
         _look_elsewhere(world, slot)
@@ -97,7 +97,7 @@ def _begin(world: World, slot: int, patch: int) -> None:
 
 
 def _take(world: World, slot: int) -> None:
-    """The resource's time is over: the worker takes its load and makes room for the next one."""
+    """Give the worker its load at the end of the resource's time, and make room for the next worker."""
     patch = int(world.patch[slot])
     harvesting.leave(world, slot)
     if patch == NOBODY:
@@ -130,7 +130,7 @@ def _go_home(world: World, slot: int) -> None:
 
 
 def _drop_off(world: World, slot: int) -> None:
-    """Hand the load over; whoever has something else to do begins it, the others go back to their resource."""
+    """Deliver the load; a worker with another order begins it, the others go back to their resource."""
     hall = int(world.order_target[slot])
     if hall == NOBODY or world.build_progress[hall] < 1.0:
         _go_home(world, slot)
@@ -146,7 +146,7 @@ def _drop_off(world: World, slot: int) -> None:
 
 
 def deliver(world: World, slot: int) -> None:
-    """Enter what a worker carries into its owner's resources."""
+    """Add a worker's load to its owner's resources."""
     player = world.players[int(world.owner[slot])]
     amount = float(world.load[slot])
     gas = harvesting.carries_gas(world, slot)

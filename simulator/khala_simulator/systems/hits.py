@@ -1,7 +1,7 @@
-"""Hits: what a weapon has let go happens when it is due, at once, as a missile or as a sweep.
+"""Hits: the hits of a fired weapon happen when they are due, at once, as a missile or as a sweep.
 
 Between ``weapons``, which puts hits into ``pending`` at the damage point, and the rules that carry them out:
-``damage``, ``missiles``, ``sweeps``. The hits of a shot happen in the order of being due and fired; those of a dead
+``damage``, ``missiles``, ``sweeps``. Hits happen in the order in which they are due and were fired; those of a dead
 attacker are lost.
 """
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def fall_due(world: World) -> None:
-    """Let every hit that is due happen."""
+    """Carry out every hit that is due."""
     pending = world.pending
     if not len(pending):
         return

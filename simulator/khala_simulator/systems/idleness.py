@@ -1,4 +1,4 @@
-"""Idleness: how long workers and production structures had nothing to do, for the score; looked at once a second."""
+"""Idleness: how long workers and production structures had nothing to do, for the score; checked once a second."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ IDLE: Final = int(OrderKind.IDLE)
 
 @lru_cache(maxsize=4)
 def _rows(catalog: Catalog) -> tuple[Bools, Bools]:
-    """By unit row: who works, and which structures train."""
+    """Return, by unit row, which types are workers, and which structures train."""
     trains = [u.structure and any(a.effect == "train" for a in catalog.abilities_of(u.row)) for u in catalog.units]
     return np.array([u.worker for u in catalog.units]), np.array(trains)
 
 
 def count(world: World) -> None:
-    """Add a second for everybody who had nothing to do at the end of it."""
+    """Add a second for every unit that is idle at the end of it."""
     if world.loop % LOOPS_PER_NORMAL_SECOND:
         return
     works, trains = _rows(world.catalog)

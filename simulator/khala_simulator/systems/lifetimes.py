@@ -1,4 +1,4 @@
-"""Lifetimes: units whose life is timed die when it is over, killed by nobody."""
+"""Lifetimes: units whose life is timed die when it is over, without a killer."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def fly(world: World) -> None:
-    """Move all missiles by one loop and let those that arrive hit."""
+    """Move all missiles by one loop and carry out the hits of those that arrive."""
     missiles = world.missiles
     if not len(missiles):
         return

@@ -1,9 +1,9 @@
 """Movement: steps towards the next corner, along the headings of ``avoidance``; acceleration, braking and turning.
 
-Everybody steps as if alone; ``collision`` then carries the steps out, pushes bodies apart and off the walls, and
-notes who was blocked. Whoever needs time to stop brakes in time to stand exactly on its goal, and a flyer that no
-longer wants to go anywhere coasts to a stop. A ground unit has to face its way to make headway, a flyer flies where it
-is facing.
+Every unit steps as if alone; ``collision`` then carries the steps out, pushes bodies apart and off the walls, and notes
+blocked units. A unit that needs time to stop brakes in time to stand exactly on its goal, and a flyer that no longer
+wants to go anywhere coasts to a stop. A ground unit has to face its way to make headway, a flyer flies where it is
+facing.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def move(world: World) -> None:
 
 
 def _face_targets(world: World) -> None:
-    """Turn those who stand and fight to their target; turrets and what can't turn keep the body's heading."""
+    """Turn units that stand and fight to their target; turrets and units that can't turn keep the body's heading."""
     fighters = world.fighters
     turning = world.aim_cos.take(fighters) > -1.0
     turning &= ~world.turreted.take(fighters)
@@ -71,7 +71,7 @@ def _face_targets(world: World) -> None:
 
 
 def _coasting(world: World) -> Ints:
-    """Flyers that have speed left and nowhere to go."""
+    """Return flyers that have speed left and nowhere to go."""
     if not census(world).drifting_flyers:
         return NOBODY_COASTS
     n = world.top
@@ -83,7 +83,7 @@ def _coasting(world: World) -> Ints:
 
 
 def _drift(world: World, slots: Ints) -> Floats:
-    """(k, 2) their steps of this loop: as the last one, a little shorter."""
+    """Return (k, 2) their steps of this loop: as the last one, a little shorter."""
     last = world.intended.take(slots, 0)
     speed = np.maximum(world.speed.take(slots) - world.step_loss.take(slots), 0.0)
     drift: Floats = last * (speed / np.maximum(geometry.length(last), 1e-12))[:, None]
@@ -94,7 +94,7 @@ def _drift(world: World, slots: Ints) -> Floats:
 
 
 def _walk(world: World, walkers: Ints) -> None:
-    """Choose the steps of all who walk, and turn them."""
+    """Choose the steps of all walkers, and turn them."""
     pos = world.pos.take(walkers, 0)
     offset = world.nav_point.take(walkers, 0) - pos
     distance = geometry.length(offset)
@@ -118,7 +118,7 @@ def _walk(world: World, walkers: Ints) -> None:
 
 
 def _braked(world: World, walkers: Ints, speed: Floats, left: Floats, straight: Bools) -> Floats:
-    """Speeds from which each walker can still stop at its goal; one with another order behind it does not."""
+    """Return the speeds at which each walker can still stop at its goal; one with a further order does not stop."""
     if not census(world).brakers:
         return speed
     loss = world.step_loss.take(walkers)
@@ -134,7 +134,7 @@ def _braked(world: World, walkers: Ints, speed: Floats, left: Floats, straight: 
 
 
 def _turn(world: World, walkers: Ints, wanted: Floats, step: Floats, left: Floats) -> tuple[Floats, Floats]:
-    """Turn walkers to the wanted directions (k, 2); returns how far and which way they get in the meantime."""
+    """Turn walkers to the wanted directions (k, 2); return how far and which way they move meanwhile."""
     facing = world.heading.take(walkers, 0)
     product = facing * wanted
     error_cos = product[:, 0] + product[:, 1]

@@ -1,7 +1,7 @@
 """Navigation: the next corner on every walker's way, round cliffs and structures.
 
 A unit whose straight line is free heads for its goal; the others follow the shortest way over the cells, cut short to
-the farthest corner they can walk to straight. Bodies in the way are ``collision``'s matter.
+the farthest corner they can walk to straight. ``collision`` handles bodies in the way.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 CORNER_REACHED = 0.4
 NEAR_CORNER = 1.8
 HEADWAY = 0.25  # so much nearer to the goal counts as progress
-LOOK_PERIOD = 4  # looking over many at once costs little more than looking over one
+LOOK_PERIOD = 4  # checking many at once costs little more than checking one
 LAYERS = tuple(Layer)
 AIR = Layer.AIR
 
 
 def find_ways(world: World) -> None:
-    """Write ``nav_point`` of every unit that wants to move; ways are looked over every few loops."""
+    """Write ``nav_point`` of every unit that wants to move; ways are checked every few loops."""
     n = world.top
     walkers = which(world.wants[:n])
     if not walkers.size:
@@ -95,7 +95,7 @@ def _note_progress(world: World, slots: Ints) -> None:
 
 
 def _stopping_point(world: World, slots: Ints, goal: Floats) -> Floats:
-    """(k, 2) where each unit would stop on a straight way; a target on a footprint is reached from beside it."""
+    """Return (k, 2) where each unit would stop on a straight way; a target on a footprint is reached from beside it."""
     offset = world.pos.take(slots, 0) - goal
     distance = geometry.length(offset)
     share = np.minimum(world.stop_at.take(slots) / np.maximum(distance, 1e-12), 1.0)

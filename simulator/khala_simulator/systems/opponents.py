@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run(world: World) -> None:
-    """Let every computer player that leads a side think when its time has come."""
+    """Make every computer player that leads a side think when its time has come."""
     if world.opponents is None:
         world.opponents = tuple(_led(world))
     for player in world.opponents:
@@ -22,7 +22,7 @@ def run(world: World) -> None:
 
 
 def _led(world: World) -> list[int]:
-    """The computer players that the scenario gives to the game's own ways."""
+    """Return the computer players that the scenario leaves to the game's own."""
     specs = world.map.scenario.players
     return [
         player.id for player in world.players[1:]

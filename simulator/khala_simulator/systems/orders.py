@@ -13,17 +13,17 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
-CROWD_PERIOD = 2  # whether the crowd at a goal is dense is looked over so often
+CROWD_PERIOD = 2  # how often the density of the crowd at a goal is checked
 
 
 def carry_out(world: World) -> None:
-    """End every order whose point is reached or whose target is gone, and begin what waits behind it."""
+    """End every order whose point is reached or whose target is gone, and begin the next one."""
     for slot in _lost(world) + _arrived(world):
         commands.begin_next(world, slot)
 
 
 def _lost(world: World) -> list[int]:
-    """Slots whose order's target is dead, or out of their owner's sight; without fog only a change can bring that."""
+    """Return slots whose target is dead, or out of their owner's sight; without fog only a change causes that."""
     if not world.orders_changed and not world.fog:
         return []
     world.orders_changed = False
@@ -36,7 +36,7 @@ def _lost(world: World) -> list[int]:
 
 
 def _arrived(world: World) -> list[int]:
-    """Slots whose walk has reached its point, or as near as the crowd there or the terrain lets them."""
+    """Return slots whose walk has reached its point, or as near as the crowd there or the terrain allows."""
     n = world.top
     walkers = which(world.walks[:n] & ((world.target[:n] == NOBODY) | ~world.looks_around[:n]))
     if not walkers.size:

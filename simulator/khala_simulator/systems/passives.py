@@ -1,4 +1,4 @@
-"""Passives: what units do by their nature, in every loop, without being told."""
+"""Passives: what units do by their nature, in every loop, without an order."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def run(world: World) -> None:
 
 
 def _look_over(world: World) -> None:
-    """List the units whose types have a rule, after somebody came or went."""
+    """List the units whose types have a rule, after a unit came or went."""
     world.passive_units_at, world.passive_units = world.population, {}
     for slot in world.live.tolist():
         name = world.unit_type(slot).name

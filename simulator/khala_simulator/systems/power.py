@@ -1,4 +1,4 @@
-"""Power: looked over when somebody came or went, was finished, or changed its kind."""
+"""Power: checked when a unit comes or goes, is finished, or changes its kind."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def run(world: World) -> None:
-    """Say which structures have power, if anything changed since the last time."""
+    """Write which structures have power, if anything changed since the last time."""
     if world.powered_at == world.population:
         return
     world.powered_at = world.population

@@ -1,4 +1,4 @@
-"""Production: what stands first in the queues of structures and eggs gets on, and what is done comes into the world.
+"""Production: the first jobs in the queues of structures and eggs progress, and finished products enter the world.
 
 Work passes at the structure's rate (Chrono Boost), not at all in one that is unfinished, stunned or without power.
 The next of a queue begins in the loop in which the one before is done, so that births follow each other a loop sooner
@@ -71,13 +71,13 @@ def _begin(world: World, slot: int, job: Job) -> bool:
 
 
 def finish(world: World, slot: int, job: Job) -> None:
-    """Let what a job makes come into the world."""
+    """Put a job's product into the world."""
     production.drop(world, slot, job)
     FINISH.get(job.kind, _nothing)(world, slot, job)
 
 
 def _nothing(_: World, __: int, ___: Job) -> None:
-    """The structure itself was what was made."""
+    """Do nothing: the structure itself is the product."""
 
 
 # units ----------------------------------------------------------------------------------------------------------------
@@ -103,7 +103,7 @@ def _born(world: World, slot: int, job: Job) -> None:
 
 
 def _put_outside(world: World, slot: int, parent: UnitType, unit: UnitType, rally: Rally | None) -> int:
-    """A new unit before the side of its structure that is nearest to where it is sent, by default the south."""
+    """Return a new unit, put before the side of its structure nearest to its rally point, by default the south."""
     x, y = world.pos[slot].tolist()
     across, along = SOUTH
     if rally is not None:
@@ -118,7 +118,7 @@ def _put_outside(world: World, slot: int, parent: UnitType, unit: UnitType, rall
 
 
 def rally_of(world: World, slot: int, unit: UnitType) -> Rally | None:
-    """Where a structure sends a new unit; an egg without a rally point of its own asks the nearest town hall."""
+    """Return where a structure sends a new unit; an egg without a rally point of its own asks the nearest town hall."""
     found = world.rallies.get(slot)
     if found is None and not world.unit_type(slot).structure:
         found = world.rallies.get(_nearest_parent(world, slot))
@@ -139,7 +139,7 @@ def _nearest_parent(world: World, slot: int) -> int:
 
 
 def _armed(world: World, slot: int, _: Job) -> None:
-    """A Carrier's new Interceptor is in its hangar at once."""
+    """Put a Carrier's new Interceptor into its hangar at once."""
     carrier.add_interceptor(world, slot)
 
 

@@ -37,7 +37,7 @@ def _regain(world: World, amount: Floats, most: Floats, rate: Floats, delay: Flo
 
 
 def _drain(world: World) -> None:
-    """Take energy from units that spend more than they regain; the rule that makes them spend looks at what is left."""
+    """Take energy from units that spend more than they regain; the rule that makes them spend checks the rest."""
     n = world.top
     slots = which(world.energy_regen[:n] < 0.0)
     if slots.size:

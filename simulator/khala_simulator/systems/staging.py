@@ -1,7 +1,7 @@
-"""Staging: what a map's script does to the world, from the units that stand there at the start to the result.
+"""Staging: what a map's script does to the world, from the units at the start to the result.
 
-One function for each kind of action of ``script``. When one is due is for ``triggers``; where there is room is for
-``placement``.
+One function for each kind of action of ``script``. ``triggers`` decides when one is due, ``placement`` where there is
+room.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ def act(world: World, action: Action, subject: int) -> None:
 
 
 def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]:
-    """Make the units of a specification, and return their slots; nobody is made for a player who is not there.
+    """Make the units of a specification, and return their slots; an absent player gets none.
 
-    A single unit that is ``placed`` on the map stands exactly at its point, whoever else is there.
+    A single unit that is ``placed`` on the map stands exactly at its point, whatever else is there.
     """
     if spec.player >= len(world.players):
         return []
@@ -106,7 +106,7 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]
 
 
 def _places(world: World, unit: UnitType, spec: CreateSpec) -> Iterator[tuple[float, float, float]]:
-    """x, y and facing of every unit, one after the other, because a random place looks at those before it."""
+    """Yield x, y and facing of every unit, one after the other, because a random place depends on those before it."""
     facing = 0.0 if spec.facing == "random" else spec.facing
     for place in _spots(world, unit, spec.at, spec.count):
         turned = place[2] if len(place) > 2 else facing
@@ -132,7 +132,7 @@ def _spots(world: World, unit: UnitType, at: Any, count: int) -> Iterator[tuple[
 
 
 def random_place(world: World, unit: UnitType, at: RandomPlace) -> Point:
-    """A point of the region on which the unit can stand, so far from others as is said, drawn by chance."""
+    """Return a random point of the region on which the unit can stand, with the required distance to others."""
     region = world.map.scenario.regions[at.random_in]
     best, best_slack = (0.0, 0.0), -math.inf
     for point in _points_in(world, region):
@@ -147,7 +147,7 @@ def random_place(world: World, unit: UnitType, at: RandomPlace) -> Point:
 
 
 def _points_in(world: World, region: Region) -> Iterator[Point]:
-    """Points of a region, uniformly; a region that lies in its box so thinly that no try meets it has its middle."""
+    """Yield uniform random points of a region; for a region too thin to hit within its box, its middle."""
     x0, y0, x1, y1 = region.box
     yielded = False
     for _ in range(DRAWS):
@@ -189,7 +189,7 @@ def _regroup(world: World, spec: RegroupSpec) -> None:
 
 
 def units_like(world: World, who: Who) -> Ints:
-    """Slots of the living units in the world that fit, ascending."""
+    """Return the slots of the living units in the world that fit, ascending."""
     slots = world.live
     if who.player is not None:
         slots = slots[world.owner[slots] == who.player]
@@ -239,7 +239,7 @@ def _command(world: World, spec: OrderSpec, slots: list[int], *, queue: bool) ->
 
 
 def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> None:
-    """Each transport among the slots unloads everybody at the point."""
+    """Make each transport among the slots unload every passenger at the point."""
     for slot in slots:
         card = world.catalog.cards[int(world.type[slot])]
         ability = next((ability for ability in card if ability.effect == "unload_all_at"), None)
@@ -248,7 +248,7 @@ def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> Non
 
 
 def _attack_all(world: World, slots: list[int], victims: Ints, *, queue: bool) -> None:
-    """Each of the slots attacks every victim, the nearest first."""
+    """Make each of the slots attack every victim, the nearest first."""
     for slot in slots:
         offset = world.pos[victims] - world.pos[slot]
         nearest_first = victims[np.argsort(offset[:, 0] ** 2 + offset[:, 1] ** 2, kind="stable")]
@@ -260,7 +260,7 @@ def _attack_all(world: World, slots: list[int], victims: Ints, *, queue: bool) -
 
 
 def point_of(world: World, place: Any) -> Point:
-    """World coordinates of a named point, one that was drawn included, or of a pair of numbers."""
+    """Return the world coordinates of a named point (drawn ones included) or of a pair of numbers."""
     if isinstance(place, str):
         drawn = world.script.points.get(place)
         return world.map.scenario.points[place] if drawn is None else drawn

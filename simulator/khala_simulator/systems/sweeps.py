@@ -1,7 +1,7 @@
 """Sweeps: lines drawn point by point through the ranks, as the Colossus' beams, the Lurker's spines and flames are.
 
-A unit is touched by the first point that reaches its edge when that point's time has come, so that one can walk out of
-the way of spines; it is hit once per sweep, some loops later where the game waits. A sweep ends with its attacker.
+A unit is touched by the first point that reaches its edge when that point's time has come, so that a unit can walk out
+of the way of spines; it is hit once per sweep, some loops later where the game waits. A sweep ends with its attacker.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _line(world: World, shot: Shot) -> records.SweepRecord:
 
 
 def _draw(world: World, sweep: Sweep) -> None:
-    """Touch whoever is at the points that are due."""
+    """Touch the units at the points that are due."""
     shot = sweep.shot
     line = _line(world, shot)
     if shot.source == NOBODY:
@@ -82,7 +82,7 @@ def _delay(line: records.SweepRecord, point: int) -> float:
 
 
 def _places(world: World, shot: Shot, line: records.SweepRecord, first: int, end: int) -> Floats:
-    """(k, 2) where the points from ``first`` up to ``end`` are, those past the weapon's reach left out."""
+    """Return (k, 2) where the points from ``first`` up to ``end`` are, without those past the weapon's reach."""
     fx, fy = shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1]
     distance = math.sqrt(fx * fx + fy * fy)
     fx, fy = (fx / distance, fy / distance) if distance > ON_TARGET else (0.0, -1.0)

@@ -1,4 +1,4 @@
-"""Triggers: the map's own script, as its scenario tells it."""
+"""Triggers: the map's own script, as its scenario defines it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FINISHED = 1.0
 
 
 def players_of(game_map: GameMap) -> list[PlayerSetup]:
-    """The players as the scenario seats them; one with an open slot is led by the computer."""
+    """Return the players as the scenario seats them; one with an open slot is led by the computer."""
     seats = sorted(game_map.scenario.players.items())
     return [PlayerSetup(i, p.race, "agent" if p.control == "agent" else "computer") for i, p in seats]
 
@@ -73,7 +73,7 @@ def _do(world: World, trigger: Trigger, subject: int) -> None:
 
 
 def _occasions(world: World, number: int, trigger: Trigger, deaths: list[Death]) -> Iterator[int]:
-    """How often the trigger is due in this loop: the unit that each is about, NOBODY for none in particular."""
+    """Yield the unit of each occasion on which the trigger is due in this loop, NOBODY for none in particular."""
     plain = False
     for when in trigger.when:
         if isinstance(when, Died):
@@ -113,7 +113,7 @@ def _made(world: World, who: Who) -> Iterator[int]:
 
 
 def _inside(world: World, spec: EnterSpec) -> frozenset[int]:
-    """Tags of the units in the region that the trigger is about."""
+    """Return the tags of the units in the region that the trigger is about."""
     slots = world.live[world.owner[world.live] != NEUTRAL]
     if spec.player is not None:
         slots = slots[world.owner[slots] == spec.player]
@@ -130,7 +130,7 @@ def _entered(world: World, number: int, spec: EnterSpec) -> bool:
 
 
 def _touched(world: World, spec: TouchSpec) -> Iterator[int]:
-    """Slots of the neutral units that are touched; each is looked at again, for one may be gone by then."""
+    """Yield slots of the touched neutral units; each is checked again, because it may be gone by then."""
     row = world.catalog.unit(spec.unit).row
     mine = world.units_of(spec.player)
     neutral = world.live[(world.owner[world.live] == NEUTRAL) & (world.type[world.live] == row)]
@@ -160,12 +160,12 @@ def _holds(world: World, condition: Condition | None) -> bool:
 
 
 def _score(world: World, player: int) -> float:
-    """The curriculum score of a player; who is not there has none."""
+    """Return the curriculum score of a player; an absent player has none."""
     return world.players[player].score.curriculum if player < len(world.players) else 0.0
 
 
 def _counts(world: World, asked: Iterable[tuple[int, dict[str, Comparison]]], least: float) -> bool:
-    """Whether every number of units of a type is as asked, among those that are finished to at least ``least``."""
+    """Return whether every number of units of a type fits, among those that are finished to at least ``least``."""
     for player, types in asked:
         slots = _owned(world, player, least)
         rows = np.bincount(world.type[slots], minlength=len(world.catalog.units))
@@ -176,7 +176,7 @@ def _counts(world: World, asked: Iterable[tuple[int, dict[str, Comparison]]], le
 
 
 def _owned(world: World, player: int, least: float) -> Ints:
-    """Slots of all of a player's units, passengers included, hallucinations not."""
+    """Return the slots of all of a player's units, with passengers, without hallucinations."""
     mine = world.alive & (world.owner == player) & (world.build_progress >= least) & ~world.hallucination
     slots: Ints = np.flatnonzero(mine)
     return slots

@@ -1,8 +1,8 @@
 """Vision: what each player sees, where the map has a fog of war.
 
 A cell is visible when its centre is within the sight of a unit of the player's and not above the unit's own cliff
-level, unless the unit flies. On maps whose script takes the fog away everybody sees everything. Units that are cloaked
-or burrowed are seen where a detector of the player's, a scan, or a buff that reveals them looks.
+level, unless the unit flies. On maps whose script removes the fog every player sees everything. Units that are cloaked
+or burrowed are seen where a detector of the player, a scan, or a revealing buff covers them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FROM_ABOVE = 1 << 20  # higher than any cliff: nothing hides from it
 
 
 def look(world: World) -> None:
-    """Update ``visibility`` and ``visible``; where there is fog or somebody hides, every few loops."""
+    """Update ``visibility`` and ``visible``; where there is fog or a unit hides, every few loops."""
     n = world.top
     changed = world.looked_at != world.population
     due = world.loop % MECHANICS.vision_period == 0 or changed
@@ -62,7 +62,7 @@ def _seen_units(world: World, player: int) -> NDArray[np.bool_]:
 
 
 def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(k,) whether a detector or a scan of the player's reaches each unit's edge."""
+    """Return (k,) whether a detector or a scan of the player reaches each unit's edge."""
     eyes = world.units_of(player)
     eyes = eyes[world.detects[eyes] > 0.0]
     scans = [item for item in world.area_effects if item.detects and item.owner == player]
@@ -75,7 +75,7 @@ def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.
 
 
 def _reveal(world: World) -> None:
-    """Show units under a revealing buff to whoever laid it on them."""
+    """Show units under a revealing buff to the player that applied it."""
     for row in world.buffs.rows:
         if "revealed" in world.catalog.buffs[int(row["buff"])].flags:
             world.visible[int(row["owner"]), int(row["slot"])] = True
@@ -93,7 +93,7 @@ def _light(world: World, player: int) -> None:
     level = cliff[inside[:, 1], inside[:, 0]].astype(np.int64) + MECHANICS.high_ground_step
     level[world.layer[slots] == Layer.AIR.value] = FROM_ABOVE
     eyes.update(zip(*cells.T.tolist(), world.sight[slots].tolist(), level.tolist(), strict=True))
-    for x, y, radius, below in eyes:  # who looks from the same cell sees the same, and the order does not matter
+    for x, y, radius, below in eyes:  # units in the same cell see the same, and the order does not matter
         mask, half = _disc(radius)
         left, low = max(x - half, 0), max(y - half, 0)
         right, high = max(min(x + half + 1, width), left), max(min(y + half + 1, height), low)
@@ -104,7 +104,7 @@ def _light(world: World, player: int) -> None:
 
 
 def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]]:
-    """Places that a player sees without a unit there, with the radius: by its area effects and its buffs on others."""
+    """Return places that a player sees without a unit there, with the radius: by area effects and buffs on others."""
     lights = [(item.at, item.sights) for item in world.area_effects if item.sights and item.owner == player]
     rows = world.buffs.rows
     for row in rows[np.isin(rows["buff"], _lighting(world.catalog)) & (rows["owner"] == player)] if len(rows) else ():
@@ -115,13 +115,13 @@ def _lights(world: World, player: int) -> list[tuple[tuple[float, float], float]
 
 @lru_cache(maxsize=4)
 def _lighting(catalog: Catalog) -> NDArray[np.int64]:
-    """Rows of the kinds of buffs that light the ground around their bearers."""
+    """Return the rows of the kinds of buffs that light the ground around their bearers."""
     return np.array([kind.row for kind in catalog.buffs if kind.lights], dtype=np.int64)
 
 
 @lru_cache(maxsize=64)
 def _disc(radius: float) -> tuple[NDArray[np.bool_], int]:
-    """The cells within a radius as a square mask, and how far its middle is from its edge."""
+    """Return the cells within a radius as a square mask, and how far its middle is from its edge."""
     cells = geometry.disc_cells(radius)
     half = int(np.abs(cells).max(initial=0))
     mask = np.zeros((2 * half + 1, 2 * half + 1), dtype=np.bool_)

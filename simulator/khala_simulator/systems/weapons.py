@@ -2,8 +2,8 @@
 
 The time from one start to the next is the period with a random delay; fractions of a loop carry over while the fight
 goes on, so that the mean is exact. A beam ticks once per period without any delay, for as long as its target stays
-within its slop. What the attack then does, at once, later or by missile, is laid into ``pending`` for ``hits``; weapons
-that send out units instead stand in ``LAUNCHERS``.
+within its slop. The hits of the attack, at once, later or by missile, are put into ``pending`` for ``hits``; weapons
+that send out units instead are in ``LAUNCHERS``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadi
 
 
 def fire(world: World) -> None:
-    """Start attacks, let those whose damage point has come take effect, and count down."""
+    """Start attacks, carry out those whose damage point has come, and count down."""
     n = world.top
     cooldown, windup, backswing = world.cooldown[:n], world.windup[:n], world.backswing[:n]
     cooldown -= cooldown > 0.0
@@ -57,7 +57,7 @@ def fire(world: World) -> None:
 
 
 def _drop_lost(world: World, lost: Ints) -> None:
-    """Attacks whose target got away before the damage point leave no cooldown."""
+    """Drop attacks whose target got away before the damage point; they leave no cooldown."""
     if lost.size:
         world.windup[lost] = NOT_STARTED
         world.cooldown[lost] = 0.0
@@ -77,7 +77,7 @@ def _turn_turrets(world: World, slots: Ints) -> None:
 
 
 def _aimed(world: World, slots: Ints) -> Bools:
-    """Whether each unit's body, or its turret, faces its target within the weapon's arc."""
+    """Return whether each unit's body, or its turret, faces its target within the weapon's arc."""
     least = world.aim_cos.take(slots)
     any_way = least <= -1.0
     if np.count_nonzero(any_way) == len(any_way):
@@ -106,7 +106,7 @@ def _start(world: World, slots: Ints) -> None:
 
 
 def _weapon_at_hand(world: World, slot: int) -> int:
-    """Row of the weapon for this attack: the one for close targets when the target stands that close."""
+    """Return the row of the weapon for this attack: the one for close targets when the target stands that close."""
     close = int(world.close_weapon[slot])
     if close >= 0 and world.weapon[slot] in (close, world.ground_weapon[slot]):
         near = world.gap[slot] <= world.close_range[slot]
@@ -115,7 +115,7 @@ def _weapon_at_hand(world: World, slot: int) -> int:
 
 
 def _take_effect(world: World, slots: Ints) -> None:
-    """Lay the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
+    """Put the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
     rows = world.weapon[slots]
     moment = world.loop + world.windup[slots]
     for row in dict.fromkeys(rows.tolist()):
@@ -133,7 +133,7 @@ def _take_effect(world: World, slots: Ints) -> None:
 
 
 def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) -> None:
-    """Lay one hit of the attacks whose damage point was at ``moment`` (k,); bounces follow from the hit before."""
+    """Put one hit of the attacks whose damage point was at ``moment`` (k,); bounces follow from the hit before."""
     hit = weapon.hits[index]
     if hit.bounce:
         return
@@ -142,7 +142,7 @@ def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) 
         chosen = _branch(world, hit, weapon, slots, target)
         slots, target, moment = slots[chosen], target[chosen], moment[chosen]
     if slots.size:
-        at = slots if weapon.is_kamikaze else target  # who blows himself up is the middle of it
+        at = slots if weapon.is_kamikaze else target  # a suicide attacker is the middle of it
         world.pending.append(
             len(slots),
             source=slots,
@@ -162,7 +162,7 @@ def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) 
 
 
 def _branch(world: World, hit: Hit, weapon: Weapon, source: Ints, target: Ints) -> Bools:
-    """(k,) whether the game's switch takes the branch ``hit`` stands in; unknown conditions never hold."""
+    """Return (k,) whether the game's switch takes the branch of ``hit``; unknown conditions never hold."""
     if hit.when == "else":
         others = [h.when for h in weapon.hits if h.when not in ("", "else")]
         taken = np.zeros(len(target), dtype=np.bool_)

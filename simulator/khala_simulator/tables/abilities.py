@@ -1,7 +1,7 @@
-"""What an ability is: whom it belongs to, what it is aimed at, what it costs, and which skill carries it out.
+"""What an ability is: which units have it, what it is aimed at, what it costs, and which skill carries it out.
 
-Data only, one record per specific ability id of the API, read from the shipped tables by ``catalog``. Whether a unit
-may use one now, and what happens then, is ``casting``'s matter; the rule behind each is a ``skills.Skill``, named by
+Data only, one record per specific ability id of the API, read from the shipped tables by ``catalog``. ``casting``
+decides whether a unit may use one now, and what happens then; the rule behind each is a ``skills.Skill``, named by
 ``effect``.
 """
 
@@ -46,7 +46,7 @@ class Need:
 
 @dataclass(frozen=True, slots=True)
 class Charges:
-    """Uses that come back one by one: how many at most and at the start, and loops for one to come back."""
+    """Uses that come back one by one: the number at most and at the start, and the loops for one to come back."""
 
     max: int
     start: int
@@ -67,10 +67,9 @@ class Filter:
 class Ability:
     """One specific ability; distances are world units, ``range`` from edge to edge, 500 is the whole map.
 
-    ``general`` is the id under which clients may also ask for it, ``solo`` says that of several units told to use it
-    only one does, ``transient`` that it leaves the unit's orders alone, ``overhead`` that the unit has to be right
-    above the point. ``count`` is how many it makes, ``supply`` what they use in all. ``numbers`` are the skill's own
-    figures.
+    ``general`` is the id under which clients may also ask for it, ``solo`` means that only one of several ordered units
+    uses it, ``transient`` that it leaves the unit's orders alone, ``overhead`` that the unit has to be right above the
+    point. ``count`` is how many it makes, ``supply`` their supply in all. ``numbers`` are the skill's own numbers.
     """
 
     id: int
@@ -118,7 +117,7 @@ class Ability:
 
     @property
     def requires_point(self) -> bool:
-        """Whether it must be aimed, as the API's list of available abilities says it."""
+        """Whether it must be aimed, in the terms of the API's list of available abilities."""
         return Aim.NONE not in self.aim
 
     @property
@@ -128,7 +127,7 @@ class Ability:
 
 
 def ability_from(raw: dict[str, Any]) -> Ability:
-    """The record in one row of ``abilities.json``."""
+    """Return the record in one row of ``abilities.json``."""
     raw = dict(raw)
     charges = raw.pop("charges", None)
     return Ability(
@@ -145,7 +144,7 @@ def ability_from(raw: dict[str, Any]) -> Ability:
 
 
 def filter_from(text: str) -> Filter:
-    """The filter in ``"Required,Words;Excluded,Words"``; "-" stands for none."""
+    """Return the filter in ``"Required,Words;Excluded,Words"``; "-" stands for none."""
     required, _, excluded = text.partition(";")
 
     def words(part: str) -> tuple[str, ...]:
@@ -155,7 +154,7 @@ def filter_from(text: str) -> Filter:
 
 
 def need_from(raw: dict[str, Any] | None) -> Need | None:
-    """The condition in a row of the tables, or None."""
+    """Return the condition in a row of the tables, or None."""
     if raw is None:
         return None
     kind = next(

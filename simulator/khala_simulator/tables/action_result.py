@@ -1,7 +1,7 @@
 """Why a command can't be carried out, with the names and numbers of the API's ``ActionResult``.
 
-The world refuses with a value, never with an exception: a wrong command is an everyday thing. Success is one of them,
-so that a check has one type.
+The world refuses with a value, never with an exception: wrong commands are normal. Success is one of the values, so
+that a check has one type.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ NOT_REQUIRED: Final = {
     "Player": _R.MUST_TARGET_YOUR_OWN_UNITS,
     "Enemy": _R.MUST_TARGET_ENEMY_UNITS,
 }
-"""What is said of a target that lacks a word that a filter requires."""
+"""The refusal of a target that lacks a word that a filter requires."""
 
 EXCLUDED: Final = {
     "Self": _R.CANT_TARGET_THAT_UNIT,
@@ -156,4 +156,4 @@ EXCLUDED: Final = {
     "Summoned": _R.CANT_TARGET_SUMMONED_UNITS,
     "Destructible": _R.CANT_TARGET_DESTRUCTIBLES,
 }
-"""What is said of a target that a filter leaves out."""
+"""The refusal of a target that a filter excludes."""

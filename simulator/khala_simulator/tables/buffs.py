@@ -1,6 +1,6 @@
-"""Kinds of buffs: what one changes of a unit's numbers or of what it may do, as the tables say it.
+"""Kinds of buffs: how the tables say they change a unit's numbers or what it may do.
 
-Which ones a unit bears is in ``active_buffs``; the rules are in ``buffs`` and ``traits``.
+``active_buffs`` holds the ones of each unit; the rules are in ``buffs`` and ``traits``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class Buff:
-    """One kind of buff; ``id`` is the API's number or 0 where clients are not told of it.
+    """One kind of buff; ``id`` is the API's number or 0 where clients do not see it.
 
     ``loops`` 0 is without an end. Factors multiply, ``_add`` adds; a name ending in ``_n`` is per normal second.
     """
@@ -60,7 +60,7 @@ class Buff:
     shield_armor_add: float = 0.0
     sight_add: float = 0.0
     detect: float = 0.0
-    lights: float = 0.0  # radius around its bearer in which who laid it on sees the ground
+    lights: float = 0.0  # radius around its bearer in which its caster's owner sees the ground
     radar: float = 0.0
     supply: float = 0.0
     life_regen_n: float = 0.0
@@ -76,7 +76,7 @@ class Buff:
 
 
 def buff_from(row: int, raw: dict[str, Any]) -> Buff:
-    """The record in one row of ``buffs.json``."""
+    """Return the record in one row of ``buffs.json``."""
     raw = dict(raw)
     response = raw.pop("response", None)
     if response is not None:

@@ -52,15 +52,15 @@ VERSION_OF_BUILD: Final = {75689: "4.10", 92440: "5.0.13"}
 
 
 class CatalogError(ValueError):
-    """A table version, unit or weapon that is not in the data was asked for."""
+    """A table version, unit or weapon that is not in the data was requested."""
 
 
 @dataclass(frozen=True, eq=False)
 class Catalog:
     """All tables of one game version, with look-up by id and by name.
 
-    ``cards`` and ``ordinary`` go by unit row: what units of a type can be told, and by which ability ids they move,
-    attack, patrol, hold and stop.
+    ``cards`` and ``ordinary`` are by unit row: the commands of a type, and the ability ids by which it moves, attacks,
+    patrols, holds and stops.
     """
 
     version: str
@@ -80,32 +80,32 @@ class Catalog:
     upgrade_of: dict[int | str, Upgrade]
 
     def unit(self, key: int | str) -> UnitType:
-        """The unit type with this API id or this name; raises ``CatalogError`` when there is none."""
+        """Return the unit type with this API id or this name; raise ``CatalogError`` when there is none."""
         row = self.row_of_id.get(key) if isinstance(key, int) else self.row_of_name.get(key)
         if row is None:
             raise CatalogError(f"no unit type {key!r} in the tables of version {self.version}")
         return self.units[row]
 
     def ability(self, number: int) -> Ability:
-        """The specific ability with this API id; raises ``CatalogError`` when there is none."""
+        """Return the specific ability with this API id; raise ``CatalogError`` when there is none."""
         found = self.ability_of_id.get(number)
         if found is None:
             raise CatalogError(f"no ability {number} in the tables of version {self.version}")
         return found
 
     def abilities_of(self, row: int) -> tuple[Ability, ...]:
-        """What units of the type in this row can be told to do, by ascending id."""
+        """Return the abilities of units of the type in this row, by ascending id."""
         return self.cards[row]
 
     def buff(self, name: str) -> Buff:
-        """The buff with this name; raises ``CatalogError`` when there is none."""
+        """Return the buff with this name; raise ``CatalogError`` when there is none."""
         found = self.buff_of_name.get(name)
         if found is None:
             raise CatalogError(f"no buff {name!r} in the tables of version {self.version}")
         return found
 
     def upgrade(self, key: int | str) -> Upgrade:
-        """The upgrade with this API id or this name; raises ``CatalogError`` when there is none."""
+        """Return the upgrade with this API id or this name; raise ``CatalogError`` when there is none."""
         found = self.upgrade_of.get(key)
         if found is not None:
             return found
@@ -114,7 +114,7 @@ class Catalog:
 
 @lru_cache(maxsize=4)
 def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
-    """The tables of a game version, given as "4.10" or as its build number 75689.
+    """Return the tables of a game version, given as "4.10" or as its build number 75689.
 
     Raises:
         CatalogError: no tables for this version are shipped.
@@ -151,12 +151,12 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
 
 
 WALK_BY_UPGRADE: Final = frozenset({"RoachBurrowed"})
-"""Types without a speed of their own that an upgrade gives one."""
+"""Types without a speed of their own that get one by upgrade."""
 BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack")
 
 
 def _cards(units: tuple[UnitType, ...], abilities: tuple[Ability, ...]) -> tuple[tuple[Ability, ...], ...]:
-    """The command card of every type; of each basic order it holds one, the one that fits the type."""
+    """Return the command card of every type; it holds one ability per basic order, the one that fits the type."""
     of_name: dict[str, dict[int, Ability]] = {unit.name: {} for unit in units}
     smart = next(a for a in abilities if a.effect == "smart")
     for ability in abilities:
@@ -191,7 +191,7 @@ def _rows(version: str, kind: str) -> list[dict[str, Any]]:
 
 
 def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows, where one that is ``like`` another has all of that one that it does not say itself."""
+    """Return the rows, with missing values of a row that is ``like`` another filled in from that one."""
     of_name = {row["name"]: row for row in rows}
     return [{**of_name[row["like"]], "made_by": (), **row} if "like" in row else row for row in rows]
 
@@ -201,7 +201,7 @@ def _pairs(bonus: dict[str, float]) -> tuple[tuple[str, float], ...]:
 
 
 def _own(record: type[Any], raw: dict[str, Any]) -> dict[str, Any]:
-    """The values of a row that are fields of ``record``."""
+    """Return the values of a row that are fields of ``record``."""
     names = {f.name for f in dataclasses.fields(record)}
     return {k: v for k, v in raw.items() if k in names}
 

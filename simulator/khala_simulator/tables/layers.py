@@ -1,4 +1,4 @@
-"""Layers: on what units of a type move."""
+"""Layers: where units of a type move."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Layer(IntEnum):
-    """On what a unit moves: the ground, the ground and its cliffs, or the air."""
+    """Where a unit moves: on the ground, on the ground and its cliffs, or in the air."""
 
     WALK = 0
     GLIDE = 1
@@ -18,7 +18,7 @@ class Layer(IntEnum):
 
 
 def layer_of(unit: UnitType) -> Layer:
-    """The layer on which units of this type move."""
+    """Return the layer on which units of this type move."""
     if unit.flying:
         return Layer.AIR
     return Layer.GLIDE if unit.mover in ("colossus", "cliffjumper") else Layer.WALK

@@ -1,7 +1,7 @@
-"""Constants of the rules that belong to no unit, with where each is from.
+"""Constants of the rules that belong to no unit, with their sources.
 
 ``data/mechanics.yaml`` holds every one with its unit, its source and, where the source is an estimate, the reasoning.
-The rules read ``MECHANICS``; whoever writes a table of estimates reads ``entries``.
+The rules read ``MECHANICS``; a table of estimates reads ``entries``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import yaml
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """One constant as the data file tells it."""
+    """One constant of the data file."""
 
     name: str
     value: float | str | bool
@@ -87,7 +87,7 @@ class Mechanics:
 
 
 def entries() -> tuple[Constant, ...]:
-    """All constants of the data file, in its order; some are choices of a rule and have no number."""
+    """Return all constants of the data file, in its order; some are choices of a rule and have no number."""
     text = (resources.files("khala_simulator.data") / "mechanics.yaml").read_text(encoding="utf-8")
     raw: dict[str, dict[str, Any]] = yaml.safe_load(text)
     return tuple(Constant(name=name, **fields) for name, fields in raw.items())

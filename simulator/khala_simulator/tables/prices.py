@@ -1,4 +1,4 @@
-"""Prices: what a player is charged for what an ability makes.
+"""Prices: what a player pays for the product of an ability.
 
 The tables keep most prices with the product (``made_by``); ``priced`` brings them to the abilities once, when a
 catalog is loaded, so that one rule of affording holds for all. ``payments`` takes them and gives them back.
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Cost = tuple[float, float]
 
 BY_PRODUCT: Final = frozenset({"train", "build", "build_addon", "summon", "warp_in", "arm", "structure_morph"})
-"""What is charged for as its product's ``made_by`` says."""
+"""Effects with the price in their product's ``made_by``."""
 BUILD_REACH: Final = 0.5
 """How far from a structure's body its builder may stand when it places it (an estimate)."""
 
@@ -26,9 +26,9 @@ BUILD_REACH: Final = 0.5
 def priced(
     abilities: Iterable[Ability], units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]
 ) -> tuple[Ability, ...]:
-    """The abilities with price, supply and time of what they make, and a builder's reach, where they have none.
+    """Return the abilities, with missing price, supply, time and builder's reach filled in from their products.
 
-    What makes nothing that the tables of the version know does nothing.
+    An ability whose product is not in the version's tables does nothing.
     """
     return tuple(_priced(ability, units, upgrades) for ability in abilities)
 
@@ -68,5 +68,5 @@ def _priced_research(ability: Ability, upgrade: Upgrade | None) -> Ability:
 
 
 def cost_of(ability: Ability) -> Cost:
-    """Minerals and vespene."""
+    """Return minerals and vespene."""
     return float(ability.minerals), float(ability.vespene)

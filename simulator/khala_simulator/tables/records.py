@@ -1,8 +1,8 @@
 """What one row of the game's tables is: records of units, weapons, upgrades and footprints.
 
-Data only, with the units of every number said; read from the shipped tables by ``catalog``, applied to a player's
-upgrades by ``stats``. Times whose name ends in ``_loops`` are game loops; a name ending in ``_n`` keeps the catalog's
-own unit, per "normal" second of 16 loops.
+Data only, with the units of every number; ``catalog`` reads it from the shipped tables, ``stats`` applies a player's
+upgrades. Times whose name ends in ``_loops`` are game loops; a name ending in ``_n`` keeps the catalog's own unit, per
+"normal" second of 16 loops.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Affects:
-    """Whom a splash, a sweep or a search touches besides the target itself."""
+    """Which units a splash, a sweep or a search touches in addition to the target itself."""
 
     allies: bool = False
     plane: str = "any"
@@ -96,9 +96,9 @@ class Hit:
 class Weapon:
     """A weapon: reach, rhythm and the hits of one shot. ``row`` is its index in ``Catalog.weapons``.
 
-    ``hidden`` ones are not told by the API (a Roach's bite), ``disabled`` ones need to be switched on, ``passive`` ones
-    only aim. ``moves`` says what the body does while it fires: it stands (""), glides on ("slowing") or goes where it
-    wants ("moving"). ``excluding`` is an attribute it can't be aimed at, ``acquires`` what it picks by itself ("any" or
+    ``hidden`` ones are not in the API (a Roach's bite), ``disabled`` ones need to be switched on, ``passive`` ones only
+    aim. ``moves`` says what the body does while it fires: it stands (""), glides on ("slowing") or goes where it wants
+    ("moving"). ``excluding`` is an attribute it can't be aimed at, ``acquires`` what it picks by itself ("any" or
     "unit", which is no structure), ``launches`` the unit type that an attack sends out.
     """
 
@@ -133,7 +133,7 @@ class Weapon:
     estimates: tuple[str, ...] = ()
 
     def reaches(self, plane: str) -> bool:
-        """Whether it can be aimed at a unit on ``plane`` ("ground" or "air")."""
+        """Return whether it can be aimed at a unit on ``plane`` ("ground" or "air")."""
         return self.targets in ("any", plane)
 
     @property
@@ -154,7 +154,7 @@ class Weapon:
 
 @dataclass(frozen=True, slots=True)
 class ProductionRecord:
-    """One way in which a unit type comes about, with what is charged for it."""
+    """One way to make a unit type, with its price."""
 
     producer: str
     ability: int
@@ -169,10 +169,9 @@ class ProductionRecord:
 class UnitType:
     """A unit type; ``row`` is its index in ``Catalog.units``, ``id`` the number that the API uses.
 
-    ``cost`` is cumulative (a Baneling's includes its Zergling), as the API tells it; what one production charges
-    stands in ``made_by``. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type
-    that is ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast of their own
-    accord.
+    ``cost`` is cumulative (a Baneling's includes its Zergling), as in the API; ``made_by`` has the price of one
+    production. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type that is
+    ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast by themselves.
     """
 
     row: int
@@ -275,11 +274,11 @@ class UnitType:
 
     @property
     def repair_loops(self) -> float:
-        """Loops in which one worker mends all its life; as long as it takes to make where the data says nothing."""
+        """Loops in which one worker repairs all its life; its production time where the data has none."""
         return self.repair_n * 16.0 or self.build_loops
 
     def weapon_against(self, plane: str) -> Weapon | None:
-        """The weapon with the longest range that a unit of this type can aim at ``plane`` by itself, or None."""
+        """Return the weapon with the longest range that a unit of this type can aim at ``plane`` by itself, or None."""
         usable = [w for w in self.weapons if w.reaches(plane) and w.works and not w.disabled]
         return max(usable, key=lambda weapon: weapon.range, default=None)
 
@@ -297,7 +296,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Upgrade:
-    """A research result, its price and what it changes."""
+    """A research result, its price and its changes."""
 
     id: int
     name: str
@@ -314,9 +313,9 @@ class Upgrade:
 class UnitFootprint:
     """The cells that a structure blocks, relative to its centre.
 
-    ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre, ``around`` of those where no
-    town hall may stand beside a resource; ``area`` is ``(x0, y0, x1, y1)`` of the mask in the same frame. ``forbids``
-    and ``requires`` are what the ground under the cells must not and must be, in the catalog's words.
+    ``cells`` holds ``(dx, dy)`` of each blocked cell's lower-left corner from the centre, ``around`` the same of cells
+    where no town hall may stand near a resource; ``area`` is ``(x0, y0, x1, y1)`` of the mask in the same frame.
+    ``forbids`` and ``requires`` are what the ground under the cells must not and must be, in the catalog's words.
     """
 
     id: str

@@ -1,7 +1,7 @@
 """The tables as arrays, one row per player, with the player's upgrades applied.
 
-``catalog`` says what a type is; here stands what it is *for this player now*. The systems gather from these arrays by
-``[owner, row]``. Recomputed for a player when an upgrade is done, never in between.
+``catalog`` says what a type is; this module says what it is *for this player now*. The systems gather from these arrays
+by ``[owner, row]``. Recomputed for a player when an upgrade is done, never in between.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ READ: Final = {
 
 
 def reads(change: Change) -> bool:
-    """Whether a change that an upgrade makes has an effect."""
+    """Return whether a change that an upgrade makes has an effect."""
     bonus = change.catalog == "effect" and change.field.startswith("AttributeBonus[")
     return bonus or change.field in READ.get(change.catalog, ())
 
@@ -78,7 +78,7 @@ class Damage:
 
 
 def bit_set(names: Iterable[str], order: tuple[str, ...]) -> int:
-    """The bit set of ``names``, bit i for ``order[i]``."""
+    """Return the bit set of ``names``, bit i for ``order[i]``."""
     return sum(1 << order.index(name) for name in set(names))
 
 
@@ -96,7 +96,7 @@ class Stats:
         self.shield_armor: Floats = np.zeros(shape_u)
         self.sight: Floats = np.zeros(shape_u)
         self.step: Floats = np.zeros(shape_u)  # world units per loop
-        self.creep_factor: Floats = np.ones(shape_u)  # on creep times that
+        self.creep_factor: Floats = np.ones(shape_u)  # times this on creep
         self.step_gain: Floats = np.zeros(shape_u)  # world units per loop, gained per loop; inf is at once
         self.life_regen: Floats = np.zeros(shape_u)  # per loop
         self.shield_regen: Floats = np.zeros(shape_u)  # per loop
@@ -127,11 +127,11 @@ class Stats:
             self._apply_weapon(player, weapon, changes)
 
     def ability(self, player: int, ability: Ability) -> Ability:
-        """The ability as it is for a player now: with the range, cooldown and times that upgrades change."""
+        """Return the ability as a player has it now, with the range, cooldown and times that upgrades change."""
         return self._abilities[player].get(ability.id, ability)
 
     def changed(self, player: int, catalog: str, entry: str, field: str, base: float) -> float:
-        """A number of the game's data as the player's upgrades have it; in the data's own unit."""
+        """Return a number of the game's data with the player's upgrades applied; in the data's own unit."""
         return self._changes[player].value(catalog, entry, field, base)
 
     def _apply_unit(self, player: int, unit: UnitType, changes: _Changes) -> None:
@@ -195,7 +195,7 @@ class _Changes:
 
 
 def _ability(ability: Ability, changes: _Changes) -> Ability:
-    """An ability with changed range, cooldown and morphing time; the data's times are normal seconds."""
+    """Return an ability with changed range, cooldown and morphing time; the data's times are normal seconds."""
 
     def value(field: str, base: float) -> float:
         return changes.value("abil", ability.link, field, base)

@@ -1,6 +1,6 @@
-"""Active buffs: which units bear which buffs, a row each.
+"""Active buffs: which units have which buffs, a row each.
 
-Only the table: ``buffs`` adds to it and takes from it, ``systems.buffs`` lets them run out.
+Only the table: ``buffs`` adds and removes rows, ``systems.buffs`` removes those that run out.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ FOREVER: Final = 1 << 40  # end of a buff that does not run out
 
 ROW: Final = np.dtype(
     [
-        ("slot", np.int64),  # who bears it
+        ("slot", np.int64),  # the unit that has it
         ("buff", np.int64),  # row in catalog.buffs
         ("source", np.int64),  # slot of the caster, or NOBODY
-        ("owner", np.int64),  # whose unit cast it
+        ("owner", np.int64),  # owner of the caster
         ("begun", np.int64),  # loop
         ("end", np.float64),  # loop, FOREVER without an end
         ("due", np.float64),  # loop of the next period, FOREVER without one
@@ -40,22 +40,22 @@ class ActiveBuffs:
         return len(self.rows)
 
     def of(self, slot: int) -> NDArray[np.void]:
-        """The rows that lie on a unit."""
+        """Return the rows of a unit."""
         found: NDArray[np.void] = self.rows[self.rows["slot"] == slot]
         return found
 
     def find(self, slot: int, row: int) -> int:
-        """Index of the first row of a kind on a unit, or -1."""
+        """Return the index of the first row of a kind on a unit, or -1."""
         found = np.flatnonzero((self.rows["slot"] == slot) & (self.rows["buff"] == row))
         return int(found[0]) if found.size else -1
 
     def forget(self, slot: int) -> None:
-        """The unit in ``slot`` is gone: what lay on it goes, what it cast stays."""
+        """Remove the buffs on a unit that is gone; buffs that it cast stay."""
         if len(self.rows):
             self.rows = self.rows[self.rows["slot"] != slot]
             source = self.rows["source"]
             source[source == slot] = NOBODY
 
     def content(self) -> bytes:
-        """All rows as bytes, for the digest of the world."""
+        """Return all rows as bytes, for the digest of the world."""
         return self.rows.tobytes()

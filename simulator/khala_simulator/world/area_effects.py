@@ -1,7 +1,7 @@
-"""Area effects: what lies on the ground for a time, such as a storm, a scan or a bile on its way.
+"""Area effects: effects on the ground for a time, such as a storm, a scan or a bile on its way.
 
-One is a value in ``world.area_effects`` until it ends; ``systems.area_effects`` calls its rule at every period. What
-the API shows of it (``effect``, the places, the radius) is in the value, what it does is the rule's.
+One is a value in ``world.area_effects`` until it ends; ``systems.area_effects`` calls its rule at every period. The
+value holds what the API shows of it (``effect``, the places, the radius); the rule holds what it does.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class AreaEffect:
 
     Args:
         rule: Name of the rule that runs it, in ``skills.registry.AREA_EFFECTS``.
-        effect: The API's effect id, 0 when clients are not told of it.
-        owner: Whose unit made it.
-        points: Where it lies, world units; the first is its middle.
+        effect: The API's effect id, 0 when clients do not see it.
+        owner: The owner of the unit that made it.
+        points: Where it is, world units; the first is its middle.
         radius: World units.
         begun: Loop at which it came.
         end: Loop at which it ends.
@@ -30,7 +30,7 @@ class AreaEffect:
         target: Tag of the unit that it follows or meets, 0 for none.
         count: Runs so far; the rule's own counter.
         sights: Radius in which its owner sees, 0 for none.
-        detects: Whether its owner sees what is cloaked there.
+        detects: Whether its owner sees cloaked units there.
     """
 
     rule: str

@@ -1,8 +1,8 @@
 """What the world keeps so that the systems need not look at every unit in every loop.
 
 All of it follows from the state and is written again when a unit comes, goes or changes; it is no part of the world's
-digest. A cache says beside it for which ``population`` it holds. What only a layer above understands is an ``object``
-here.
+digest. Each cache notes for which ``population`` it holds. Values that only a layer above understands are of type
+``object`` here.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ class WorldCaches:
 
     def __init__(self) -> None:
         self.population = 0  # counts births and deaths, for what is worth remembering between them
-        self.looked_at = -1  # the population that ``visible`` was written for
+        self.looked_at = -1  # the population for which ``visible`` was written
         self.resting_version = -1  # the population among which no body touched another when all last stood still
         self.bodies: object | None = None  # of this population, for ``contacts``
         self.census: object | None = None  # of this population, for ``census``
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``requirements``
         self.tallied = -1  # the loop in which that was counted
-        self.regenerating = (False, False, False)  # whether anybody regains shields, life, energy
-        self.harvesting = False  # whether anybody harvests
-        self.mortal = False  # whether anybody's life is timed
-        self.hiding = False  # whether anybody is cloaked or burrowed
+        self.regenerating = (False, False, False)  # whether any unit regains shields, life, energy
+        self.harvesting = False  # whether any unit harvests
+        self.mortal = False  # whether any unit's life is timed
+        self.hiding = False  # whether any unit is cloaked or burrowed
         self.passive_units: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
-        self.passive_units_at = -1  # the population that this was written for
+        self.passive_units_at = -1  # the population for which this was written
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
         self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
         self.powered_at = -1  # the population for which ``powered`` was written
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
-        self.anyone_moved = True  # somebody walked in the last loop
-        self.orders_changed = True  # somebody got an order, was born or died since orders were last looked over
+        self.anyone_moved = True  # a unit walked in the last loop
+        self.orders_changed = True  # a unit got an order, was born or died since orders were last checked

@@ -1,4 +1,4 @@
-"""One use of an ability, as a value: who, which, and at what."""
+"""One use of an ability, as a value: the caster, the ability, and its target."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Cast:
     """A unit (slot) uses an ability on a unit (slot), at a point (world), or on nothing.
 
     ``begun`` is the loop in which it takes effect; a channel goes on from there. ``was`` is the row of the caster's
-    type before it did.
+    type before that.
     """
 
     slot: int

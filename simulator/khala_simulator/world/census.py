@@ -1,4 +1,4 @@
-"""The census: which kinds of units live in a world now, so that systems can pass over what is not there.
+"""The census: which kinds of units live in a world now, so that systems can skip kinds that are absent.
 
 Taken again when a unit comes, dies or changes; nothing here decides anything.
 """
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Census:
-    """Whether anybody living has what each field says."""
+    """Whether any living unit has what each field says."""
 
     turrets: bool
     beams: bool
     rolling_guns: bool  # weapons that fire while the body goes where it wants
     guns_walking: bool  # and at what the unit passes
     drifting_flyers: bool  # flyers that need time to stop
-    brakers: bool  # anybody who does
+    brakers: bool  # units that do
     low_priority_bodies: bool  # units of less push priority than the ordinary
     weapons_with_filters: bool  # units that can't aim at what is near, or do not aim at structures
 
@@ -46,7 +46,7 @@ class Census:
 
 
 def census(world: World) -> Census:
-    """The census of a world, taken now if something has changed."""
+    """Return the census of a world, taken now if something has changed."""
     known = world.census
     if not isinstance(known, Census):
         known = world.census = Census.of(world)

@@ -5,7 +5,7 @@ with the type of its numbers, what an unused slot holds (0 if nothing is said), 
 whose arrays are (capacity, 2); all others are (capacity,). Distances are world units, times game loops.
 
 ``state`` is what decides the future and is part of the world's digest. ``trait`` follows from it: from type, owner,
-upgrades and order, or it is written anew in every loop before it is read.
+upgrades and order, or it is written again in every loop before it is read.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Column:
     is_state: bool
 
     def make(self, capacity: int) -> NDArray[Any]:
-        """A fresh array of unused slots."""
+        """Return a fresh array of unused slots."""
         return np.full((capacity, self.width) if self.width else capacity, self.empty, dtype=self.dtype)
 
 
@@ -85,9 +85,9 @@ class UnitColumns:
     target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
     attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
     scan_loop: Ints = state(int)  # loop from which it looks for a target again
-    guard: Floats = state(float, width=2)  # where an idle unit stood when it engaged somebody by itself
+    guard: Floats = state(float, width=2)  # where an idle unit stood when it engaged a target by itself
     returning: Bools = state(bool)  # an idle unit that will go back there after the fight
-    leashed: Bools = state(bool)  # it gave up a chase and looks at nobody until it is nearly back
+    leashed: Bools = state(bool)  # it gave up a chase and ignores enemies until it is nearly back
     rank: Floats = state(float)  # of the target it has chosen by itself; see acquire
     weapon: Ints = state(int, -1)  # row of the weapon for that target, or -1
     reach: Floats = state(float)  # its range, edge to edge
@@ -106,18 +106,18 @@ class UnitColumns:
     build_loops: Floats = state(float)  # loops that its construction takes in all, 0 when it is complete
     self_made: Bools = state(bool)  # its construction goes on by itself
     site: Ints = state(int, NOBODY)  # slot of the structure that it is building, or NOBODY
-    worked: Ints = state(int, LONG_AGO)  # last loop in which somebody built it
+    worked: Ints = state(int, LONG_AGO)  # last loop in which a unit built it
     harvest: Ints = state(int)  # harvesting.Phase, 0 when it does not gather
     patch: Ints = state(int, NOBODY)  # slot of the resource that it harvests, or NOBODY
     occupant: Ints = state(int, NOBODY)  # slot of the worker that is at this resource now, or NOBODY
     load: Ints = state(int)  # resources that it carries
     contents: Ints = state(int)  # resources that are left in it
     work_until: Floats = state(float)  # loop at which it is done at its resource
-    zone: Floats = state(float, width=2)  # middle of the circle in which alone it fires
-    zone_radius: Floats = state(float)  # that circle's radius, 0 for who fires anywhere
+    zone: Floats = state(float, width=2)  # middle of the only circle in which it fires
+    zone_radius: Floats = state(float)  # that circle's radius, 0 for units that fire anywhere
     help_loop: Ints = state(int, LONG_AGO)  # last loop this unit called for help
     nav_point: Floats = state(float, width=2)  # next corner of the path
-    nav_loop: Ints = state(int)  # loop at which the path is looked over again
+    nav_loop: Ints = state(int)  # loop at which the path is checked again
     nav_straight: Bools = state(bool)  # the straight line to the goal is free
     nav_end: Bools = state(bool)  # no way leads nearer to the goal
     nav_goal: Floats = state(float, width=2)  # the goal, or what can be reached nearest to it
@@ -130,7 +130,7 @@ class UnitColumns:
     gap: Floats = state(float)  # distance to its target this loop, edge to edge
     toward: Floats = trait(float, width=2)  # unit vector to its target this loop
     in_reach: Bools = state(bool)  # its target is within the weapon's reach this loop
-    intended: Floats = state(float, width=2)  # the step it takes this loop if nobody is in the way
+    intended: Floats = state(float, width=2)  # the step it takes this loop if nothing is in the way
 
     radius: Floats = trait(float)  # body for ranges
     separation: Floats = trait(float)  # body for pushing
@@ -152,7 +152,7 @@ class UnitColumns:
     air_weapon: Ints = trait(int, -1)
     close_weapon: Ints = trait(int, -1)  # row of the one that takes over when the target stands close, or -1
     close_range: Floats = trait(float)
-    least_range: Floats = trait(float)  # below this gap no weapon reaches, 0 for nearly everybody
+    least_range: Floats = trait(float)  # below this gap no weapon reaches, 0 for nearly every unit
     guns_walking: Bools = trait(bool)  # it fires at what it passes while it walks
     spares_structures: Bools = trait(bool)  # it does not pick structures by itself
     turret_cos: Floats = trait(float)  # cosine and
@@ -161,7 +161,7 @@ class UnitColumns:
     air_scan: Floats = trait(float)
     acquires: Bools = trait(bool)  # it picks fights by itself
     threat_bits: Ints = trait(int)  # planes on which units fear it
-    defensive: Bools = trait(bool)  # nobody fears it while it does not fight
+    defensive: Bools = trait(bool)  # no unit fears it while it does not fight
     flees: Bools = trait(bool)  # attacked while idle it runs
     targetable: Bools = trait(bool)  # it may be a target at all
     cloaked: Bools = trait(bool)  # seen by detectors only
@@ -207,7 +207,7 @@ class UnitColumns:
         self.capacity = 0
 
     def grow(self, capacity: int) -> None:
-        """Make room for ``capacity`` slots; what is there stays, the arrays are new."""
+        """Make room for ``capacity`` slots; the values stay, the arrays are new."""
         for name, column in COLUMNS.items():
             array = column.make(capacity)
             if self.capacity:
@@ -221,7 +221,7 @@ class UnitColumns:
             getattr(self, name)[slot] = column.empty
 
     def state_bytes(self, slots: int) -> bytes:
-        """The state of the first ``slots`` slots, column by column."""
+        """Return the state of the first ``slots`` slots, column by column."""
         return b"".join(getattr(self, name)[:slots].tobytes() for name, column in COLUMNS.items() if column.is_state)
 
 

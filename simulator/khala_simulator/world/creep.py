@@ -2,10 +2,10 @@
 
 A source covers the cells of its mask one after the other, those near its middle first, and gives them up again from the
 outside when it is gone; a cell bears creep while any source covers it, or where the map has painted it. Masks, periods
-and delays are the game version's (``data/tables/<version>/creep.json``); how many cells come in one period, and in
+and delays depend on the game version (``data/tables/<version>/creep.json``); how many cells come in one period, and in
 which order, is an estimate (see ``data/mechanics.yaml``).
 
-State and its bookkeeping only: which units are sources, and what creep does, is ``systems.creep``'s matter.
+State and its bookkeeping only: ``systems.creep`` decides which units are sources, and what creep does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 GENERATING: Final = "makeCreep2x2Overlord"
-"""The buff of an Overlord that lets creep fall."""
+"""The buff of an Overlord that generates creep."""
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class Spread:
 
 @lru_cache(maxsize=4)
 def spreads(version: str) -> dict[str, Spread]:
-    """Unit type's name -> how creep spreads from it, in a game version."""
+    """Return unit type's name -> how creep spreads from it, in a game version."""
     path = resources.files("khala_simulator.data") / "tables" / version / "creep.json"
     table = json.loads(path.read_text(encoding="utf-8"))
     masks = {row["id"]: _cells(row["area"], row["rows"]) for row in table["masks"]}
@@ -55,7 +55,7 @@ def spreads(version: str) -> dict[str, Spread]:
 
 
 def _cells(area: list[int], rows: list[str]) -> set[tuple[int, int]]:
-    """The marked cells of a mask, whose first row is its top."""
+    """Return the marked cells of a mask, whose first row is its top."""
     left, top = area[0], area[3]
     return {(left + x, top - 1 - line) for line, text in enumerate(rows) for x, mark in enumerate(text) if mark == "o"}
 
@@ -104,7 +104,7 @@ class Creep:
         self._count: NDArray[np.int32] = np.zeros(terrain.walk.shape, dtype=np.int32)
 
     def add(self, tag: int, unit: str, cell: tuple[int, int], loop: int, *, grown: bool) -> None:
-        """Let creep spread from a new source, or from one that has all its creep already."""
+        """Add a source from which creep spreads, or one that has all its creep already."""
         spread = self.spreads[unit]
         source = CreepSource(tag, unit, cell, 0, loop + spread.period_loops)
         self.sources.append(source)
@@ -112,7 +112,7 @@ class Creep:
         self.due = min(self.due, source.due)
 
     def reach(self, source: CreepSource, extent: int) -> None:
-        """Let a source cover exactly the first ``extent`` of its cells."""
+        """Make a source cover exactly the first ``extent`` of its cells."""
         cells = self.spreads[source.unit].cells
         extent = min(max(extent, 0), len(cells))
         changed = cells[min(extent, source.extent) : max(extent, source.extent)] + source.cell
@@ -123,19 +123,19 @@ class Creep:
         source.extent = extent
 
     def paint(self, x0: int, y0: int, x1: int, y1: int) -> None:
-        """Put creep that never recedes on the cells of a box (``x1`` and ``y1`` exclusive), as a map can have it."""
+        """Put permanent creep on the cells of a box (``x1`` and ``y1`` exclusive), as a map can have it."""
         self._painted = self._painted.copy()
         self._painted[max(y0, 0) : y1, max(x0, 0) : x1] = True
         self.settle()
 
     def settle(self) -> None:
-        """Write ``covered`` anew after sources have changed, and forget those that cover nothing any more."""
+        """Rebuild ``covered`` after sources have changed, and forget those that cover nothing any more."""
         self.sources = [source for source in self.sources if source.extent or not source.fades]
         self.covered = self._painted | ((self._count > 0) & self._bears)
         self.anywhere = bool(self.covered.any())
 
     def covers(self, x: float, y: float) -> bool:
-        """Whether there is creep at a point."""
+        """Return whether there is creep at a point."""
         height, width = self.covered.shape
         column, row = min(max(int(x), 0), width - 1), min(max(int(y), 0), height - 1)
         return bool(self.covered[row, column])

@@ -1,6 +1,6 @@
 """The ground of one game: which cells its structures block now.
 
-Only the cells; which way round leads over what is free is ``pathfinding``'s.
+Only the cells; ``pathfinding`` finds ways over the free ones.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Ground:
     """The terrain with the structures that stand on it now.
 
-    ``surfaces`` is a place for what ``pathfinding`` works out of it per layer; it is empty after every change.
+    ``surfaces`` stores what ``pathfinding`` computes per layer; it is empty after every change.
     """
 
     def __init__(self, terrain: Terrain) -> None:
@@ -39,7 +39,7 @@ class Ground:
             self._changed()
 
     def with_structures(self, grid: Grid) -> Grid:
-        """A copy of a grid of free cells (h, w) with the cells of the structures taken."""
+        """Return a copy of a grid of free cells (h, w) with the cells of the structures taken."""
         grid = grid.copy()
         for cells in self.blocked.values():
             grid[cells[:, 1], cells[:, 0]] = False

@@ -1,4 +1,4 @@
-"""Jobs: what a structure or an egg is making, as values of its queue; ``production`` has the rules."""
+"""Jobs: the products in the queue of a structure or an egg, as values; ``production`` has the rules."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 class Job:
     """One thing in the making.
 
-    ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` what
-    comes back when it is called off, ``supply`` what it uses once it is ``begun``. A job of kind ``addon`` only waits
-    for the structure with the tag ``site``.
+    ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` the
+    refund when it is called off, ``supply`` what it uses once it is ``begun``. A job of kind ``addon`` only waits for
+    the structure with the tag ``site``.
     """
 
     ability: int

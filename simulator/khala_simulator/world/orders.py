@@ -1,7 +1,7 @@
-"""What a unit can be told to do: the kinds of orders and one order as a value.
+"""Orders of units: their kinds, and one order as a value.
 
-The current order of every unit lies in the world's arrays, waiting ones are ``Order`` values in its queue.
-``commands`` creates them from what a player says, ``systems.orders`` carries them out.
+The current order of every unit is in the world's arrays, waiting ones are ``Order`` values in its queue. ``commands``
+creates them from a player's commands, ``systems.orders`` carries them out.
 """
 
 from __future__ import annotations

@@ -58,13 +58,13 @@ class ScoreCounters:
     idle_worker_s: float = 0.0  # normal seconds, summed over workers
     idle_production_s: float = 0.0
     spent: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were charged
-    curriculum: float = 0.0  # what the map's script gives
-    collected: list[float] = field(default_factory=lambda: [0.0, 0.0])  # minerals and vespene that were brought home
+    curriculum: float = 0.0  # points from the map's script
+    collected: list[float] = field(default_factory=lambda: [0.0, 0.0])  # delivered minerals and vespene
 
 
 @dataclass(slots=True)
 class PlayerSetup:
-    """Who sits in a slot: ``control`` is ``agent`` or ``computer``; ``difficulty`` is the API's number or 0."""
+    """The player of a slot: ``control`` is ``agent`` or ``computer``; ``difficulty`` is the API's number or 0."""
 
     id: int
     race: str
@@ -92,9 +92,9 @@ class Player:
     surrendered: bool = False
     score: ScoreCounters = field(default_factory=ScoreCounters)
     attacking: bool = False  # a computer player's army is on its way
-    start: tuple[float, float] | None = None  # where his town hall was put at the start of a melee game
-    camera: tuple[float, float] | None = None  # where he looks at the start, if not where the map says
+    start: tuple[float, float] | None = None  # where the town hall was put at the start of a melee game
+    camera: tuple[float, float] | None = None  # where the camera starts, if not where the map says
 
     def counters(self) -> tuple[object, ...]:
-        """Everything as nested tuples, in a fixed order, for the digest of the world."""
+        """Return everything as nested tuples, in a fixed order, for the digest of the world."""
         return dataclasses.astuple(self)

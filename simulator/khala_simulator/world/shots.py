@@ -1,8 +1,8 @@
-"""What has left a weapon and not yet arrived: missiles in flight and hits that are due later.
+"""Shots under way: missiles in flight and hits that are due later.
 
 Two small tables of exactly as many rows as there are shots, and a list of the sweeps under way. ``systems.weapons``
-adds to them, ``systems.hits``, ``missiles`` and ``sweeps`` take from them. A reference to a unit that died becomes -1;
-the shot keeps its last point.
+adds to them, ``systems.hits``, ``missiles`` and ``sweeps`` remove from them. A reference to a unit that died becomes
+-1; the shot keeps its last point.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NOBODY: Final = -1
 
 _SHOT: Final = [
     ("source", np.int64),  # slot of the attacker, or NOBODY
-    ("owner", np.int64),  # whose unit fired
+    ("owner", np.int64),  # owner of the attacker
     ("target", np.int64),  # slot of the target, or NOBODY
     ("prior", np.int64),  # slot from which a bounce came, or NOBODY
     ("weapon", np.int64),  # row in catalog.weapons
@@ -47,7 +47,7 @@ class Shot(NamedTuple):
 
 
 def shot_of(row: np.void) -> Shot:
-    """The shot in a row of either table."""
+    """Return the shot in a row of either table."""
     source, owner, target, prior, weapon, hit = (int(row[name]) for name in Shot._fields[:6])
     start, goal = row["start"].tolist(), row["goal"].tolist()
     return Shot(source, owner, target, prior, weapon, hit, (start[0], start[1]), (goal[0], goal[1]))
@@ -55,7 +55,7 @@ def shot_of(row: np.void) -> Shot:
 
 @dataclass(slots=True)
 class Sweep:
-    """A sweep that is under way: its shot, the (fractional) loop it began at, the next point, whom it has touched."""
+    """A sweep that is under way: its shot, the (fractional) loop it began at, the next point, the touched units."""
 
     shot: Shot
     begun: float
@@ -63,7 +63,7 @@ class Sweep:
     touched: list[int]
 
     def forget(self, slot: int) -> None:
-        """The unit in ``slot`` is gone."""
+        """Drop references to the unit in ``slot``, which is gone."""
         self.touched = [other for other in self.touched if other != slot]
         self.shot = self.shot._replace(
             source=NOBODY if self.shot.source == slot else self.shot.source,
@@ -107,13 +107,13 @@ class _Table:
         self.rows = self.rows[mask]
 
     def forget(self, slot: int) -> None:
-        """The unit in ``slot`` is gone."""
+        """Drop references to the unit in ``slot``, which is gone."""
         for name in ("source", "target", "prior"):
             column = self.rows[name]
             column[column == slot] = NOBODY
 
     def content(self) -> bytes:
-        """All rows as bytes, for the digest of the world."""
+        """Return all rows as bytes, for the digest of the world."""
         return self.rows.tobytes()
 
 

@@ -1,8 +1,7 @@
-"""Snapshots: what a player remembers of structures and resources that the fog has closed over.
+"""Snapshots: what a player remembers of structures and resources that the fog has covered.
 
 A snapshot shows a unit as it was when it was last seen, with a tag of its own, and is forgotten when its place is seen
-without it. Only things that stay where they are leave one. ``fog`` keeps them up to date; on maps without
-fog there are none.
+without it. Only immobile units leave one. ``fog`` keeps them up to date; on maps without fog there are none.
 """
 
 from __future__ import annotations
@@ -36,5 +35,5 @@ class FogMemory:
         self.made = 0
 
     def find(self, tag: int) -> RememberedUnit | None:
-        """The shown snapshot with this tag of its own, or None."""
+        """Return the shown snapshot with this tag of its own, or None."""
         return next((snapshot for snapshot in self.shown if snapshot.tag == tag), None)

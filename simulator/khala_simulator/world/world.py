@@ -1,10 +1,10 @@
 """The world: the whole state of one game as arrays over unit slots.
 
-State and bookkeeping only. What happens in it is in ``systems``, what players ask of it comes through ``commands``,
-``tick`` advances it, and the API reads it. A slot is the index of a unit in every array; slots of dead units are used
-again with another tag, so whoever keeps a unit for longer than a loop keeps its tag.
+State and bookkeeping only. ``systems`` has the rules, players' orders come through ``commands``, ``tick`` advances it,
+and the API reads it. A slot is the index of a unit in every array; slots of dead units are used again with another tag,
+so code that keeps a unit for longer than a loop keeps its tag.
 
-Everything that decides the future lies in the state columns, the queues, the shots under way, the players, the random
+Everything that decides the future is in the state columns, the queues, the shots under way, the players, the random
 generator and the loop counter; ``digest`` covers exactly these.
 """
 
@@ -51,7 +51,7 @@ INDEX_SHIFT: Final = 18
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """A unit that died: at which loop, which tag and type, whose it was, and whose unit did it (-1 nobody's)."""
+    """A unit that died: its loop, tag, type and owner, and the killer's owner (-1 for none)."""
 
     loop: int
     tag: int
@@ -62,7 +62,7 @@ class Death:
 
 @dataclass(frozen=True, slots=True)
 class Mishap:
-    """A command that was given and could not be carried out in the end: at which loop, whose, which, and why."""
+    """A command that could not be carried out after all: its loop, player, ability, and the reason."""
 
     loop: int
     player: int
@@ -73,7 +73,7 @@ class Mishap:
 
 @dataclass(frozen=True, slots=True)
 class PlayerAlert:
-    """Something that a player is told of: at which loop, whom, and the API's name of it."""
+    """An alert to a player: its loop, the player, and its name in the API."""
 
     loop: int
     player: int
@@ -115,7 +115,7 @@ class World(UnitColumns, WorldCaches):
         self.visibility = np.full((len(self.players), height, width), never if self.fog else 2, dtype=np.uint8)
         self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
         self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
-        self.memories = [FogMemory() for _ in self.players]  # what each player remembers of what the fog covers
+        self.memories = [FogMemory() for _ in self.players]  # each player's memory of what the fog covers
         self.missiles = Missiles()
         self.pending = PendingHits()
         self.sweeps: list[Sweep] = []
@@ -126,11 +126,11 @@ class World(UnitColumns, WorldCaches):
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
         self.alerts: list[PlayerAlert] = []
-        self.jobs: dict[int, list[Job]] = {}  # slot -> what it is making and is to make, in order
-        self.invested: dict[int, tuple[float, float]] = {}  # slot -> what was paid for what is being built
+        self.jobs: dict[int, list[Job]] = {}  # slot -> its products, in order
+        self.invested: dict[int, tuple[float, float]] = {}  # slot -> the price paid for its construction
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []
-        self.deaths_seen = 0  # how many of the deaths the triggers have been told about
+        self.deaths_seen = 0  # how many of the deaths the triggers have handled
         self.script = ScriptMemory()
         self.ended = False
         self.queue: list[list[Order]] = []
@@ -138,14 +138,14 @@ class World(UnitColumns, WorldCaches):
         self._recycles: Ints = np.zeros(0, dtype=np.int64)
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
         self.growth = Creep(game_map.terrain, self.catalog.version)
-        self.scan_now = True  # somebody lost a target or got an order since the last scan
+        self.scan_now = True  # a unit lost a target or got an order since the last scan
         self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
         self._grow(64)
 
     # units --------------------------------------------------------------------------------------------------------
 
     def add(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float) -> int:
-        """Take a free slot for a unit at exactly ``point``; returns it. ``lifecycle.spawn`` writes the rest."""
+        """Take a free slot for a unit at exactly ``point``; return it. ``lifecycle.spawn`` writes the rest."""
         slot = self._free_slot()
         self.clear(slot)
         self.alive[slot] = True
@@ -184,7 +184,7 @@ class World(UnitColumns, WorldCaches):
         self.population_changed()
 
     def stow(self, slot: int, carrier: int) -> None:
-        """Take a unit out of the world into a carrier: it lives on, and nobody sees or touches it."""
+        """Take a unit out of the world into a carrier: it lives on, unseen and untouchable."""
         self.carrier[slot] = carrier
         self.walks[slot] = self.looks_around[slot] = self.holds[slot] = False
         self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
@@ -206,38 +206,38 @@ class World(UnitColumns, WorldCaches):
         self.population_changed()
 
     def alert(self, player: int, name: str) -> None:
-        """Tell a player something, by the API's name of the alert."""
+        """Send a player an alert, by its name in the API."""
         self.alerts.append(PlayerAlert(self.loop, player, name))
 
     def passengers(self, carrier: int) -> list[int]:
-        """Slots of the units inside a carrier, ascending."""
+        """Return the slots of the units inside a carrier, ascending."""
         inside: list[int] = np.flatnonzero(self.alive & (self.carrier == carrier)).tolist()
         return inside
 
     def slot_of(self, tag: int) -> int:
-        """The slot of a living unit with this tag, or NOBODY."""
+        """Return the slot of a living unit with this tag, or NOBODY."""
         slot = tag >> INDEX_SHIFT & 0x3FFF
         return slot if slot < self.capacity and tag != NO_TAG and self.tag[slot] == tag else NOBODY
 
     def tag_of(self, slot: int) -> int:
-        """The tag of the unit in a slot, 0 for NOBODY."""
+        """Return the tag of the unit in a slot, 0 for NOBODY."""
         return int(self.tag[slot]) if slot >= 0 else NO_TAG
 
     def unit_type(self, slot: int) -> UnitType:
-        """The record of the unit's type."""
+        """Return the record of the unit's type."""
         return self.catalog.units[int(self.type[slot])]
 
     def units_of(self, player: int) -> Ints:
-        """Slots of a player's living units, ascending."""
+        """Return the slots of a player's living units, ascending."""
         result: Ints = self.live[self.owner[self.live] == player]
         return result
 
     def facing(self) -> Floats:
-        """(capacity,) API facing of every slot, radians in [0, 2 pi)."""
+        """Return (capacity,) API facing of every slot, radians in [0, 2 pi)."""
         return geometry.facing(self.heading)
 
     def heights(self) -> Floats:
-        """(len(live),) z of every living unit: the ground's, and its flying height above it."""
+        """Return (len(live),) z of every living unit: the ground's, and its flying height above it."""
         above = np.array([self.catalog.units[row].height for row in self.type[self.live]], dtype=np.float64)
         result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
         return result
@@ -248,7 +248,7 @@ class World(UnitColumns, WorldCaches):
             self.ground.block(slot, self.footprint_cells(slot))
 
     def footprint_cells(self, slot: int) -> Ints:
-        """(k, 2) cells ``(x, y)`` that a structure blocks; (0, 2) for others."""
+        """Return (k, 2) cells ``(x, y)`` that a structure blocks; (0, 2) for others."""
         footprint = self.catalog.footprints.get(self.unit_type(slot).footprint)
         if footprint is None or not footprint.cells:
             return np.zeros((0, 2), dtype=np.int64)
@@ -259,7 +259,7 @@ class World(UnitColumns, WorldCaches):
     # orders, as values --------------------------------------------------------------------------------------------
 
     def orders_of(self, slot: int) -> list[Order]:
-        """The unit's orders, the current one first; empty when it is idle and engages nobody.
+        """Return the unit's orders, the current one first; empty when it is idle and engages nobody.
 
         An idle unit that fights by itself shows the attack it makes, as the game does.
         """
@@ -282,7 +282,7 @@ class World(UnitColumns, WorldCaches):
         return [current, *self.queue[slot]]
 
     def _progress(self, slot: int) -> float:
-        """How much of the time is over that an ability takes to prepare, 0..1."""
+        """Return the elapsed part of an ability's preparation, 0..1."""
         end, begun = float(self.cast_at[slot]), float(self.cast_begun[slot])
         return min(max((self.loop - begun) / (end - begun), 0.0), 1.0) if end > begun >= 0.0 else 0.0
 
@@ -294,14 +294,14 @@ class World(UnitColumns, WorldCaches):
         return self.growth.covered
 
     def on_creep(self, slot: int) -> bool:
-        """Whether the middle of a unit is on creep."""
+        """Return whether the middle of a unit is on creep."""
         x, y = self.pos[slot].tolist()
         return self.growth.covers(x, y)
 
     # sight --------------------------------------------------------------------------------------------------------
 
     def is_visible(self, player: int) -> Bools:
-        """(len(live),) whether ``player`` sees each living unit now; cloak and detection are not looked at here."""
+        """Return (len(live),) whether ``player`` sees each living unit now; cloak and detection are ignored here."""
         if not self.fog:
             return np.ones(len(self.live), dtype=np.bool_)
         cells = self.pos[self.live].astype(np.int64)
@@ -321,7 +321,7 @@ class World(UnitColumns, WorldCaches):
     # bookkeeping --------------------------------------------------------------------------------------------------
 
     def digest(self) -> str:
-        """SHA-256 over everything that decides the future, the same on every run with the same actions."""
+        """Return the SHA-256 of everything that decides the future, the same on every run with the same actions."""
         sha = hashlib.sha256(self.map.digest.encode())
         sha.update(repr((self.loop, self.ended, self.scan_now, self.hurt, self.rng.bit_generator.state)).encode())
         sha.update(self.state_bytes(self.top))
@@ -340,7 +340,7 @@ class World(UnitColumns, WorldCaches):
         return sha.hexdigest()
 
     def population_changed(self) -> None:
-        """Note that a unit came, went or became another."""
+        """Note that a unit came, went or changed its type."""
         self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.bodies = None
@@ -352,7 +352,7 @@ class World(UnitColumns, WorldCaches):
         self.hiding = bool((self.cloaked | self.burrowed).any())
 
     def note_traits(self, slot: int) -> None:
-        """Note what the changed traits of a unit mean for systems that pass over worlds without such units."""
+        """Note a unit's changed traits for the systems that skip worlds without such units."""
         shields, life, energy = self.regenerating
         self.regenerating = (
             shields or bool(self.shield_regen[slot]),

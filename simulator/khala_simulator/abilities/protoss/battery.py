@@ -25,7 +25,7 @@ OVERCHARGE_ABILITY = 4107
 
 
 def _recharge(world: World, cast: Cast) -> bool:
-    """Give one loop's shields; over when they are full, the energy is used up, or the unit has gone too far away."""
+    """Give one loop's shields; end when they are full, the energy is used up, or the unit has gone too far away."""
     slot, target = cast.slot, int(world.order_target[cast.slot])
     if target == NOBODY or not (world.can_cast[slot] and world.targetable[target]):
         return False
@@ -49,7 +49,7 @@ def _begin(world: World, cast: Cast) -> None:
 
 
 def _boost(world: World, slot: int) -> float:
-    """How much faster than ordinarily a battery works; an overcharged one spends no energy."""
+    """Return how many times faster than usual a battery works; an overcharged one spends no energy."""
     if OVERCHARGE not in world.catalog.buff_of_name or not buffs.has(world, slot, OVERCHARGE):
         return 1.0
     return number(world.catalog.ability(OVERCHARGE_ABILITY), "rate")
@@ -78,7 +78,7 @@ def _cant_stop(world: World, cast: Cast) -> ActionResult:
 
 
 def _overcharge(world: World, cast: Cast) -> None:
-    """Let a battery work faster and for nothing for a while."""
+    """Make a battery work faster and without energy for a while."""
     buffs.apply(world, cast.target, OVERCHARGE, source=cast.slot, loops=number(cast, "duration_loops"))
 
 
@@ -99,7 +99,7 @@ def _cant_overcharge(world: World, cast: Cast) -> ActionResult:
 def recharge_by_click(
     world: World, slots: list[int], target: int, _: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
-    """The right click of a battery on a unit: recharge it, if that is possible now."""
+    """Right-click a unit with a battery: recharge it, if that is possible now."""
     taken: list[int] = []
     for slot in slots if target != NOBODY else ():
         card = world.catalog.abilities_of(int(world.type[slot]))

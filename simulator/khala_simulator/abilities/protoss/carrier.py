@@ -1,7 +1,7 @@
 """The Carrier and its Interceptors: building them, sending them out, calling them back, and losing them.
 
-An Interceptor belongs to its Carrier (column ``home``). In the hangar it is a passenger; outside it attacks whom the
-Carrier attacks, as far as the leash allows, and else flies back. With the Carrier all of them die.
+An Interceptor belongs to its Carrier (column ``home``). In the hangar it is a passenger; outside it attacks the
+Carrier's target, as far as the leash allows, and otherwise flies back. When the Carrier dies, all its Interceptors die.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 ARM = 1042
 INTERCEPTOR = "Interceptor"
 EQUIPPED, NEXT_LAUNCH = "hangar", "launch"
-DOCKING_GAP = 1.1  # a follower stops within this of whom it follows
+DOCKING_GAP = 1.1  # a follower stops within this distance of the unit that it follows
 
 
 def crew_of(world: World, carrier: int) -> list[int]:
-    """The Interceptors of a Carrier, in the hangar and outside, ascending."""
+    """Return the Interceptors of a Carrier, in the hangar and outside, ascending."""
     crew: list[int] = which(world.home[: world.top] == carrier).tolist()
     return crew
 
 
 def add_interceptor(world: World, carrier: int) -> int:
-    """Put a new Interceptor into a Carrier's hangar; returns its slot."""
+    """Put a new Interceptor into a Carrier's hangar; return its slot."""
     x, y = world.pos[carrier].tolist()
     slot = lifecycle.spawn(world, world.catalog.unit(INTERCEPTOR), int(world.owner[carrier]), (x, y))
     world.home[slot] = carrier
@@ -60,7 +60,7 @@ def _arm(world: World, slots: list[int], ability: Ability, _: int, __: Point | N
 
 
 def _has_place(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Whether the hangar and its queue take one more."""
+    """Refuse if the hangar and its queue have no room for one more."""
     queued = len(world.jobs.get(slot, ()))
     if queued >= production.QUEUE:
         return ActionResult.QUEUE_IS_FULL
@@ -72,7 +72,7 @@ def _has_place(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def _tend(world: World, slots: list[int]) -> None:
-    """Equip new Carriers, launch where there is somebody to attack, and tell those outside what to do."""
+    """Equip new Carriers, launch where there is a target, and direct the Interceptors outside."""
     ability = world.catalog.ability(ARM)
     out = _outside(world)
     for carrier in slots:
@@ -94,7 +94,7 @@ def _outside(world: World) -> Ints:
 
 
 def _equip(world: World, carrier: int, count: int) -> None:
-    """Give a new Carrier the Interceptors that it begins with; an image has none."""
+    """Give a new Carrier its first Interceptors; a hallucination has none."""
     world.timers[carrier][EQUIPPED] = 0.0
     if not world.hallucination[carrier]:
         for _ in range(count):
@@ -116,7 +116,7 @@ def _launch(world: World, carrier: int, prey: int, ability: Ability) -> None:
 
 
 def _direct(world: World, slot: int, carrier: int, leash: float) -> None:
-    """Attack the Carrier's prey, go on with the own one while the leash allows, else come home."""
+    """Attack the Carrier's target, go on with its own one while the leash allows, else return."""
     prey = int(world.target[carrier]) if world.in_reach[carrier] else NOBODY
     own = int(world.order_target[slot]) if world.order_kind[slot] == OrderKind.ATTACK_UNIT else NOBODY
     if prey == NOBODY and own != NOBODY and gap(world, carrier, own) <= leash:
@@ -138,7 +138,7 @@ def _attack(world: World, slot: int, prey: int) -> None:
 
 
 def _take_along(world: World, carrier: int) -> None:
-    """The Interceptors of a Carrier that dies die with it."""
+    """Kill the Interceptors of a Carrier that dies."""
     for slot in crew_of(world, carrier):
         if world.carrier[slot] == NOBODY:
             world.life[slot] = 0.0

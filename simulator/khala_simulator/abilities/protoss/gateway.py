@@ -38,14 +38,14 @@ LEFT_BEHIND: Final = (
 
 
 def _landing(world: World, cast: Cast) -> Point | None:
-    """Where a blink ends: the free place in sight that is nearest to its aim and no farther away than it reaches."""
+    """Return where a blink ends: the visible free place within its range that is nearest to its aim."""
     reach = number(cast, "distance")
     aim = teleport.within(world, cast.slot, place_of(world, cast), reach)
     return teleport.spot_near(world, cast.slot, aim, reach=reach, seen_by=int(world.owner[cast.slot]))
 
 
 def _blink(world: World, cast: Cast) -> None:
-    """Be at a place in sight, no farther away than it reaches, at once."""
+    """Teleport at once to a visible place within range."""
     point = _landing(world, cast)
     if point is not None:
         teleport.turn(world, cast.slot, point)
@@ -53,7 +53,7 @@ def _blink(world: World, cast: Cast) -> None:
 
 
 def _stride(world: World, cast: Cast) -> None:
-    """Be at a place in sight at once; since 5.0.13 no attack follows for a second."""
+    """Teleport at once to a visible place; since 5.0.13 the unit can't attack for a second afterwards."""
     _blink(world, cast)
     if STRIDE_DELAY in world.catalog.buff_of_name:
         buffs.apply(world, cast.slot, STRIDE_DELAY, source=cast.slot)
@@ -69,7 +69,7 @@ def _cant_blink(world: World, cast: Cast) -> ActionResult:
 
 
 def _prey(world: World, slot: int, ability: Ability) -> int:
-    """Whom a Zealot with autocast charges: whoever it attacks, when that is near enough and not beside it."""
+    """Return the unit that a Zealot with autocast charges: its target, if near enough and not adjacent."""
     target = int(world.target[slot])
     if target == NOBODY or not world.can_attack[slot] or world.holds[slot]:
         return NOBODY
@@ -145,7 +145,7 @@ def _phase_shift(world: World, cast: Cast) -> None:
 
 
 def _shift(world: World, area: AreaEffect) -> None:
-    """Send the Adept to its shade when the time has come; let the shade go when the Adept is dead or has given up."""
+    """Send the Adept to its shade when the time has come; end the shade when the Adept is dead or has cancelled."""
     adept, shade = world.slot_of(area.source), world.slot_of(area.target)
     held = adept != NOBODY and buffs.has(world, adept, SHIFTING) and world.carrier[adept] == NOBODY
     if shade == NOBODY or not held:
@@ -171,7 +171,7 @@ def _arrive(world: World, adept: int, shade: int) -> None:
 
 
 def _cancel_shift(world: World, cast: Cast) -> None:
-    """Give up the shift: told to the Adept or to its shade."""
+    """Cancel the shift; the Adept or its shade may take the order."""
     tag = world.tag_of(cast.slot)
     for area in world.area_effects:
         if area.rule == "phase_shift" and tag in (area.source, area.target):

@@ -1,7 +1,7 @@
 """Skills over large areas: Mass Recall of the Mothership and of the Nexus, Time Warp, and the cloaking field.
 
-A recall marks the units it takes; each of them leaves when its mark runs out. Time Warp is an area effect that lays a
-slowing buff on enemies in every loop, and so does the cloaking field with friends.
+A recall marks the units it takes; each of them leaves when its mark runs out. Time Warp is an area effect that applies
+a slowing buff to enemies in every loop; the cloaking field does the same with its own buff for friends.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SCRAMBLED = "RavenScramblerMissile"
 
 
 def _taken(world: World, cast: Cast) -> list[int]:
-    """Whom a recall would take: the owner's units in the circle, less its caster and what is bound elsewhere."""
+    """Return the units that a recall would take: the owner's in the circle, except its caster and bound ones."""
     near = around(world, place_of(world, cast), number(cast, "radius"), structures=False)
     return [
         slot
@@ -63,7 +63,7 @@ def _recall(world: World, cast: Cast) -> None:
 
 
 def _bring(world: World, area: AreaEffect) -> None:
-    """Take the marked units along at the end; without the caster they stay and are free."""
+    """Teleport the marked units at the end; if the caster is gone they stay and are free."""
     caster = world.slot_of(area.source)
     lost = caster == NOBODY or buffs.has(world, caster, SCRAMBLED)
     if not lost and world.loop < area.end:
@@ -85,7 +85,7 @@ def _marked(world: World, name: str, area: AreaEffect) -> list[int]:
 
 
 def _arrive(world: World, slot: int, area: AreaEffect) -> None:
-    """Stand as far from the destination as it stood from the middle of the recall, or as near to there as it fits."""
+    """Place the unit at its old offset from the middle of the recall, or as near to there as it fits."""
     (from_x, from_y), (to_x, to_y) = area.points
     x, y = world.pos[slot].tolist()
     wanted = to_x + x - from_x, to_y + y - from_y
@@ -120,7 +120,7 @@ def _slow(world: World, area: AreaEffect) -> None:
 
 
 def _always_cloaks(world: World, slots: list[int]) -> None:
-    """Where the field is no ability (4.10) every Mothership has it from the beginning."""
+    """Give every Mothership the field from the beginning where it is no ability (4.10)."""
     if world.catalog.buff(CLOAK_FIELD).loops:
         return
     for slot in slots:
@@ -148,7 +148,7 @@ def _cloak(world: World, cast: Cast) -> None:
 
 
 def _chrono_boost(world: World, cast: Cast) -> None:
-    """Let a structure work faster for a while."""
+    """Make a structure work faster for a while."""
     buffs.apply(world, cast.target, str(cast.ability.numbers["buff"]), source=cast.slot)
 
 

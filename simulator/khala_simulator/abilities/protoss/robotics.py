@@ -1,7 +1,7 @@
 """Skills of what the robotics facility makes: Purification Nova and the Immortal's barrier.
 
-Observers and Warp Prisms change mode by the common morph. The nova is a unit that its player may steer; an area
-effect ties it to its Disruptor and lets it burst when its time is over.
+Observers and Warp Prisms change mode by the common morph. The nova is a unit that its player may steer; an area effect
+ties it to its Disruptor and makes it burst when its time is over.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _burn(world: World, area: AreaEffect) -> None:
 
 
 def _burst(world: World, area: AreaEffect, disruptor: int, nova: int) -> None:
-    """Hurt everybody on the ground around the nova, friends too; only the owner's own Disruptors are spared."""
+    """Hurt every ground unit around the nova, friends too; only the owner's own Disruptors are spared."""
     ability = world.catalog.ability(area.ability)
     x, y = world.pos[nova].tolist()
     amount, bonus = number(ability, "damage"), number(ability, "bonus_vs_shields")
@@ -95,8 +95,8 @@ def _burst(world: World, area: AreaEffect, disruptor: int, nova: int) -> None:
 def _guard(world: World, slots: list[int]) -> None:
     """Raise and lower the barriers of Immortals.
 
-    Where the barrier stands by itself (5.0.13) it lasts for a while after the first damage to it; before (4.10) it is
-    the first damage that raises it. Then it is a while until the next one.
+    Where the barrier is always up (5.0.13), it lasts for a while after the first damage to it; before (4.10), the first
+    damage raises it. Then a cooldown runs until the next one.
     """
     stands = BARRIER_SPENT in world.catalog.buff_of_name
     for slot in slots:
@@ -139,7 +139,7 @@ def _raise(world: World, slot: int) -> None:
 
 
 def _raise_by_order(world: World, cast: Cast) -> None:
-    """Raise a barrier that takes damage in its bearer's stead; Immortals do it by themselves."""
+    """Raise a barrier that absorbs damage; Immortals do it by themselves."""
     _raise(world, cast.slot)
 
 

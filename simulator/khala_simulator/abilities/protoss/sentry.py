@@ -1,7 +1,7 @@
 """The Sentry's skills: Guardian Shield, Force Field and Hallucination.
 
-A force field is a neutral unit whose cells nobody on the ground can enter until it ends, a massive unit comes near or
-a bile breaks it. A guardian shield is an area effect that follows its Sentry and lays a short buff on whom it covers.
+A force field is a neutral unit. No ground unit can enter its cells until it ends, a massive unit comes near or a bile
+breaks it. A guardian shield is an area effect that follows its Sentry and applies a short buff to the units it covers.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MASSIVE: Final = 1 << ATTRIBUTES.index("massive")
 
 
 def _guardian_shield(world: World, cast: Cast) -> None:
-    """Surround the Sentry with a shield that follows it and takes damage from ranged hits on friends."""
+    """Surround the Sentry with a shield that follows it and reduces the damage of ranged hits on friends."""
     end = world.loop + number(cast, "duration_loops")
     lay(world, cast, "guardian_shield", end=end, due=world.loop + 1, effect=SHIELD_EFFECT)
 
@@ -66,7 +66,7 @@ def _place(world: World, slot: int) -> tuple[float, float]:
 
 
 def _force_field(world: World, cast: Cast) -> None:
-    """Put up a wall that nobody on the ground can pass until it ends, or somebody massive breaks it."""
+    """Put up a wall that no ground unit can pass until it ends or a massive unit breaks it."""
     unit = world.catalog.unit("ForceField")
     point = place_of(world, cast)
     slot = lifecycle.spawn(world, unit, 0, point)
@@ -78,7 +78,7 @@ def _force_field(world: World, cast: Cast) -> None:
 
 
 def _push_out(world: World, field: int) -> None:
-    """Put the bodies that stand where a force field appears beside it, each to the nearest place that is free."""
+    """Move the bodies under a new force field beside it, each to the nearest free place."""
     x, y = world.pos[field].tolist()
     for slot in around(world, (x, y), float(world.radius[field]), plane="ground", structures=False):
         unit = world.unit_type(slot)

@@ -58,7 +58,7 @@ def _lift(world: World, cast: Cast) -> None:
 
 
 def _unearth(world: World, slot: int) -> None:
-    """Make a burrowed unit the one that it is above the ground."""
+    """Turn a burrowed unit into its unburrowed type."""
     unit = world.unit_type(slot)
     above = unit.name.replace("Burrowed", "")
     if unit.burrowed and above in world.catalog.row_of_name:
@@ -82,7 +82,7 @@ def _lifter_done(world: World, cast: Cast) -> None:
 
 
 def _put_down(world: World, slot: int, _: np.void) -> None:
-    """What is not held any longer comes down beside whoever stands there."""
+    """Put down a unit that is no longer held, beside any unit that stands there."""
     buffs.remove(world, slot, LIFT_HEIGHT)
     x, y = world.pos[slot].tolist()
     teleport.to(world, slot, teleport.spot_near(world, slot, (x, y)) or (x, y))
@@ -90,7 +90,7 @@ def _put_down(world: World, slot: int, _: np.void) -> None:
 
 
 def _retarget(world: World, slot: int) -> None:
-    """Units that fight one that has changed its plane take the weapon that fits now, or let go."""
+    """Switch the attackers of a unit that changed its plane to the weapon that fits now, or end their fight."""
     for fighter in (world.target[: world.top] == slot).nonzero()[0].tolist():
         if not targets.engage(world, fighter, slot):
             targets.disengage(world, fighter)
@@ -144,7 +144,7 @@ def _mind_energy(world: World, slots: list[int]) -> None:
 
 
 def _reveal(world: World, cast: Cast) -> None:
-    """Let the owner see the enemies around a place for a while, cloaked ones too."""
+    """Show the owner the enemies around a place for a while, cloaked ones too."""
     owner = int(world.owner[cast.slot])
     near = around(world, place_of(world, cast), number(cast, "radius"))
     for slot in foes(world, near, owner):
@@ -191,7 +191,7 @@ def _trap_done(world: World, area: AreaEffect) -> None:
 
 
 def _intruder(world: World, slot: int, ability: Ability) -> int:
-    """Somebody who sets off a trap: an enemy on the ground within reach, or the trap itself for nobody."""
+    """Return the trap itself if an enemy on the ground within reach sets it off, else NOBODY."""
     x, y = world.pos[slot].tolist()
     reach = ability.autocast_range + float(world.radius[slot])
     near = _catchable(world, slot, around(world, (x, y), reach, plane="ground", structures=False))
@@ -213,7 +213,7 @@ def _cant_spring(world: World, cast: Cast) -> ActionResult:
 
 
 def _spring(world: World, cast: Cast) -> None:
-    """The trap shows itself, catches everybody around it after a moment, and is gone a little later."""
+    """Show the trap, catch every unit around it after a moment, and remove it a little later."""
     slot = cast.slot
     x, y = world.pos[slot].tolist()
     delay = number(cast, "delay_loops")

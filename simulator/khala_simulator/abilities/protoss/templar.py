@@ -1,7 +1,7 @@
 """The Templars' skills: Psi Storm, Feedback and the merging of two into an Archon.
 
-A storm searches its circle again and again and lays a buff on whom it finds; the buff does the damage. It lies once on
-a unit, so that storms do not add up, and goes on for a moment after the unit has left.
+A storm searches its circle again and again and applies a buff to the units it finds; the buff does the damage. A unit
+has it only once, so that storms do not add up, and it goes on for a moment after the unit has left.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ SPARED_BY_FEEDBACK: Final = frozenset({"OrbitalCommand", "OrbitalCommandFlying",
 
 
 def _psi_storm(world: World, cast: Cast) -> None:
-    """Let a storm rage at a place that hurts everybody in it but structures."""
+    """Start a storm at a place; it hurts everything in it except structures."""
     period = number(cast, "search_period_loops")
     end = world.loop + period * (number(cast, "searches") - 1) + ROUNDING
     lay(world, cast, "psi_storm", end=end, due=world.loop, effect=STORM_EFFECT, period=period)
 
 
 def _search(world: World, area: AreaEffect) -> None:
-    """Find whom the storm touches, friends too: who is new to it takes damage at once."""
+    """Find the units that the storm touches, friends too; new ones take damage at once."""
     source = world.slot_of(area.source)
     for slot in around(world, area.at, area.radius, structures=False):
         fresh = not buffs.has(world, slot, STORM_BUFF)
@@ -83,7 +83,7 @@ def _cant_feed_back(world: World, cast: Cast) -> ActionResult:
 
 
 def _pair(world: World, cast: Cast) -> None:
-    """Send the unit and the nearest other one that was told to merge to each other; without one nothing happens."""
+    """Send the unit and the nearest other one with the merge order to each other; without one nothing happens."""
     slot = cast.slot
     asked = which(world.casts[: world.top] & (world.order_ability[: world.top] == cast.ability.id))
     asked = asked[(world.owner[asked] == world.owner[slot]) & (asked != slot)]
@@ -96,7 +96,7 @@ def _pair(world: World, cast: Cast) -> None:
 
 
 def _fuse(world: World, cast: Cast) -> None:
-    """Become an Archon with another Templar, beside it; it takes its time to form."""
+    """Merge with another Templar beside it into an Archon, which takes its time to form."""
     one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
     x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
     archon = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))

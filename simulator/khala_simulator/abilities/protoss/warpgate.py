@@ -1,7 +1,7 @@
 """The skill of Warp Gates: warping a unit into a power field, from far away.
 
-The unit is there at once, helpless and vulnerable, until it is finished: soon in a field that a Nexus, a Gateway or a
-Warp Prism is near, later in others. The gate then needs its time before the next one.
+The unit appears at once, but is helpless and vulnerable until it is finished: soon in a field near a Nexus, a Gateway
+or a Warp Prism, later in others. The gate then has a cooldown before the next one.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ def _can_warp_in(world: World, cast: Cast) -> ActionResult:
 
 
 def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
-    """Why a player can't warp a unit in at a point, or success."""
+    """Return why a player can't warp a unit in at a point, or success."""
     if power.best(world, player, point) is None:
         return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
     return ActionResult.SUCCESS if _is_free(world, unit, point) else ActionResult.CANT_WARP_IN_UNITS_THERE
 
 
 def _is_free(world: World, unit: UnitType, point: Point) -> bool:
-    """Whether a unit's body touches nobody and no wall at a point."""
+    """Return whether a unit's body touches no other body and no wall at a point."""
     at = np.array([point])
     surface = pathfinding.surface(world.ground, layer_of(unit))
     if not surface.flat[surface.cell(at)][0]:
@@ -73,7 +73,7 @@ def _is_free(world: World, unit: UnitType, point: Point) -> bool:
 
 
 def _hurry(world: World, slots: list[int]) -> None:
-    """Let a gate be ready sooner as long as its work passes faster, as under Chrono Boost."""
+    """Shorten a gate's cooldown while it works faster, as under Chrono Boost."""
     if not len(world.buffs):
         return
     for slot in slots:

@@ -1,6 +1,6 @@
-"""Skills that units of every race have: changing mode, and buffs that need no more than being laid on.
+"""Skills that units of every race have: changing mode, and buffs that only need to be applied.
 
-A morph is an ability whose time passes while the unit stands still, and that then makes it one of another type.
+A morph is an ability whose time passes while the unit stands still; then the unit changes its type.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def on_self(buff: str) -> Effect:
-    """An effect that lays a buff on the caster, for as long as the ability or else the buff says."""
+    """Return an effect that applies a buff to the caster, for as long as the ability or else the buff says."""
 
     def effect(world: World, cast: Cast) -> None:
-        """Bear a buff for a time."""
+        """Apply a buff to the caster for a time."""
         loops = cast.ability.numbers.get("duration_loops")
         buffs.apply(world, cast.slot, buff, source=cast.slot, loops=loops)
 
@@ -32,10 +32,10 @@ def on_self(buff: str) -> Effect:
 
 
 def on_target(buff: str) -> Effect:
-    """An effect that lays a buff on the target."""
+    """Return an effect that applies a buff to the target."""
 
     def effect(world: World, cast: Cast) -> None:
-        """Lay a buff on the target for a time."""
+        """Apply a buff to the target for a time."""
         loops = cast.ability.numbers.get("duration_loops")
         buffs.apply(world, cast.target, buff, source=cast.slot, loops=loops)
 
@@ -43,17 +43,17 @@ def on_target(buff: str) -> Effect:
 
 
 def off_self(buff: str) -> Effect:
-    """An effect that takes a buff off the caster."""
+    """Return an effect that removes a buff from the caster."""
 
     def effect(world: World, cast: Cast) -> None:
-        """Lay down a buff."""
+        """Remove a buff from the caster."""
         buffs.remove(world, cast.slot, buff)
 
     return effect
 
 
 def _morph(world: World, cast: Cast) -> None:
-    """Become what the ability makes; the time it takes has passed (see ``casting.prep_loops``)."""
+    """Become the type that the ability makes; its time has already passed (see ``casting.prep_loops``)."""
     lifecycle.become(world, cast.slot, world.catalog.unit(cast.ability.unit))
     push_units_off(world, cast.slot)
 
@@ -69,7 +69,7 @@ def _can_morph(world: World, cast: Cast) -> ActionResult:
 
 
 def _walkable(world: World, slot: int) -> bool:
-    """Whether the ground under a flyer bears walkers."""
+    """Return whether the ground under a flyer is walkable."""
     surface = pathfinding.surface(world.ground, Layer.WALK)
     return bool(surface.flat[surface.cell(world.pos[slot][None])][0])
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def cancelling(cancelled: str) -> Skill:
-    """The skill that ends an order to use an ability with the effect ``cancelled``; what waits behind it begins."""
+    """Return the skill that ends an order with the effect ``cancelled``; the next order in the queue begins."""
 
     def refuse(world: World, cast: Cast) -> ActionResult:
         used = world.catalog.ability_of_id.get(int(world.order_ability[cast.slot]))

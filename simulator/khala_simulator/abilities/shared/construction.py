@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 
 IN_PROGRESS: Final = frozenset({"BuildInProgress", "BuildinProgressNydusCanal", "Warpable"})
-"""The groups of abilities that call off what is being built or warped in itself."""
+"""The groups of abilities by which an unfinished structure or unit calls itself off."""
 
 
 # placing --------------------------------------------------------------------------------------------------------------
 
 
 def _place(world: World, cast: Cast) -> None:
-    """Begin a structure where it was asked for."""
+    """Begin a structure at the point of the cast."""
     unit, slot = building_sites.product(world, cast.ability), cast.slot
     if unit is None:
         return
@@ -55,7 +55,7 @@ def _place(world: World, cast: Cast) -> None:
 
 
 def _rich(world: World, unit: UnitType, geyser: int) -> UnitType:
-    """The kind of gas structure that stands on a rich geyser."""
+    """Return the kind of gas structure that stands on a rich geyser."""
     name = f"{unit.name}Rich"
     rich = world.unit_type(geyser).per_trip > unit.per_trip and name in world.catalog.row_of_name
     return world.catalog.unit(name) if rich else unit
@@ -88,7 +88,7 @@ def _is_known(world: World, _: int, ability: Ability) -> ActionResult:
 
 
 def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Point | None, __: bool) -> list[int]:
-    """Begin a structure far away, as a Nydus Network does its worms."""
+    """Begin a structure far away, as a Nydus Network does with its worms."""
     unit = building_sites.product(world, ability)
     if unit is None or point is None:
         return []
@@ -103,7 +103,7 @@ def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Poi
 
 
 def resume(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
-    """The right click of a Terran builder on an unfinished structure: go on with it."""
+    """Right-click an unfinished structure with a Terran builder: go on with it."""
     unit = world.unit_type(target) if target != NOBODY else None
     if unit is None or world.build_progress[target] >= 1.0 or world.self_made[target]:
         return []
@@ -136,7 +136,7 @@ def _is_at_work(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def _cancel(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
-    """Call off a construction, a structure's change of kind or its add-on, or a mode change that is being prepared."""
+    """Call off a construction, a structure's change of kind or its add-on, or a pending mode change."""
     for slot in slots:
         if world.build_progress[slot] < 1.0:
             construction.call_off(world, slot)
@@ -156,7 +156,7 @@ def _cancel_change(world: World, slot: int) -> None:
 
 
 def _has_something(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Whether there is anything of this kind to call off."""
+    """Refuse if there is nothing of this kind to call off."""
     if world.build_progress[slot] < 1.0:
         return ActionResult.SUCCESS if ability.link in IN_PROGRESS else ActionResult.CANT_FIND_CANCEL_ORDER
     if ability.link in IN_PROGRESS:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _gather(world: World, slots: list[int], _: Ability, target: int, __: Point | None, queue: bool) -> list[int]:
-    """Harvest a mineral field or a gas structure, and bring home what it gives, until told otherwise."""
+    """Harvest a mineral field or a gas structure, and bring home the load, until another order comes."""
     return commands.gather(world, slots, target, queue=queue)
 
 
@@ -45,7 +45,7 @@ def _can_return(world: World, cast: Cast) -> ActionResult:
 
 
 def _let_out(world: World, slot: int) -> None:
-    """Who is in a gas structure when it is destroyed comes out of it."""
+    """Release the workers inside a gas structure when it is destroyed."""
     for worker in world.passengers(slot):
         commands.begin(world, worker, None)
 

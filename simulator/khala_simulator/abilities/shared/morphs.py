@@ -1,8 +1,8 @@
 """Morphs that are paid for when they begin and take their time in a cocoon or in place, and calling morphs off.
 
-A Zergling that becomes a Baneling, a Hatchery that becomes a Lair: the price is charged at the beginning, the unit is a
-cocoon (if there is one) until the time has passed, and nothing but calling it off ends it before. Burrowing and the
-like, which cost nothing, are ``basics``' morphs; here is how those are called off.
+A Zergling that becomes a Baneling, a Hatchery that becomes a Lair: the price is charged at the beginning, and the unit
+is a cocoon (if there is one) until the time has passed or the morph is called off. Morphs that cost nothing, such as
+burrowing, are in ``basics``; calling them off is here.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def _grow(world: World, cast: Cast) -> None:
-    """Become a cocoon, if there is one, and in the end something new."""
+    """Become a cocoon, if there is one, and at the end the new type."""
     world.cast_begun[cast.slot], world.cast_at[cast.slot] = world.loop, world.loop + cast.ability.loops
     cocoon = str(cast.ability.numbers.get("cocoon", ""))
     if cocoon:
@@ -44,7 +44,7 @@ def _grows(world: World, cast: Cast) -> bool:
 
 
 def _renewed(world: World, slot: int, unit: UnitType) -> None:
-    """Become another type with all of its life, as what comes into or out of a cocoon has."""
+    """Become another type with full life, as when a unit enters or leaves a cocoon."""
     lifecycle.become(world, slot, unit)
     world.life[slot] = world.life_max[slot]
     world.energy[slot] = min(
@@ -57,13 +57,13 @@ def _can_grow(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def grows(world: World, slot: int) -> bool:
-    """Whether a unit is in the midst of such a morph."""
+    """Return whether a unit is in the middle of such a morph."""
     growing = world.channelling.get(slot)
     return growing is not None and growing.ability.effect == "grow"
 
 
 def call_off(world: World, slot: int) -> None:
-    """Make a growing unit what it was before; three quarters of the price come back."""
+    """Turn a growing unit back into its former type; refund three quarters of the price."""
     growing = world.channelling[slot]
     was = world.catalog.units[growing.was]
     if world.type[slot] != was.row:
@@ -73,7 +73,7 @@ def call_off(world: World, slot: int) -> None:
 
 
 def _call_off_growth(world: World, cast: Cast) -> None:
-    """Become what it was before; three quarters of the price come back."""
+    """Turn back into the former type; refund three quarters of the price."""
     if grows(world, cast.slot):
         call_off(world, cast.slot)
 
@@ -83,7 +83,7 @@ def _grows_now(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def _call_off_morph(world: World, cast: Cast) -> None:
-    """Stay what it is: the morph under way is dropped."""
+    """Drop the morph under way and stay the same type."""
     commands.begin_next(world, cast.slot)
 
 

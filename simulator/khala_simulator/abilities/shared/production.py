@@ -1,7 +1,7 @@
 """Skills of structures and eggs: training, changing kind, rally points, and calling off what is in a queue.
 
-They take effect at once and leave orders alone; the work is ``systems.production``'s. Of several units told to train
-only one does: the one with the shortest queue (with a reactor it counts half), the nearest to idle first.
+They take effect at once and leave orders alone; the work is ``systems.production``'s. When several units get the order
+to train, only one does: the one with the shortest queue (with a reactor it counts half), the nearest to idle first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 COCOONS: Final = {"Larva": "Egg"}
-"""What a unit that becomes another one is while it does."""
+"""The type of a unit while it changes into another one."""
 MORPHS: Final = frozenset({"structure_morph", "addon", "grow"})
 WORKERS: Final = 3690  # the general ability that sets a rally point for workers
 
@@ -44,7 +44,7 @@ def _length(world: World, slot: int) -> float:
 
 
 def has_place(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Whether a queue takes one more job of this kind."""
+    """Refuse if a queue has no room for one more job of this kind."""
     if ability.unit and ability.unit not in world.catalog.row_of_name:
         return ActionResult.NOT_SUPPORTED
     jobs = world.jobs.get(slot, [])
@@ -56,7 +56,7 @@ def has_place(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def _change(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
-    """Have a structure become one of another kind; it makes nothing else meanwhile."""
+    """Make a structure change its kind; it makes nothing else meanwhile."""
     for slot in slots:
         production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
     return slots
@@ -72,7 +72,7 @@ def _can_change(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def cancel_last(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, ____: bool) -> list[int]:
-    """Call off the last job of a queue; an egg becomes a larva again, and a cocoon what it was."""
+    """Call off the last job of a queue; an egg becomes a larva again, and a cocoon its former type."""
     growing = [slot for slot in slots if morphs.grows(world, slot)]
     for slot in growing:
         morphs.call_off(world, slot)
@@ -97,7 +97,7 @@ def _hatch_back(world: World, slot: int) -> None:
 
 
 def has_job(world: World, slot: int, _: Ability) -> ActionResult:
-    """Whether there is anything to call off."""
+    """Refuse if there is nothing to call off."""
     found = slot in world.jobs or morphs.grows(world, slot)
     return ActionResult.SUCCESS if found else ActionResult.CANT_FIND_CANCEL_ORDER
 
@@ -106,7 +106,7 @@ def has_job(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def _rally(world: World, slots: list[int], ability: Ability, target: int, point: Point | None, _: bool) -> list[int]:
-    """Say where new units are sent; at itself it is forgotten."""
+    """Set where new units are sent; aimed at the structure itself it is forgotten."""
     kind = "workers" if ability.general == WORKERS else "units"
     for slot in slots:
         set_rally(world, slot, kind, target, point)
@@ -127,7 +127,7 @@ def set_rally(world: World, slot: int, kind: str, target: int, point: Point | No
 
 
 def rally_by_click(world: World, slots: list[int], target: int, point: Point | None, _: bool) -> list[int]:
-    """The right click with a structure: a rally point, for workers on a resource, else for all."""
+    """Set a rally point by right click: for workers if it is on a resource, else for all units."""
     taken = []
     for slot in slots:
         card = world.catalog.abilities_of(int(world.type[slot]))
@@ -142,7 +142,7 @@ def rally_by_click(world: World, slots: list[int], target: int, point: Point | N
 
 
 def _sends_units(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Whether units come of it: a structure, an egg, or a unit that is itself still in the making."""
+    """Refuse what produces no units: all but structures, eggs, and units that are themselves unfinished."""
     finished = world.build_progress[slot] >= 1.0
     return ActionResult.ERROR if ability.link == "ProgressRally" and finished else ActionResult.SUCCESS
 

@@ -1,9 +1,9 @@
 """Projectiles of abilities: they chase a unit or head for a point and do something where they arrive.
 
-A missile of a weapon lives in ``world.missiles``; one of an ability is an area effect, because what it does on
-arrival is a rule and not damage. Abilities call ``launch`` for a missile that moves and put a rule of theirs into
-``ARRIVALS``; a missile whose target has died or can't be touched any more is lost. What is thrown (``throw``) is not
-seen on its way: its rule runs once, when it is due. Speeds are estimates (see ``data/mechanics.yaml`` and
+A weapon's missile lives in ``world.missiles``; an ability's missile is an area effect, because on arrival it runs a
+rule instead of dealing damage. Abilities call ``launch`` for a missile that moves and register their rule in
+``ARRIVALS``; a missile is lost when its target dies or can't be touched any more. A thrown object (``throw``) is
+invisible on its way: its rule runs once, when it is due. Speeds are estimates (see ``data/mechanics.yaml`` and
 ``missile_speed_n`` of the abilities, per normal second).
 """
 
@@ -36,7 +36,7 @@ where it arrived) and the target (a slot, or NOBODY for one that was sent to a p
 
 
 def launch(world: World, cast: Cast, speed_n: float) -> AreaEffect:
-    """Send a missile on its way from the caster to what the cast is aimed at; it flies from the next loop on."""
+    """Send a missile from the caster to the cast's target; it flies from the next loop on."""
     return launch_at(world, cast.ability, cast.slot, cast.target, speed_n, point=cast.point)
 
 
@@ -65,7 +65,7 @@ def launch_at(
 
 
 def fly(world: World, missile: AreaEffect) -> None:
-    """Move a missile by one loop, and let it arrive at its target's edge or at its point."""
+    """Move a missile by one loop; at its target's edge or its point it arrives."""
     target = world.slot_of(missile.target) if missile.target else NOBODY
     if missile.target and (target == NOBODY or not _touchable(world, target)):
         end(world, missile)
@@ -89,7 +89,7 @@ def end(world: World, missile: AreaEffect) -> None:
 
 
 def flown(missile: AreaEffect) -> float:
-    """How far a missile is from where it was launched."""
+    """Return the distance of a missile from its launch point."""
     (x, y), memory = missile.at, missile.memory
     return math.hypot(x - memory["from_x"], y - memory["from_y"])
 
@@ -109,7 +109,7 @@ def _goal(world: World, missile: AreaEffect, target: int) -> Point:
 
 
 def flight_loops(world: World, cast: Cast) -> int:
-    """Loops from the throw until it arrives: at the point, or at the edge of the target where it stands now."""
+    """Return the loops from the throw until it arrives: at the point, or at the target's present edge."""
     step = number(cast, "missile_speed_n") / LOOPS_PER_NORMAL_SECOND
     if cast.target == NOBODY:
         return math.ceil(distance(world, cast.slot, place_of(world, cast)) / step)

@@ -1,4 +1,4 @@
-"""Push units off the cells that a structure comes to stand on, such as a depot that rises."""
+"""Push units off the cells of a structure that appears, such as a depot that rises."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ JUST_TOUCHING = 1e-6
 
 
 def push_units_off(world: World, slot: int) -> None:
-    """Move the units off the cells that a structure has just come to stand on, each to the nearest free place."""
+    """Move the units off the cells of a structure that has just appeared, each to the nearest free place."""
     cells = world.footprint_cells(slot)
     if not len(cells) or world.unit_type(slot).underfoot:
         return
@@ -29,7 +29,7 @@ def push_units_off(world: World, slot: int) -> None:
 
 
 def _on(world: World, cells: Ints) -> Ints:
-    """Slots of the units on the ground that reach into the box around the cells."""
+    """Return the slots of the units on the ground that reach into the box around the cells."""
     slots = world.live
     solid = (world.plane_bits[slots] & GROUND_PLANE != 0) & (world.layer_bits[slots] != 0)
     slots = slots[solid & ~world.walled[slots]]

@@ -1,6 +1,7 @@
-"""Teleports: units that are elsewhere at once, where they fit, and units that appear beside their maker.
+"""Teleports: put units elsewhere at once, where they fit, or new units beside their maker.
 
-Used by blinks, recalls, phase shifts, transports and summons. What a teleport costs and who may is the skills' matter.
+Used by blinks, recalls, phase shifts, transports and summons. The skills decide what a teleport costs and who may use
+it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ EDGE = 1e-6
 
 
 def to(world: World, slot: int, point: Point) -> None:
-    """Put a unit elsewhere at once; its way is looked for anew from there."""
+    """Put a unit elsewhere at once; its way is searched again from there."""
     world.pos[slot] = world.nav_point[slot] = world.guard[slot] = point
     world.speed[slot] = 0.0
     world.aside[slot] = 0.0
@@ -35,7 +36,7 @@ def to(world: World, slot: int, point: Point) -> None:
 
 
 def turn(world: World, slot: int, point: Point) -> None:
-    """Let a unit face a point at once, unless it stands on it."""
+    """Turn a unit to face a point at once, unless it stands on it."""
     offset = np.array(point) - world.pos[slot]
     length = float(geometry.length(offset[None])[0])
     if length > EDGE and not world.unit_type(slot).unturnable:
@@ -45,11 +46,11 @@ def turn(world: World, slot: int, point: Point) -> None:
 def spot_near(
     world: World, slot: int, point: Point, *, reach: float = math.inf, seen_by: int | None = None
 ) -> Point | None:
-    """The place nearest to ``point`` where a unit fits, or None when there is none.
+    """Return the place nearest to ``point`` where a unit fits, or None when there is none.
 
     Args:
         world: The game.
-        slot: The unit; its own body is in nobody's way.
+        slot: The unit; its own body is ignored.
         point: Where it is wanted.
         reach: How far from where it is now the place may be, centre to centre.
         seen_by: The place must be in this player's sight.
@@ -72,7 +73,7 @@ SEEN = 2
 
 
 def within(world: World, slot: int, point: Point, reach: float) -> Point:
-    """``point``, or where the straight way to it is ``reach`` long."""
+    """Return ``point``, or where the straight way to it is ``reach`` long."""
     x, y = world.pos[slot].tolist()
     away = math.hypot(point[0] - x, point[1] - y)
     if away <= reach:
@@ -81,7 +82,7 @@ def within(world: World, slot: int, point: Point, reach: float) -> Point:
 
 
 def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int]:
-    """Put new units of the maker's owner where they fit around it; returns their slots."""
+    """Put new units of the maker's owner where they fit around it; return their slots."""
     x, y = world.pos[maker].tolist()
     owner, facing = int(world.owner[maker]), float(geometry.facing(world.heading[maker : maker + 1])[0])
     return [
@@ -91,6 +92,6 @@ def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int
 
 
 def live_until(world: World, slot: int, loop: float) -> None:
-    """Let a unit's life end by itself at a loop."""
+    """Make a unit's life end by itself at a loop."""
     world.expires[slot] = math.ceil(loop)
     world.mortal = True

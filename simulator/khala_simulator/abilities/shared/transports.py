@@ -1,12 +1,12 @@
-"""Transports of all races: loading and unloading, what becomes of passengers, and the right click on a carrier.
+"""Transports of all races: loading, unloading, the fate of passengers, and the right click on a carrier.
 
-What can carry, how much, how far it reaches and how fast it unloads stands in the tables (``cargo_`` of a unit type).
-A mobile carrier goes to its passenger; to one that stands still the passengers come: they follow it with the load
-ability as their order and are taken in when they are beside it. Unloading goes on by itself, a unit per period, until
-the carrier is empty; meanwhile the carrier may move. Who sits in a Bunker keeps a weapon (``traits`` gives it the
-Bunker's edge and one more range). All Nydus entrances of a player share what is inside.
+The tables hold which types carry, how much, how far they reach and how fast they unload (``cargo_`` of a unit type). A
+mobile carrier goes to its passenger. Passengers go to one that stands still: they follow it with the load ability as
+their order and get in when they are beside it. Unloading goes on by itself, a unit per period, until the carrier is
+empty; meanwhile the carrier may move. A unit in a Bunker keeps a weapon (``traits`` gives it the Bunker's edge and one
+more range). All Nydus entrances of a player share what is inside.
 
-Above: ``casting`` and ``systems.passives``. Below: ``teleport`` for where somebody fits.
+Above: ``casting`` and ``systems.passives``. Below: ``teleport`` for where a unit fits.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 FOLLOW = int(OrderKind.FOLLOW)
-BOARDING_GAP = 1.1  # a follower stops within this of whom it follows
+BOARDING_GAP = 1.1  # a follower stops within this distance of the unit that it follows
 UNLOAD_REACH = 4.0  # MaxUnloadRange of the Nydus network; the others have none of their own
 UNLOADING = "unloading"
 NYDUS: Final = frozenset({"NydusNetwork", "NydusCanal"})
@@ -45,7 +45,7 @@ CARRIERS: Final = (
     "PlanetaryFortress", "NydusNetwork", "NydusCanal",
 )  # fmt: skip
 SPILLS: Final = frozenset({"Bunker", "CommandCenter", "CommandCenterFlying", "PlanetaryFortress"})
-"""Carriers whose passengers live on when they die; with the others they die (the catalog's CargoDeath)."""
+"""Carriers whose passengers survive them; passengers of other carriers die with them (the catalog's CargoDeath)."""
 WORKERS_ONLY: Final = frozenset({"CommandCenter", "CommandCenterFlying", "PlanetaryFortress"})
 
 
@@ -53,7 +53,7 @@ WORKERS_ONLY: Final = frozenset({"CommandCenter", "CommandCenterFlying", "Planet
 
 
 def inside(world: World, carrier: int) -> list[int]:
-    """Who sits in a carrier; a player's Nydus entrances hold all the same."""
+    """Return the units in a carrier; all Nydus entrances of a player hold the same ones."""
     if world.unit_type(carrier).name not in NYDUS:
         return world.passengers(carrier)
     owner = int(world.owner[carrier])
@@ -65,13 +65,13 @@ def _entrances(world: World, owner: int) -> list[int]:
 
 
 def room(world: World, carrier: int) -> int:
-    """How much cargo space of a carrier is free."""
+    """Return the free cargo space of a carrier."""
     taken = sum(world.unit_type(slot).cargo_size for slot in inside(world, carrier))
     return world.unit_type(carrier).cargo_space - taken
 
 
 def cant_carry(world: World, carrier: int, passenger: int) -> ActionResult:
-    """Why a carrier can't take a unit in now, ``ActionResult.SUCCESS`` when it can."""
+    """Return why a carrier can't take a unit in now, ``ActionResult.SUCCESS`` when it can."""
     unit, vessel = world.unit_type(passenger), world.unit_type(carrier)
     if world.owner[passenger] != world.owner[carrier]:
         return ActionResult.CANT_LOAD_OTHER_PLAYERS_UNITS
@@ -91,7 +91,7 @@ def cant_carry(world: World, carrier: int, passenger: int) -> ActionResult:
 
 
 def _load(world: World, cast: Cast) -> None:
-    """Take a unit in that has come within reach."""
+    """Load a unit that has come within reach."""
     if cant_carry(world, cast.slot, cast.target) is ActionResult.SUCCESS:
         take_in(world, cast.slot, cast.target)
 
@@ -123,7 +123,7 @@ def _told_to_load(
 
 
 def _board(world: World, slots: list[int], carrier: int, ability: Ability, *, queue: bool) -> list[int]:
-    """Have units walk to a carrier and get in."""
+    """Make units walk to a carrier and get in."""
     order = Order(OrderKind.FOLLOW, ability.id, target=world.tag_of(carrier))
     return commands.give(world, slots, order, queue=queue)
 
@@ -154,19 +154,19 @@ def _nobody_to_load(world: World, cast: Cast) -> ActionResult:
 
 
 def _unload_all(world: World, cast: Cast) -> None:
-    """Begin to let everybody out, one after the other."""
+    """Begin to unload every passenger, one after the other."""
     world.timers.setdefault(cast.slot, {})[UNLOADING] = world.loop
 
 
 def _unload_there(world: World, cast: Cast) -> bool:
-    """Stay at the place until everybody is out; a carrier that unloads at itself goes on as it was told."""
+    """Stay at the place until every passenger is out; a carrier that unloads at itself goes on with its order."""
     return UNLOADING in world.timers.get(cast.slot, {}) and cast.target != cast.slot
 
 
 def _told_to_unload(
     world: World, slots: list[int], ability: Ability, target: int, point: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
-    """Unload on the way when told to do it at the carrier itself, else at the point or beside the unit."""
+    """Unload on the way if the target is the carrier itself, else at the point or beside the unit."""
     own = world.slot_of(target)
     if own in slots and not queue:
         world.timers.setdefault(own, {})[UNLOADING] = world.loop
@@ -176,7 +176,7 @@ def _told_to_unload(
 
 
 def _no_place(world: World, cast: Cast) -> ActionResult:
-    """Whether nobody could stand at the point that is named."""
+    """Refuse if no unit could stand at the named point."""
     if cast.point is None or cast.target != NOBODY:
         return ActionResult.SUCCESS
     unit = world.unit_type(inside(world, cast.slot)[0])
@@ -190,7 +190,7 @@ def _is_empty(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def unload_one(world: World, carrier: int, passenger: int) -> bool:
-    """Let one unit out of a carrier now; returns whether there was a place for it."""
+    """Unload one unit from a carrier now; return whether there was a place for it."""
     x, y = world.pos[carrier].tolist()
     unit = world.unit_type(passenger)
     places = placement.candidates(world, unit, (x, y), UNLOAD_REACH + float(world.radius[carrier]))
@@ -205,7 +205,7 @@ def unload_one(world: World, carrier: int, passenger: int) -> bool:
 
 
 def _unload_unit(world: World, cast: Cast) -> None:
-    """Let the passenger out that was named, or the first one."""
+    """Unload the named passenger, or the first one."""
     found = inside(world, cast.slot)
     if found:
         unload_one(world, cast.slot, cast.target if cast.target in found else found[0])
@@ -215,7 +215,7 @@ def _unload_unit(world: World, cast: Cast) -> None:
 
 
 def _carry(world: World, slots: list[int]) -> None:
-    """Take in who stands beside the carrier and wants in, and let out who is due."""
+    """Load the units beside the carrier that want in, and unload those that are due."""
     following = world.order_kind[: world.top] == FOLLOW
     if np.count_nonzero(following):
         for slot in which(following).tolist():
@@ -243,7 +243,7 @@ def _let_in(world: World, slot: int, carrier: int) -> None:
 
 
 def _let_out(world: World, carrier: int) -> None:
-    """Let the next passenger out, or all at once where there is no period."""
+    """Unload the next passenger, or all at once where there is no period."""
     period = world.unit_type(carrier).unload_period_n * LOOPS_PER_NORMAL_SECOND
     timers = world.timers[carrier]
     for passenger in inside(world, carrier):
@@ -262,7 +262,7 @@ def _let_out(world: World, carrier: int) -> None:
 
 
 def _spill(world: World, slot: int) -> None:
-    """Put everybody beside a carrier that dies."""
+    """Put every passenger beside a carrier that dies."""
     for passenger in world.passengers(slot):
         if not unload_one(world, slot, passenger):
             x, y = world.pos[slot].tolist()
@@ -270,7 +270,7 @@ def _spill(world: World, slot: int) -> None:
 
 
 def _hand_on(world: World, slot: int) -> None:
-    """What sits in a Nydus entrance that dies comes out at another one; without one it dies, too."""
+    """Hand the units in a Nydus entrance that dies to another entrance; without one they die, too."""
     others = [other for other in _entrances(world, int(world.owner[slot])) if other != slot]
     others = [other for other in others if world.life[other] > 0.0 and world.build_progress[other] >= 1.0]
     if others:
@@ -284,7 +284,7 @@ def _hand_on(world: World, slot: int) -> None:
 def load_by_click(
     world: World, slots: list[int], target: int, point: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
-    """Units that are sent to a carrier of their own get in; a carrier that is sent to such a unit takes it in."""
+    """Make units that click on a carrier of their own get in, and a carrier that clicks on such a unit load it."""
     del point
     if target == NOBODY or world.carrier[target] != NOBODY:
         return []
@@ -302,7 +302,7 @@ def load_by_click(
 
 
 def _may_board(world: World, slot: int, carrier: int) -> bool:
-    """Whether a unit would get in; workers rather repair what is damaged."""
+    """Return whether a unit would get in; workers rather repair a damaged carrier."""
     damaged = world.unit_type(slot).worker and world.life[carrier] < world.life_max[carrier]
     return not damaged and cant_carry(world, carrier, slot) is ActionResult.SUCCESS
 

@@ -1,6 +1,6 @@
 """Skills of Terran structures: building a tech lab or a reactor at their side.
 
-The add-on grows by itself; its structure makes nothing meanwhile. Lifting off, landing and taking over add-ons stand
+The add-on grows by itself; its structure makes nothing meanwhile. Lifting off, landing and taking over add-ons are
 elsewhere.
 """
 
@@ -22,7 +22,7 @@ OFFSET: Final = (2.5, -0.5)  # from a structure's middle to that of its add-on
 
 
 def place_of(world: World, slot: int) -> Point:
-    """Where the add-on of a structure stands."""
+    """Return where the add-on of a structure stands."""
     x, y = world.pos[slot].tolist()
     return x + OFFSET[0], y + OFFSET[1]
 

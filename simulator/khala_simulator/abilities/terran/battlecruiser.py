@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def _charge(world: World, cast: Cast) -> None:
-    """Begin to charge; the cooldown that ``casting`` has begun is the one for a charge that is interrupted."""
+    """Begin to charge; the cooldown that ``casting`` has begun is that of an interrupted charge."""
     world.timers.get(cast.slot, {}).pop(cast.ability.timer, None)
     loops = number(cast, "interrupt_cooldown_loops", 0.0)
     if loops:
@@ -66,7 +66,7 @@ def _may_jump(world: World, cast: Cast) -> ActionResult:
 
 
 def _begin_jump(world: World, cast: Cast) -> None:
-    """Jump to any place of the map; the ship can't be touched on its way, nor told anything."""
+    """Jump to any place of the map; the ship can't be touched on its way and takes no orders."""
     world.bound[cast.slot] = True
     delay = number(cast, "pre_delay_vulnerable_loops", 0.0)
     if delay:
@@ -75,7 +75,7 @@ def _begin_jump(world: World, cast: Cast) -> None:
 
 
 def _jump(world: World, cast: Cast) -> bool:
-    """Begin the stage whose time has come: out, on the way (already at the goal, untouchable), in; False at the end."""
+    """Begin the stage that is due: out, on the way (already at the goal, untouchable), in; return False at the end."""
     over = cast.begun + number(cast, "pre_delay_vulnerable_loops", 0.0)
     for name, figure in ((LEAVING, "out_loops"), (AWAY, "transit_loops"), (COMING, "in_loops")):
         begin, over = over, over + number(cast, figure)

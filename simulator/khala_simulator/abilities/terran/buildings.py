@@ -1,6 +1,6 @@
 """Terran structures: fires, salvage, radar, and depots that units walk over.
 
-What they make, and how they are built, is production's and construction's matter; flying ones are in ``landing``.
+Production and construction decide what they make and how they are built; flying ones are in ``landing``.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ INFLAMMABLE: Final = (
 
 
 def _catch_fire(world: World, slots: list[int]) -> None:
-    """Let finished structures that are badly damaged burn; looked after every few loops."""
+    """Make badly damaged finished structures burn; checked every few loops."""
     if world.loop % LOOKED_AFTER:
         return
     at = np.array(slots)
@@ -48,7 +48,7 @@ def _catch_fire(world: World, slots: list[int]) -> None:
 
 
 def _burn(world: World, slot: int, _: np.void) -> None:
-    """Take life from a burning structure, or put the fire out when it has been repaired; nobody is credited."""
+    """Take life from a burning structure, or put the fire out when it has been repaired; no player gets the credit."""
     if world.life[slot] >= world.life_max[slot] * BURNS_BELOW:
         buffs.remove(world, slot, BURNING)
         return
@@ -64,12 +64,12 @@ NO_KILLER: Final = -1
 
 
 def _salvage(world: World, cast: Cast) -> None:
-    """Take the structure down, and get three quarters of what it cost back when that is done."""
+    """Take the structure down, and refund three quarters of its cost when that is done."""
     buffs.apply(world, cast.slot, SALVAGED, source=cast.slot)
 
 
 def _not_yet(world: World, cast: Cast) -> ActionResult:
-    """Refuse a structure that has somebody inside, or is being taken down already."""
+    """Refuse a structure that has passengers, or is being taken down already."""
     inside = bool(world.passengers(cast.slot)) or buffs.has(world, cast.slot, SALVAGED)
     return ActionResult.ERROR if inside else ActionResult.SUCCESS
 
@@ -93,7 +93,7 @@ RADAR: Final = {"SensorTower": "SensorTowerRadar"}
 
 @dataclass(frozen=True, slots=True)
 class Radar:
-    """The circle in which a player is told of moving units that he does not see: whose, where, how far."""
+    """The circle in which a player learns of moving units that it does not see: whose, where, how far."""
 
     owner: int
     point: tuple[float, float]
@@ -101,7 +101,7 @@ class Radar:
 
 
 def radars(world: World) -> list[Radar]:
-    """Every radar that works now, in the order of slots."""
+    """Return every radar that works now, in the order of slots."""
     rows = {world.catalog.row_of_name[name]: world.catalog.buff(buff).radar for name, buff in RADAR.items()}
     slots = world.live[np.isin(world.type[world.live], list(rows))]
     slots = slots[world.build_progress[slots] >= 1.0]

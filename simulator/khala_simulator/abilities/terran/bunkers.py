@@ -1,6 +1,6 @@
-"""Bunkers hand orders on to those who sit in them: whom to shoot at, and to use stimpacks.
+"""Bunkers pass orders on to their passengers: which target to shoot at, and to use stimpacks.
 
-Getting in and out is ``transports``', how passengers see and reach is ``traits``'.
+``transports`` has getting in and out, ``traits`` how passengers see and reach.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ def _anybody_armed(world: World, slot: int, _: Ability) -> ActionResult:
     return ActionResult.SUCCESS if _armed(world, slot) else ActionResult.CANT_ATTACK_WEAPONS_DISABLED
 
 
-# whom to shoot at -----------------------------------------------------------------------------------------------------
+# targets --------------------------------------------------------------------------------------------------------------
 
 
 def _shoot(world: World, cast: Cast) -> None:
-    """Have those inside shoot at a unit that they reach; at a point they choose for themselves."""
+    """Make the passengers shoot at a unit in reach; at a point they choose for themselves."""
     for slot in _armed(world, cast.slot):
         if cast.target != NOBODY and _reaches(world, slot, cast.target):
             targets.engage(world, slot, cast.target)
@@ -64,7 +64,7 @@ def _told_to_shoot(
 
 
 def _cease(world: World, cast: Cast) -> None:
-    """Have those inside let go of whom they shoot at."""
+    """Make the passengers drop their target."""
     for slot in _armed(world, cast.slot):
         targets.disengage(world, slot)
 
@@ -73,7 +73,7 @@ def _cease(world: World, cast: Cast) -> None:
 
 
 def _users(world: World, slot: int, ability: Ability) -> list[int]:
-    """Passengers who can use the ability that is handed on."""
+    """Return the passengers that can use the ability that is passed on."""
     inner = world.catalog.ability(int(number(ability, "ability")))
     return [
         s
@@ -86,7 +86,7 @@ def _users(world: World, slot: int, ability: Ability) -> list[int]:
 
 
 def _stim(world: World, cast: Cast) -> None:
-    """Have those inside use their stimpacks."""
+    """Make the passengers use their stimpacks."""
     inner = world.catalog.ability(int(number(cast, "ability")))
     for slot in _users(world, cast.slot, cast.ability):
         world.life[slot] -= inner.life

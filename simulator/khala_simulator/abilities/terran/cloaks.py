@@ -1,6 +1,6 @@
-"""Cloaks: Ghosts and Banshees that hide from everybody but detectors as long as their energy lasts.
+"""Cloaks: Ghosts and Banshees hide from all but detectors as long as their energy lasts.
 
-Energy drains by the buff's own negative rate (``systems.regeneration``). The Mothership's field is another module's.
+Energy drains by the buff's own negative rate (``systems.regeneration``). The Mothership's field is in ``mothership``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Cyclone: Lock On, which follows its target with missiles while the Cyclone goes where it wants.
+"""Cyclone: Lock On, which fires missiles at its target while the Cyclone goes where it wants.
 
 The lock is an area effect that moves with the target: its owner sees there, it fires at its periods, and it ends when
 the target is dead, hidden or too far away, or the Cyclone is dead, helpless or calls it off. The cooldown runs from
-there. In 4.10 each period is one missile of the ability's own; in 5.0.13 the lock fires the ordinary weapon's.
+then on. In 4.10 each period is one missile of the ability's own; in 5.0.13 the lock fires the ordinary weapon's.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _lock(world: World, cast: Cast) -> None:
 
 
 def _track(world: World, lock: AreaEffect) -> None:
-    """Follow the target and fire when it is time, or let go."""
+    """Follow the target and fire when it is time, or end the lock."""
     ability = world.catalog.ability(lock.ability)
     slot, target = world.slot_of(lock.source), world.slot_of(lock.target)
     if NOBODY in (slot, target) or not _holds(world, ability, slot, target):
@@ -124,7 +124,7 @@ def _release(world: World, lock: AreaEffect, ability: Ability) -> None:
 
 
 def _call_off(world: World, cast: Cast) -> None:
-    """Let go of the target; the next lock has to wait."""
+    """Drop the target; the next lock has to wait."""
     for lock in world.area_effects:
         if lock.rule == "lock_on" and lock.source == world.tag_of(cast.slot):
             _release(world, lock, world.catalog.ability(lock.ability))

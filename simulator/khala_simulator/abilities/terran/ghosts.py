@@ -30,7 +30,7 @@ ATTACKING: Final = frozenset({OrderKind.ATTACK_UNIT, OrderKind.ATTACK_MOVE})
 
 
 def _take_aim(world: World, cast: Cast) -> None:
-    """Aim until the shot; being hurt, or a target that gets away, spoils it and gives the energy back."""
+    """Aim until the shot; damage or a target that gets away ends it and returns the energy."""
     buffs.apply(world, cast.slot, AIMING, source=cast.slot)
     buffs.apply(world, cast.slot, REFUNDABLE, source=cast.slot)
 
@@ -67,12 +67,12 @@ def _lower_aim(world: World, cast: Cast) -> None:
 
 
 def _fire_emp(world: World, cast: Cast) -> None:
-    """Send a round that takes shields and energy from all around its point, and uncovers who is cloaked."""
+    """Send a round that takes shields and energy from all around its point, and uncovers cloaked units."""
     projectiles.launch(world, cast, MECHANICS.emp_speed_n)
 
 
 def _burst(world: World, missile: AreaEffect, _: int) -> None:
-    """Take shields and energy from everybody around, friends as well, and uncover who is cloaked."""
+    """Take shields and energy from every unit around, friends as well, and uncover cloaked ones."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):
         apply_damage(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
@@ -86,19 +86,19 @@ def _burst(world: World, missile: AreaEffect, _: int) -> None:
 
 
 def _hold_fire(world: World, cast: Cast) -> None:
-    """Fire at nobody until told to."""
+    """Hold fire until ordered to attack."""
     buffs.apply(world, cast.slot, "GhostHoldFireB", source=cast.slot)
     if OrderKind(int(world.order_kind[cast.slot])) not in ATTACKING:
         disengage(world, cast.slot)
 
 
 def _free_weapons(world: World, cast: Cast) -> None:
-    """Fire again at whoever comes into range."""
+    """Fire again at any enemy that comes into range."""
     buffs.remove(world, cast.slot, "GhostHoldFireB")
 
 
 def _fire_when_told(world: World, slot: int, _: np.void) -> None:
-    """A Ghost that is told to attack no longer holds its fire."""
+    """End holding fire for a Ghost with an attack order."""
     if OrderKind(int(world.order_kind[slot])) in ATTACKING:
         buffs.remove(world, slot, "GhostHoldFireB")
 

@@ -1,7 +1,6 @@
 """Infantry: stimpacks, concussive shells and the Reaper's charge.
 
-The Reaper's leaps are its mover's (``pathfinding``), its regeneration out of combat and combat shields are numbers of
-the tables.
+The Reaper's leaps are in ``pathfinding``; its regeneration out of combat and combat shields are numbers in the tables.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ if TYPE_CHECKING:
 
 
 def _stim(world: World, cast: Cast) -> None:
-    """Walk and fire faster for a time; the price is paid in life."""
+    """Walk and fire faster for a time, at a cost in life."""
     on_self("Stimpack")(world, cast)
 
 
 def _stim_marauder(world: World, cast: Cast) -> None:
-    """Walk and fire faster for a time; the price is paid in life."""
+    """Walk and fire faster for a time, at a cost in life."""
     on_self("StimpackMarauder")(world, cast)
 
 
@@ -45,7 +44,7 @@ SHELLS: Final = "PunisherGrenades"
 
 
 def _slow(world: World, source: int, owner: int, victim: int) -> None:
-    """Slow whom a grenade hits when its owner has the shells; nothing massive and no structure."""
+    """Slow units that a grenade hits when its owner has the shells; no massive ones and no structures."""
     unit = world.unit_type(victim)
     researched = world.catalog.upgrade(SHELLS).id in world.players[owner].upgrades
     if (
@@ -67,7 +66,7 @@ STEP_TESTED: Final = 0.25
 
 
 def _throw_charge(world: World, cast: Cast) -> None:
-    """Lay a charge that goes off after its fuse, hurts all on the ground around it and throws them outwards."""
+    """Throw a charge that goes off after its fuse, hurts all ground units around it and throws them outwards."""
     point, fuse = place_of(world, cast), number(cast, "fuse_loops")
     owner = int(world.owner[cast.slot])
     charge = lifecycle.spawn(world, world.catalog.unit("KD8Charge"), owner, point)
@@ -75,7 +74,7 @@ def _throw_charge(world: World, cast: Cast) -> None:
 
 
 def _explode(world: World, charge: AreaEffect) -> None:
-    """Hurt everybody on the ground around a charge, friends as well, and throw them outwards."""
+    """Hurt every ground unit around a charge, friends as well, and throw them outwards."""
     ability, source = world.catalog.ability(charge.ability), world.slot_of(charge.source)
     body = world.slot_of(charge.target)
     for slot in around(world, charge.at, charge.radius, plane="ground"):
@@ -115,7 +114,7 @@ def _throw(world: World, charge: AreaEffect, slot: int) -> None:
 
 
 def _fly_back(world: World, item: AreaEffect) -> None:
-    """Carry a thrown unit on, until something is in its way that it can't walk on."""
+    """Carry a thrown unit on, until ground that it can't walk on is in its way."""
     slot = world.slot_of(item.target)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
         item.end = world.loop

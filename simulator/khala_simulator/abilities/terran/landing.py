@@ -1,7 +1,7 @@
 """Terran structures that fly: lifting off, landing, and the add-ons that stay behind and are taken up again.
 
-An add-on belongs to the structure at its left; without one it is a plain tech lab or reactor that anybody of its owner
-may land at. Making add-ons, and what they are good for, is production's matter.
+An add-on belongs to the structure at its left; without one it is a plain tech lab or reactor at which any structure of
+its owner may land. Production makes and uses add-ons.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _can_land(world: World, cast: Cast) -> ActionResult:
 
 
 def _settle(world: World, cast: Cast) -> None:
-    """Come down, unless something has come under it by now, and take up an add-on that stands at the right place."""
+    """Land, unless something is under it by now, and take up an add-on at the right place."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
     if cast.point is None or _can_land(world, cast) is not ActionResult.SUCCESS:
         return

@@ -1,8 +1,8 @@
-"""Liberators: a Defender zone is laid out, the ship takes its mode, and then fires at what stands in the circle.
+"""Liberators: the ship marks a Defender zone, changes its mode, and then fires at ground units in the circle.
 
-The zone is an area effect from the order on (the API's effect 8 while it is set up, 9 when it works); it ends when
-the ship leaves its mode, dies, or is carried away from it. That a ship fires only inside is in the columns ``zone``
-and ``zone_radius``, which choosing and measuring targets look at.
+The zone is an area effect from the order on (the API's effect 8 while it is set up, 9 when it works); it ends when the
+ship leaves its mode, dies, or is carried away from it. The columns ``zone`` and ``zone_radius`` keep a ship's fire
+inside; the systems that choose and measure targets read them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ TO_AIR: Final = "LiberatorMorphtoAA"
 
 
 def _lay_out(world: World, cast: Cast) -> None:
-    """Mark the zone and begin the morph; what waited in the queue comes after it."""
+    """Mark the zone and begin the morph; the rest of the queue comes after it."""
     slot, point = cast.slot, cast.point
     assert point is not None
     _leave(world, slot)
@@ -53,7 +53,7 @@ def _lay_out(world: World, cast: Cast) -> None:
 
 
 def _guard(world: World, zone: AreaEffect) -> None:
-    """Let the zone work when it is set up, and end it when its ship is gone, or too far away."""
+    """Activate the zone when it is set up, and end it when its ship is gone or too far away."""
     slot = world.slot_of(zone.source)
     if slot == NOBODY or world.carrier[slot] != NOBODY:
         projectiles.end(world, zone)
@@ -69,13 +69,13 @@ def _guard(world: World, zone: AreaEffect) -> None:
 
 
 def _more_range(world: World, zone: AreaEffect) -> float:
-    """What upgrades add to how far from the ship a zone may lie; the leash grows with it."""
+    """Return how much farther upgrades allow a zone to be from the ship; the leash grows with it."""
     ability = world.catalog.ability(zone.ability)
     return world.stats.ability(zone.owner, ability).range - ability.range
 
 
 def _take_off(world: World, cast: Cast) -> None:
-    """Give up the zone and take the mode against ships."""
+    """Give up the zone and change to the mode against air."""
     _leave(world, cast.slot)
     _morph(world, cast.slot, TO_AIR)
 
@@ -89,7 +89,7 @@ def _leave(world: World, slot: int) -> None:
 
 
 def _morph(world: World, slot: int, link: str) -> None:
-    """Make the morph with this link the unit's current order; what waits behind stays."""
+    """Make the morph with this link the unit's current order; the queue behind it stays."""
     waiting = world.queue[slot]
     ability = next(a for a in world.catalog.abilities if a.link == link and a.effect == "morph")
     commands.begin(world, slot, Order(OrderKind.CAST, ability.id))

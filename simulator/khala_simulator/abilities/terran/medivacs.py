@@ -1,7 +1,7 @@
-"""Medivacs: healing, and the afterburners. What they carry is the transports' matter.
+"""Medivacs: healing, and the afterburners. Carrying is in ``transports``.
 
-A Medivac heals one unit at a time for energy, follows it while it walks, and does so by itself unless it is told
-not to. Nobody is healed by two at once.
+A Medivac heals one unit at a time for energy, follows it while it walks, and does so by itself unless autocast is off.
+Two Medivacs never heal the same unit at once.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BIOLOGICAL: Final = 1 << ATTRIBUTES.index("biological")
 
 
 def _can_heal(world: World, cast: Cast) -> ActionResult:
-    """Refuse who needs no healing or has somebody who heals him, and Medivacs without energy."""
+    """Refuse units that need no healing or already have a healer, and Medivacs without energy."""
     slot, target = cast.slot, cast.target
     if target == NOBODY:
         return ActionResult.MUST_TARGET_UNIT
@@ -35,7 +35,7 @@ def _can_heal(world: World, cast: Cast) -> ActionResult:
 
 
 def _is_healed(world: World, cast: Cast) -> bool:
-    """Whether another Medivac heals the target now."""
+    """Return whether another Medivac heals the target now."""
     return any(
         other.target == cast.target and other.ability.effect == cast.ability.effect and slot != cast.slot
         for slot, other in world.channelling.items()
@@ -43,7 +43,7 @@ def _is_healed(world: World, cast: Cast) -> bool:
 
 
 def _heal(world: World, cast: Cast) -> bool:
-    """Heal for one loop while the target is near (a Medivac follows), until it is well or the energy is used up."""
+    """Heal for one loop while the target is near (a Medivac follows), until its life is full or the energy is gone."""
     slot, target = cast.slot, cast.target
     if target == NOBODY or not world.can_cast[slot] or not world.targetable[target]:
         return False
@@ -61,13 +61,13 @@ def _heal(world: World, cast: Cast) -> bool:
 
 
 def resume(world: World, slot: int) -> None:
-    """Let a caster walk into range again and go on from there."""
+    """Make a caster walk into range again and go on from there."""
     world.channels[slot] = False
     world.cast_at[slot] = -1.0
 
 
 def _pick(world: World, slot: int, ability: Ability) -> int:
-    """The nearest friend who needs healing and whom nobody heals."""
+    """Return the nearest friend that needs healing and has no healer."""
     hurt = nearest_hurt(world, slot, ability.autocast_range, BIOLOGICAL)
     return next(
         (other for other in hurt if _can_heal(world, Cast(slot, ability, other)) is ActionResult.SUCCESS), NOBODY
@@ -75,7 +75,7 @@ def _pick(world: World, slot: int, ability: Ability) -> int:
 
 
 def _begin(world: World, cast: Cast) -> None:
-    """Give a friend life for energy, loop by loop, as long as both last and he can be followed."""
+    """Give a friend life for energy, loop by loop, as long as both last and the friend can be followed."""
     _heal(world, cast)
 
 

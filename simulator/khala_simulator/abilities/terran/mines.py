@@ -45,7 +45,7 @@ def _fire(world: World, cast: Cast) -> None:
 
 
 def _explode(world: World, missile: AreaEffect, target: int) -> None:
-    """Hurt the target, and whoever is around it, friends as well, but no structure and no mine of the owner's."""
+    """Hurt the target, and every unit around it, friends as well, but no structure and no mine of the owner's."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     owner = missile.owner
     apply_damage(
@@ -59,7 +59,7 @@ def _explode(world: World, missile: AreaEffect, target: int) -> None:
 
 
 def _keep_watch(world: World, slots: list[int]) -> None:
-    """Uncover mines that reload, every few loops; drilling claws keep these hidden."""
+    """Uncover mines that reload, every few loops; drilling claws keep them hidden."""
     if world.loop % LOOKED_AFTER:
         return
     for slot in slots:
@@ -70,19 +70,19 @@ def _keep_watch(world: World, slots: list[int]) -> None:
 
 
 def _claws_hide(world: World, slot: int) -> bool:
-    """Whether the owner has the claws; in both versions they take the reloading mine's visibility away."""
+    """Return whether the owner has the claws; in both versions they hide the reloading mine."""
     return world.catalog.upgrade(CLAWS).id in world.players[int(world.owner[slot])].upgrades
 
 
 def _climb_out(world: World, slots: list[int]) -> None:
-    """Forget that a mine which has come out of the ground was uncovered."""
+    """Clear the uncovered mark of a mine that has come out of the ground."""
     if len(world.buffs) and not world.loop % LOOKED_AFTER:
         for slot in slots:
             buffs.remove(world, slot, SHOWN)
 
 
 def _fire_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
-    """A right click of burrowed mines on a foe sends their missiles."""
+    """Fire the missiles of burrowed mines that right-click on a foe."""
     if target == NOBODY or world.unit_type(target).structure:
         return []
     taken: list[int] = []

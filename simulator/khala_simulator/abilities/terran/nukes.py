@@ -1,7 +1,7 @@
-"""Nukes: a Ghost paints a place, and what its owner has armed in an academy comes down there.
+"""Nukes: a Ghost paints a place, and a missile that its owner has armed in an academy comes down there.
 
-The strike takes one of the owner's Nukes when it is called, wherever that lies. The Ghost has to keep painting until
-the missile is down; a moment later it goes off.
+The strike takes one of the owner's Nukes when it is called, wherever that is. The Ghost has to keep painting until the
+missile is down; a moment later it goes off.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _fall(world: World, strike: AreaEffect) -> None:
 
 
 def _detonate(world: World, strike: AreaEffect) -> None:
-    """Hurt everything around by the ring it is in, friend and foe, on the ground and in the air."""
+    """Hurt everything around, by its ring, friend and foe, on the ground and in the air."""
     ability, source = world.catalog.ability(strike.ability), world.slot_of(strike.source)
     struck: set[int] = set()
     for ring in ability.numbers["area"]:

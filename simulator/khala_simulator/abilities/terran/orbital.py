@@ -1,4 +1,4 @@
-"""Orbital commands: scanner sweep, MULE and extra supplies. What a MULE does when it is down is harvesting's matter."""
+"""Orbital commands: scanner sweep, MULE and extra supplies. ``harvesting`` has what a MULE does then."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SWEEP: Final = 6  # the API's ScannerSweep
 
 
 def _sweep(world: World, cast: Cast) -> None:
-    """See everything in a circle anywhere on the map for a while, what is cloaked or burrowed as well."""
+    """Reveal everything in a circle anywhere on the map for a while, also cloaked or burrowed units."""
     lasts, radius = number(cast, "duration_loops"), number(cast, "radius")
     world.area_effects.append(
         AreaEffect(
@@ -64,7 +64,7 @@ def _can_call(world: World, cast: Cast) -> ActionResult:
 
 
 def _call_mule(world: World, cast: Cast) -> None:
-    """Have a MULE come down, which mines for the time it lives."""
+    """Drop a MULE, which mines as long as it lives."""
     falls = number(cast, "delay_loops")
     world.area_effects.append(
         AreaEffect(
@@ -112,7 +112,7 @@ def _is_plain_depot(world: World, cast: Cast) -> ActionResult:
 
 
 def _drop_supplies(world: World, cast: Cast) -> None:
-    """Have a depot provide more supply from a moment later on."""
+    """Make a depot provide more supply from a moment later on."""
     buffs.apply(world, cast.target, ON_ITS_WAY, source=cast.slot, loops=number(cast, "delay_loops"))
 
 

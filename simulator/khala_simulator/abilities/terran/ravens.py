@@ -1,6 +1,6 @@
-"""Ravens: auto-turrets, the interference matrix and the anti-armor missile. That a Raven detects is in the tables.
+"""Ravens: auto-turrets, the interference matrix and the anti-armor missile. Detection is in the tables.
 
-Point defence drones, seeker missiles and repair drones are in no melee game of the versions shipped.
+Melee games of the shipped versions have no point defence drones, seeker missiles or repair drones.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ MARKED: Final = "ScramblerMarker"
 
 
 def _can_be_jammed(world: World, cast: Cast) -> ActionResult:
-    """Refuse what is neither mechanical nor psionic, and where markers are known, what is jammed or about to be."""
+    """Refuse units neither mechanical nor psionic, and, where markers are known, those jammed or about to be."""
     if cast.target == NOBODY:
         return ActionResult.MUST_TARGET_UNIT
     if not {"mechanical", "psionic"} & set(world.unit_type(cast.target).attributes):
@@ -89,13 +89,13 @@ RESEARCHED_RADIUS: Final = ("effect", "RavenShredderMissileImpactSearchArea", "A
 
 
 def _send_shredder(world: World, cast: Cast) -> None:
-    """Send a missile that chases its target and weakens the armor of all around it, friends as well."""
+    """Send a missile that chases its target and weakens the armor of all units around it, friends as well."""
     missile = projectiles.launch(world, cast, MECHANICS.shredder_speed_n)
     missile.rule = "shredder"
 
 
 def _chase(world: World, missile: AreaEffect) -> None:
-    """Fly on; the target can tell, and a missile that was led too far for too long gives up."""
+    """Fly on, visible to the target; a missile that chased too far for too long gives up."""
     ability = world.catalog.ability(missile.ability)
     target = world.slot_of(missile.target)
     spent = world.loop == missile.begun + number(ability, "patience_loops")
@@ -108,7 +108,7 @@ def _chase(world: World, missile: AreaEffect) -> None:
 
 
 def _shred(world: World, missile: AreaEffect, _: int) -> None:
-    """Weaken the armor of everybody around, friends as well, but of no structure."""
+    """Weaken the armor of every unit around, friends as well, but of no structure."""
     ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
     radius = world.stats.changed(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
     loops = number(ability, "duration_loops")

@@ -1,6 +1,6 @@
-"""Repair: SCVs and MULEs mend machines and structures for a quarter of their price.
+"""Repair: SCVs and MULEs repair machines and structures for a quarter of their price.
 
-One worker mends a whole unit in the time that the tables give; several add up. Every loop costs its share of the
+One worker repairs a whole unit in the time that the tables give; several add up. Every loop costs its share of the
 price, and a player who can't pay it stops the work.
 """
 
@@ -37,7 +37,7 @@ def _can_repair(world: World, cast: Cast) -> ActionResult:
 
 
 def _unaffordable(world: World, cast: Cast) -> ActionResult:
-    """Whether the player lacks what the next loop of work costs."""
+    """Refuse if the player can't afford the next loop of work."""
     player = world.players[int(world.owner[cast.slot])]
     if "free" in player.cheats:
         return ActionResult.SUCCESS
@@ -48,19 +48,19 @@ def _unaffordable(world: World, cast: Cast) -> ActionResult:
 
 
 def _loops(world: World, slot: int) -> float:
-    """Loops in which one worker mends a unit from nothing."""
+    """Return the loops that one worker needs to repair a unit from zero life."""
     return world.unit_type(slot).repair_loops
 
 
 def _price(world: World, cast: Cast) -> tuple[float, float]:
-    """Minerals and vespene for one loop of work."""
+    """Return the minerals and vespene for one loop of work."""
     share = number(cast, "cost_fraction_full_repair") / _loops(world, cast.target)
     minerals, vespene = world.unit_type(cast.target).cost
     return minerals * share, vespene * share
 
 
 def _mend(world: World, cast: Cast) -> bool:
-    """Mend for one loop; go after a unit that drives away, stop when it is whole or the money is gone."""
+    """Repair for one loop; follow a unit that moves away, stop when it has full life or the resources are used up."""
     slot, target = cast.slot, cast.target
     if target == NOBODY or not world.targetable[target] or world.life[target] >= world.life_max[target] - DONE:
         return False
@@ -84,17 +84,17 @@ def _mend(world: World, cast: Cast) -> bool:
 
 
 def _begin(world: World, cast: Cast) -> None:
-    """Mend a machine or a structure, loop by loop, for a quarter of its price and as long as it took to make it."""
+    """Repair a machine or a structure, loop by loop, for a quarter of its price and in its production time."""
     _mend(world, cast)
 
 
 def _pick(world: World, slot: int, ability: Ability) -> int:
-    """The nearest machine or structure of the owner's that needs repair."""
+    """Return the nearest machine or structure of the owner's that needs repair."""
     return next(iter(nearest_hurt(world, slot, ability.autocast_range, MECHANICAL)), NOBODY)
 
 
 def _repair_by_click(world: World, slots: list[int], target: int, _: Point | None, queue: bool) -> list[int]:
-    """A right click of workers on a damaged machine or structure of their own sends them to repair it."""
+    """Send workers that right-click on a damaged machine or structure of their own to repair it."""
     if target == NOBODY or "mechanical" not in world.unit_type(target).attributes:
         return []
     if world.build_progress[target] < 1.0 or world.life[target] >= world.life_max[target] - DONE:

@@ -1,4 +1,4 @@
-"""Banelings burst: when told to, and when they die without having burst in an attack."""
+"""Banelings burst on order, and when they die without having burst in an attack."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BUILDINGS = "VolatileBurstBuilding"
 
 
 def burst(world: World, slot: int) -> None:
-    """Harm the enemies on the ground around a Baneling, as its attack does."""
+    """Harm the ground enemies around a Baneling, as its attack does."""
     weapon = next(w for w in world.catalog.weapons if w.id == BURST)
     x, y = world.pos[slot].tolist()
     world.spent[slot] = True
@@ -39,7 +39,7 @@ def _explode(world: World, cast: Cast) -> None:
 
 
 def _dies(world: World, slot: int) -> None:
-    """A Baneling that is killed bursts, too."""
+    """Burst a Baneling that is killed."""
     if not world.spent[slot] and not world.hallucination[slot]:
         burst(world, slot)
 

@@ -35,7 +35,7 @@ SMALL: Final = (
 
 
 def _throw(world: World, slot: int, target: int) -> None:
-    """Throw a broodling: its hit flies as a missile, and it fights on where that lands."""
+    """Throw a broodling: its hit flies as a missile, and the broodling fights on where that lands."""
     if target == NOBODY:
         return
     escort = next(w for w in world.catalog.weapons if w.id == ESCORT)
@@ -66,7 +66,7 @@ def _lands(world: World, item: AreaEffect) -> None:
 
 
 def hatch(world: World, owner: int, point: Point, count: int) -> list[int]:
-    """Let broodlings come into the world around a point, for a few seconds."""
+    """Spawn broodlings around a point, for a few seconds."""
     unit = world.catalog.unit(BROODLING)
     slots = [lifecycle.spawn(world, unit, owner, place) for place in free_places(world, unit, point, count)]
     for slot in slots:
@@ -76,7 +76,7 @@ def hatch(world: World, owner: int, point: Point, count: int) -> list[int]:
 
 
 def _leaves(count: int) -> Callable[[World, int], None]:
-    """A destroyed structure leaves so many broodlings."""
+    """Spawn the broodlings that a destroyed structure leaves."""
 
     def rule(world: World, slot: int) -> None:
         if world.build_progress[slot] >= 1.0:

@@ -1,4 +1,4 @@
-"""The Corruptor's Caustic Spray: a channel on a structure that harms it more the longer it lasts."""
+"""The Corruptor's Caustic Spray: a channel on a structure that does more damage the longer it lasts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CHANNELING = "ChannelingCausticSpray"
 
 
 def _spray(world: World, cast: Cast) -> None:
-    """Harm a structure again and again, and more after a while, until it falls or the Corruptor does something else."""
+    """Harm a structure again and again, and more after a while, until it dies or the Corruptor does something else."""
     buffs.apply(world, cast.slot, CHANNELING, source=cast.slot)
 
 

@@ -1,4 +1,4 @@
-"""Crawlers take root again: on creep, where their footprint fits. Pulling the roots up is an ordinary morph."""
+"""Crawlers take root again: on creep, where their footprint fits. Uprooting is an ordinary morph."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The Infestor's skills: Fungal Growth, Neural Parasite, Infested Terrans, Microbial Shroud.
 
-Units under Neural Parasite belong to the Infestor's owner as long as the channel lasts; whose they were is kept in the
-buff that lies on them.
+Units under Neural Parasite belong to the Infestor's owner as long as the channel lasts; their buff keeps the former
+owner.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SHROUD = "AmorphousArmorcloud"
 
 
 def _fungal(world: World, cast: Cast) -> None:
-    """Throw a growth that harms, slows and uncloaks the enemies it falls on."""
+    """Throw a growth that harms, slows and uncloaks the enemies it hits."""
     throw(world, cast, "fungal_growth", radius=number(cast, "radius"))
 
 
@@ -57,7 +57,7 @@ def _fungal_tick(world: World, slot: int, row: np.void) -> None:
 
 
 def _reach_out(world: World, cast: Cast) -> None:
-    """Take an enemy unit over for as long as the Infestor holds still and in reach."""
+    """Take over an enemy unit for as long as the Infestor holds still and in reach."""
     throw(world, cast, "neural_parasite")
 
 
@@ -79,7 +79,7 @@ def _arrives(world: World, item: AreaEffect) -> None:
 
 
 def _controls(world: World, cast: Cast) -> bool:
-    """Whether the parasite is on its way, or holds its victim within the leash."""
+    """Return whether the parasite is on its way, or holds its victim within the leash."""
     slot, target = cast.slot, cast.target
     if world.order_target[slot] != target:
         return False
@@ -90,7 +90,7 @@ def _controls(world: World, cast: Cast) -> bool:
 
 
 def _holder(world: World, target: int) -> int:
-    """Slot of the Infestor that holds a unit, or NOBODY."""
+    """Return the slot of the Infestor that holds a unit, or NOBODY."""
     at = world.buffs.find(target, world.catalog.buff(NEURAL).row)
     return int(world.buffs.rows[at]["source"]) if at >= 0 else NOBODY
 
@@ -109,7 +109,7 @@ def _time_is_up(world: World, slot: int, row: np.void) -> None:
 
 
 def _hand_over(world: World, slot: int, owner: int) -> None:
-    """Give a unit to a player: it forgets its orders, and its new friends leave it alone."""
+    """Give a unit to a player: it drops its orders, and its new friends stop attacking it."""
     lifecycle.give(world, slot, owner)
     world.queue[slot] = []
     commands.begin(world, slot, None)
@@ -122,7 +122,7 @@ def _hand_over(world: World, slot: int, owner: int) -> None:
 
 
 def _break_off(world: World, cast: Cast) -> None:
-    """Let the victim go before its time."""
+    """Release the victim early."""
     commands.begin_next(world, cast.slot)
 
 
@@ -136,7 +136,7 @@ def _is_holding(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def _infested_terrans(world: World, cast: Cast) -> None:
-    """Throw an egg from which an infested terran hatches, who lives for a while."""
+    """Throw an egg that hatches an infested terran with a timed life."""
     throw(world, cast, "infested_terran_egg")
 
 
@@ -165,7 +165,7 @@ def _hatches(world: World, item: AreaEffect) -> None:
 
 
 def _shroud(world: World, cast: Cast) -> None:
-    """Lay a cloud in which ground units take half of what flyers deal."""
+    """Place a cloud in which ground units take half of the damage of flyers."""
     end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
     lay(world, cast, "microbial_shroud", end=end, due=world.loop, period=period)
 

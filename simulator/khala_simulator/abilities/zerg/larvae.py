@@ -1,6 +1,6 @@
 """Larvae: town halls hatch them one by one, a Queen's injection several at once; they wander and need creep.
 
-Each larva's ``home`` is its town hall. What becomes of a larva is ``production``'s matter.
+Each larva's ``home`` is its town hall. ``production`` has what a larva becomes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ RING: Final = tuple(
 
 
 def of(world: World, hall: int) -> Ints:
-    """Slots of the larvae of a town hall, ascending."""
+    """Return the slots of the larvae of a town hall, ascending."""
     live = world.live
     mine: Ints = live[(world.home[live] == hall) & (world.type[live] == _larva(world))]
     return mine
@@ -47,7 +47,7 @@ def _larva(world: World) -> int:
 
 
 def hatch(world: World, hall: int, count: int = 1) -> None:
-    """Let larvae hatch beside a town hall, as many as it may have in all."""
+    """Hatch larvae beside a town hall, up to as many as it may have in all."""
     there = len(of(world, hall))
     x, y = world.pos[hall].tolist()
     for index in range(there, min(there + count, MECHANICS.larva_limit)):
@@ -57,7 +57,7 @@ def hatch(world: World, hall: int, count: int = 1) -> None:
 
 
 def _hatch_by_nature(world: World, slots: list[int]) -> None:
-    """A finished town hall with less than three larvae hatches the next one after a while."""
+    """Hatch the next larva after a while at finished town halls with less than three."""
     live = world.live
     larvae = live[world.type[live] == _larva(world)]
     for larva in larvae[world.home[larvae] < 0].tolist():
@@ -84,7 +84,7 @@ def _hatch_by_nature(world: World, slots: list[int]) -> None:
 
 
 def _adopt(world: World, larva: int, halls: list[int]) -> None:
-    """A larva without a home belongs to the nearest town hall of its owner, if that is near."""
+    """Give a larva without a home to its owner's nearest town hall, if that is near."""
     x, y = world.pos[larva].tolist()
     mine = [(distance(world, hall, (x, y)), hall) for hall in halls if world.owner[hall] == world.owner[larva]]
     away, hall = min(mine, default=(math.inf, NOBODY))
@@ -96,7 +96,7 @@ def _adopt(world: World, larva: int, halls: list[int]) -> None:
 
 
 def _inject(world: World, cast: Cast) -> None:
-    """Let three more larvae hatch after a while; further injections wait for their turn."""
+    """Hatch three more larvae after a while; further injections wait for their turn."""
     buffs.apply(world, cast.target, WAITING if buffs.has(world, cast.target, INJECTED) else INJECTED, source=cast.slot)
 
 
@@ -106,7 +106,7 @@ def _is_hall(world: World, cast: Cast) -> ActionResult:
 
 
 def _injection_is_over(world: World, slot: int, row: np.void) -> None:
-    """The larvae come one after the other, and the next injection begins."""
+    """Hatch the larvae one after the other, and begin the next injection."""
     world.alert(int(world.owner[slot]), "LarvaHatched")
     numbers = world.catalog.ability(INJECT)
     count, gap = int(number(numbers, "larva")), MECHANICS.injected_larva_loops
@@ -133,7 +133,7 @@ def _one_hatches(world: World, item: AreaEffect) -> None:
 
 
 def _wander(world: World, slots: list[int]) -> None:
-    """Larvae creep a little now and then, near their town hall; off creep they die."""
+    """Move larvae a little now and then, near their town hall; off creep they die."""
     for slot in slots:
         if (world.loop - int(world.born_loop[slot])) % MECHANICS.larva_rest_loops:
             continue

@@ -1,4 +1,4 @@
-"""The burrowed Lurker's hold fire: it picks no target by itself until it is told to again."""
+"""The burrowed Lurker's hold fire: it picks no target by itself until fire is allowed again."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ HELD = "LurkerHoldFireB"
 
 
 def _hold_fire(world: World, cast: Cast) -> None:
-    """Attack nobody without being told."""
+    """Attack only on order."""
     buffs.apply(world, cast.slot, HELD, source=cast.slot)
 
 
 def _fire_at_will(world: World, cast: Cast) -> None:
-    """Attack whoever comes near again."""
+    """Attack any enemy that comes near again."""
     buffs.remove(world, cast.slot, HELD)
 
 

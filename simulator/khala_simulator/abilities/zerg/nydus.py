@@ -13,7 +13,7 @@ SHELL = "NydusWormArmor"
 
 
 def _harden(world: World, slots: list[int]) -> None:
-    """Armor lies on every worm that is not finished, and on no other."""
+    """Give extra armor to every unfinished worm, and to no other."""
     for slot in slots:
         rises = world.build_progress[slot] < 1.0
         if rises and not buffs.has(world, slot, SHELL):

@@ -1,6 +1,6 @@
-"""Overlords that let creep fall, and the Overseer's changelings and contamination.
+"""Overlords that generate creep, and the Overseer's changelings and contamination.
 
-A changeling that comes near an enemy unit takes the looks of the enemy's basic fighter; it never fights.
+A changeling that comes near an enemy unit takes the look of the enemy's basic fighter; it never fights.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ SEARCH_RADIUS: Final = 12.0  # the catalog's ChangelingDisguiseEx3Search
 
 
 def _let_creep_fall(world: World, cast: Cast) -> None:
-    """Let creep spread below while it stands still."""
+    """Generate creep below while it stands still."""
     buffs.apply(world, cast.slot, GENERATING, source=cast.slot)
     world.growth.looked_at = -1
 
 
 def _stop_creep(world: World, cast: Cast) -> None:
-    """Let no more creep fall."""
+    """Stop generating creep."""
     buffs.remove(world, cast.slot, GENERATING)
     world.growth.looked_at = -1
 
@@ -54,14 +54,14 @@ def _generating(world: World, slot: int, _: Ability) -> ActionResult:
 
 
 def _spawn_changeling(world: World, cast: Cast) -> None:
-    """Bring a changeling into the world, which lives for a while."""
+    """Spawn a changeling with a timed life."""
     (slot,) = teleport.beside(world, cast.slot, world.catalog.unit(str(cast.ability.numbers["unit"])))
     chance = MECHANICS.broodling_random_loops * world.rng.random()
     teleport.live_until(world, slot, world.loop + number(cast, "duration_loops") + chance)
 
 
 def _disguise(world: World, slots: list[int]) -> None:
-    """Take the looks of the first enemy unit that comes near."""
+    """Take the look of the first enemy unit that comes near."""
     period = world.catalog.buff(SEARCH).period_loops
     for slot in slots:
         if (world.loop - int(world.born_loop[slot])) % period == 0:
@@ -72,7 +72,7 @@ def _disguise(world: World, slots: list[int]) -> None:
 
 
 def _enemy_near(world: World, slot: int) -> int:
-    """Slot of an enemy unit within sight that a changeling could look like, or NOBODY."""
+    """Return the slot of an enemy unit within sight that a changeling could look like, or NOBODY."""
     slots, owner = world.live, int(world.owner[slot])
     offset = world.pos[slots] - world.pos[slot]
     near = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= (SEARCH_RADIUS + world.radius[slots]) ** 2
@@ -82,7 +82,7 @@ def _enemy_near(world: World, slot: int) -> int:
 
 
 def _looks(world: World, enemy: int) -> str:
-    """The type whose looks a changeling takes from an enemy unit, by its race and its owner's upgrades."""
+    """Return the type that a changeling imitates near an enemy unit, by its race and its owner's upgrades."""
     player = world.players[int(world.owner[enemy])]
     has = {world.catalog.upgrade(number).name for number in player.upgrades}
     match world.unit_type(enemy).race:

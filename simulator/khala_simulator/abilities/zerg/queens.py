@@ -60,20 +60,20 @@ def _plant(world: World, cast: Cast) -> None:
 
 
 def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
-    """Creep without a structure on it; the tumor's own must be in sight."""
+    """Return why there is no room: it takes creep without a structure, and sight for a tumor's own."""
     unit = world.catalog.unit(cast.ability.unit)
     return building_sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
 
 
 def _burrow_when_grown(world: World, slots: list[int]) -> None:
-    """A finished tumor goes under the ground by itself."""
+    """Burrow finished tumors."""
     for slot in slots:
         if world.build_progress[slot] >= 1.0 and world.order_kind[slot] == OrderKind.IDLE:
             commands.begin(world, slot, Order(OrderKind.CAST, BURROW))
 
 
 def _burrow_tumor(world: World, cast: Cast) -> None:
-    """Go under the ground, and be able to plant another tumor after a while."""
+    """Burrow, and be able to plant another tumor after a while."""
     slot = cast.slot
     lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
     plant = world.catalog.ability(PLANT)

@@ -1,4 +1,4 @@
-"""The Ravager's Corrosive Bile: it is seen where it will fall, and falls on friend and foe."""
+"""The Ravager's Corrosive Bile: the place where it will land is visible, and it hits friend and foe."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BILE_EFFECT = 11
 
 
 def _bile(world: World, cast: Cast) -> None:
-    """Harm whoever stands at the place some time later, and destroy force fields there."""
+    """Harm every unit at the place some time later, and destroy force fields there."""
     rises, falls = number(cast, "delay_loops"), number(cast, "fall_loops")
     due = world.loop + rises + falls
     lay(world, cast, "corrosive_bile", end=due, due=due, effect=BILE_EFFECT)

@@ -1,4 +1,4 @@
-"""Swarm Hosts: two locusts that hatch beside it, fly where they are sent, and swoop down on what they meet."""
+"""Swarm Hosts: two locusts hatch beside it, fly where they are sent, and swoop down on the enemies they meet."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ DRAINED = "ViperConsumeStructure"
 
 
 def _cloud(world: World, cast: Cast) -> None:
-    """Lay a cloud in which nobody on the ground shoots farther than an arm's length, and structures detect nothing."""
+    """Place a cloud in which ground units shoot no farther than melee range, and structures detect nothing."""
     end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
     lay(world, cast, "blinding_cloud", end=end, due=world.loop, effect=CLOUD_EFFECT, period=period)
 
@@ -64,7 +64,7 @@ def _can_pull(world: World, cast: Cast) -> ActionResult:
 
 
 def _caught(world: World, item: AreaEffect) -> None:
-    """The tentacle has its victim: that drops everything, comes out of the ground and is on its way."""
+    """Catch the victim: it drops its orders, unburrows and starts to move."""
     viper, slot = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (viper, slot):
         return
@@ -104,7 +104,7 @@ def _pulls(world: World, item: AreaEffect) -> None:
 
 
 def _bomb(world: World, cast: Cast) -> None:
-    """Throw a parasite at a flyer, which harms enemy flyers around it, and goes on where it dies."""
+    """Throw a parasite at a flyer; it harms enemy flyers around the host, and goes on where the host dies."""
     throw(world, cast, "parasitic_bomb")
 
 
@@ -132,7 +132,7 @@ def _harms(world: World, slot: int, row: np.void) -> None:
 
 
 def _lingers(world: World, slot: int, row: np.void) -> None:
-    """The host is dead: what is left of the time goes on at the place."""
+    """Go on at the place for the rest of the time when the host is dead."""
     left = float(row["end"]) - world.loop
     if left <= 0.0:
         return
@@ -146,7 +146,7 @@ def _lingers(world: World, slot: int, row: np.void) -> None:
 
 
 def _consume(world: World, cast: Cast) -> None:
-    """Drain a structure of its own side's life for energy."""
+    """Drain life from one of its owner's structures for energy."""
     buffs.apply(world, cast.target, DRAINED, source=cast.slot)
 
 

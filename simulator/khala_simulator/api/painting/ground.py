@@ -1,6 +1,6 @@
-"""The ground as an image of a client shows it: terrain, creep, fog and the lines between cells.
+"""The ground on a client's image: terrain, creep, fog and the lines between cells.
 
-The terrain is painted in tiles when they are first seen, and shared by all games on the map; a view is a cut of them.
+The terrain is painted in tiles when they are first seen, and shared by all games on the map; a view is a part of them.
 Above: `scene.py`, `overview.py`. Below: `terrain.py`.
 """
 
@@ -32,7 +32,7 @@ FINEST, COARSEST = 16, 4
 """Pixels per cell with which tiles are painted."""
 CREEP_OPACITY, GRID_OPACITY = 0.5, 0.07
 DARK = 32
-"""On ground darker than this the lines between cells would be all there is to see."""
+"""On ground darker than this only the lines between cells would be visible."""
 MOST_STEP = 1.5
 """From this many pixels of the tiles per pixel on, they are shrunk first, so that no detail falls in between."""
 _LIGHT = np.array([0, 105, 255, 0], np.uint8)
@@ -40,7 +40,7 @@ _LIGHT = np.array([0, 105, 255, 0], np.uint8)
 
 
 class PaintedGround:
-    """The ground on one of a client's images; painted anew only when the view moves or creep spreads."""
+    """The ground on one of a client's images; painted again only when the view moves or creep spreads."""
 
     def __init__(self, columns: int, rows: int, pixels_per_cell: float, *, grid: bool = False) -> None:
         self._size = columns, rows
@@ -52,7 +52,7 @@ class PaintedGround:
         self._covered = self._bare
 
     def paint(self, world: World, player: int, view: Rect, *, fog: bool) -> Image:
-        """A fresh image of this part of the map; with `fog` dark where the player does not see."""
+        """Return a new image of this part of the map; with `fog` dark where the player does not see."""
         height, creep = world.map.terrain.size[1], world.creep
         if view != self._view:
             self._bare, self._view, self._creep = self._cut(world.map.terrain, view), view, None
@@ -77,7 +77,7 @@ class PaintedGround:
         return image
 
     def _cover(self, creep: Mask, view: Rect) -> Image:
-        """The bare ground with creep on it."""
+        """Return the bare ground with creep on it."""
         if not creep.any():
             return self._bare
         mask = cut(creep[::-1].astype(np.uint8) * 255, (0, creep.shape[0]), 1, view, self._size) > 127
@@ -88,7 +88,7 @@ class PaintedGround:
 
 
 def _tiles(terrain: Terrain, view: Rect) -> Cells | None:
-    """The tiles of the map that a view shows something of, counted in tiles; None if it shows none."""
+    """Return the tiles of the map that a view overlaps, counted in tiles; None if it overlaps none."""
     columns, rows = (math.ceil(cells / TILE) for cells in terrain.size)
     x0, y0 = max(0, math.floor(view.x0 / TILE)), max(0, math.floor(view.y0 / TILE))
     x1, y1 = min(columns, math.ceil(view.x1 / TILE)), min(rows, math.ceil(view.y1 / TILE))
@@ -96,7 +96,7 @@ def _tiles(terrain: Terrain, view: Rect) -> Cells | None:
 
 
 def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
-    """Tiles side by side."""
+    """Return tiles side by side as one image."""
     rows = [
         np.concatenate([_tile(terrain, x, y, density) for x in range(tiles.x0, tiles.x1)], axis=1)
         for y in range(tiles.y1 - 1, tiles.y0 - 1, -1)
@@ -112,7 +112,7 @@ def _tile(terrain: Terrain, x: int, y: int, density: int) -> Image:
 
 
 def _lines(view: Rect, size: tuple[int, int]) -> Mask:
-    """The pixels that lie on a border between cells."""
+    """Return the pixels on a border between cells."""
     x = np.floor(np.linspace(view.x0, view.x1, size[0] + 1))
     y = np.floor(np.linspace(view.y1, view.y0, size[1] + 1))
     result: Mask = (np.diff(x) > 0)[None, :] | (np.diff(y) < 0)[:, None]
@@ -122,7 +122,7 @@ def _lines(view: Rect, size: tuple[int, int]) -> Mask:
 def cut(
     image: NDArray[np.uint8], corner: tuple[float, float], density: float, view: Rect, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """The part of an image that a view shows, `size` (columns, rows); black where the image ends.
+    """Return the part of an image that a view shows, `size` (columns, rows); black where the image ends.
 
     `corner` is the world point at the image's upper left, `density` its pixels per cell.
     """

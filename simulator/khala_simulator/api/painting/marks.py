@@ -1,4 +1,4 @@
-"""Small marks on a rendered image: bars, rings, shots, sparks. Works in pixels, on the image that it is given.
+"""Small marks on a rendered image: bars, rings, shots, sparks. Works in pixels, on the given image.
 
 Above: `scene.py`, `overview.py`.
 """
@@ -29,19 +29,19 @@ BEAM_OPACITY = 0.62
 
 
 def fixed(value: float) -> int:
-    """A coordinate as OpenCV takes it with `SHIFT`, where whole numbers are the middles of pixels."""
+    """Return a coordinate as OpenCV takes it with `SHIFT`, where whole numbers are the middles of pixels."""
     return round((value - 0.5) * _ONE)
 
 
 def health_colour(share: float) -> Colour:
-    """Red, yellow or green."""
+    """Return red, yellow or green."""
     return palette.HEALTH[0 if share <= 1 / 3 else 1 if share <= 2 / 3 else 2]
 
 
 def bars(
     image: Image, middle: int, bottom: int, size: tuple[int, int], shares: Sequence[tuple[float, Colour]], border: int
 ) -> None:
-    """Bars above each other, the first on top, on a dark ground; `bottom` is the row below them, `size` of each one."""
+    """Draw stacked bars, the first on top, on a dark ground; `bottom` is the row below them, `size` is per bar."""
     width, height = size
     rows, columns = image.shape[:2]
     left, top = middle - width // 2, bottom - height * len(shares)
@@ -57,7 +57,7 @@ def bars(
 
 
 def pips(image: Image, left: int, top: int, size: int, colours: Sequence[Colour]) -> None:
-    """Small squares side by side on a dark ground."""
+    """Draw small squares side by side on a dark ground."""
     rows, columns = image.shape[:2]
     width = (size + 1) * len(colours)
     if left < 1 or top < 1 or left + width >= columns or top + size >= rows:
@@ -69,25 +69,25 @@ def pips(image: Image, left: int, top: int, size: int, colours: Sequence[Colour]
 
 
 def ring(image: Image, centre: Point, radius: float, colour: Colour, width: int = 1) -> None:
-    """A circle with soft edges."""
+    """Draw a circle with soft edges."""
     at = (fixed(centre[0]), fixed(centre[1]))
     cv2.circle(image, at, round(radius * _ONE), colour, width, cv2.LINE_AA, SHIFT)
 
 
 def dot(image: Image, centre: Point, radius: float, colour: Colour) -> None:
-    """A disc with soft edges."""
+    """Draw a disc with soft edges."""
     at = (fixed(centre[0]), fixed(centre[1]))
     cv2.circle(image, at, round(radius * _ONE), colour, -1, cv2.LINE_AA, SHIFT)
 
 
 def line(image: Image, start: Point, end: Point, colour: Colour, width: int = 1) -> None:
-    """A line with soft edges."""
+    """Draw a line with soft edges."""
     one, other = (fixed(start[0]), fixed(start[1])), (fixed(end[0]), fixed(end[1]))
     cv2.line(image, one, other, colour, width, cv2.LINE_AA, SHIFT)
 
 
 def beams(image: Image, shots: Sequence[tuple[Point, Point, Colour]], width: int) -> None:
-    """Shots from attackers to targets, the ground shining through."""
+    """Draw shots from attackers to targets, the ground shining through."""
     ends = np.array([point for start, end, _ in shots for point in (start, end)])
     x0, y0 = np.maximum(ends.min(axis=0).astype(np.intp) - width, 0).tolist()
     x1, y1 = np.maximum(ends.max(axis=0).astype(np.intp) + width + 2, 0).tolist()
@@ -101,7 +101,7 @@ def beams(image: Image, shots: Sequence[tuple[Point, Point, Colour]], width: int
 
 
 def spark(image: Image, at: Point, size: float, turn: int) -> None:
-    """A small cross of light where somebody is hit; `turn` varies it."""
+    """Draw a small cross of light where a unit is hit; `turn` varies it."""
     x, y = at
     a, b = (
         ((size, size * 0.35), (-size * 0.35, size))
@@ -113,6 +113,6 @@ def spark(image: Image, at: Point, size: float, turn: int) -> None:
 
 
 def missile(image: Image, at: Point, tail: Point, colour: Colour, size: float) -> None:
-    """A bright head with a short tail."""
+    """Draw a bright head with a short tail."""
     line(image, tail, at, colour, 1)
     dot(image, at, size, (255, 255, 255))

@@ -1,4 +1,4 @@
-"""The minimap: ground, fog, units as dots, where the camera looks, where somebody is attacked.
+"""The minimap: ground, fog, units as dots, where the camera looks, where a unit is attacked.
 
 Above: `render.py`. Below: `ground.py`, `marks.py`.
 """
@@ -41,7 +41,7 @@ class OverviewPainter:
         self._rest = (round(x), round(y))  # where the map ends, in an image of another shape
 
     def paint(self, frame: Frame) -> Image:
-        """The image of this frame."""
+        """Return the image of this frame."""
         image = self._ground.paint(frame.world, frame.player, self._shown, fog=frame.fogged)
         self._dots(image, frame)
         for x, y in blips(frame.world, self._types, frame.player).tolist():
@@ -54,7 +54,7 @@ class OverviewPainter:
         return image
 
     def _dots(self, image: Image, frame: Frame) -> None:
-        """Neutral things first, own units last; structures are squares."""
+        """Draw the dots, neutral units first, own units last; structures are squares."""
         sight, scale = frame.sight, self._minimap.scale
         known = np.flatnonzero(sight.display != Display.HIDDEN.value)
         structure = self._types.structure[sight.row]

@@ -1,8 +1,8 @@
 """The colours of rendered images.
 
-Sides are told apart by hue (blue against vermilion, which every common kind of colour blindness leaves distinct), by
-lightness, and by their rim: light around own units, dark around the enemy's. The ground stays grey and dull, so that
-colour always means a unit or an effect.
+Sides differ by hue (blue against vermilion, which every common kind of colour blindness leaves distinct), by lightness,
+and by their rim: light around own units, dark around the enemy's. The ground stays grey and dull, so that colour always
+means a unit or an effect.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class PlayerColors:
 
     body: Colour
     rim: Colour
-    dark: Colour  # inner parts of structures, what is cut out of a body
+    dark: Colour  # inner parts of structures, cut-outs of a body
     ink: Colour  # letters
     beam: Colour  # its shots
     dot: Colour  # on the minimap
@@ -56,14 +56,14 @@ LIVERIES: dict[int, PlayerColors] = {
 }  # fmt: skip
 
 _OF_PLAYER = np.array([Alliance.NEUTRAL, Alliance.SELF, Alliance.ENEMY, Alliance.ALLY])
-"""In which side's colours an observer sees the units of a player; it has no side itself."""
+"""The side whose colours an observer sees on the units of a player; it has no side itself."""
 
 VOID: Colour = (12, 13, 18)
 LOW: Colour = (62, 68, 74)
 """Ground at the height of the lowest cliff level, and at the highest."""
 HIGH: Colour = (142, 134, 118)
 ROCK: Colour = (46, 44, 46)
-"""What cannot be walked on takes this colour's side."""
+"""Unwalkable ground shifts towards this colour."""
 EDGE: Colour = (20, 19, 22)
 CREST: Colour = (196, 188, 168)
 """The line along a cliff, on its lower and on its upper side."""
@@ -78,7 +78,7 @@ ENERGY: Colour = (206, 118, 255)
 PROGRESS: Colour = (250, 226, 120)
 BLIP: Colour = (150, 30, 40)
 BOON: Colour = (255, 214, 92)
-"""A buff that somebody has from his own side, and one from another."""
+"""A buff from the unit's own side, and one from another side."""
 BANE: Colour = (232, 92, 255)
 BAR: Colour = (10, 10, 12)
 SELECTED: Colour = (130, 255, 120)
@@ -90,7 +90,7 @@ VESPENE: Colour = (88, 200, 96)
 
 
 def mix(one: Colour, other: Colour, part: float) -> Colour:
-    """A colour between two, at 0 the first."""
+    """Return a colour between two, at 0 the first."""
     return (
         round(one[0] + (other[0] - one[0]) * part),
         round(one[1] + (other[1] - one[1]) * part),
@@ -99,7 +99,7 @@ def mix(one: Colour, other: Colour, part: float) -> Colour:
 
 
 def sides(owner: NDArray[np.int64], alliance: NDArray[np.int64], player: int) -> NDArray[np.int64]:
-    """(n,) keys of LIVERIES for units of these owners: their alliance, or for an observer their player's colours."""
+    """Return (n,) keys of LIVERIES for units of these owners: the alliance, or for an observer the player's colours."""
     if player != OBSERVER:
         return alliance
     number = np.where(owner == API_NEUTRAL, 0, owner)
@@ -108,7 +108,7 @@ def sides(owner: NDArray[np.int64], alliance: NDArray[np.int64], player: int) ->
 
 
 def livery_of(unit: UnitType, side: int) -> PlayerColors:
-    """The colours of a unit of a side; what can be harvested has colours of its own."""
+    """Return the colours of a unit of a side; resources have colours of their own."""
     livery = LIVERIES[side]
     if unit.resource:
         stuff = VESPENE if unit.resource == "vespene" else RICH_MINERALS if "Rich" in unit.name else MINERALS

@@ -38,10 +38,10 @@ MOST_PIPS = 4
 TAIL = 0.6
 """World units that a missile draws behind it."""
 TINY, SMALL, TALL = 4.2, 6.0, 30.0
-"""Radius in pixels below which only damage and construction are told, by bars without a border; below which bars are
-one pixel high; and from which they are three."""
+"""Radius in pixels below which bars show only damage and construction, without a border; below which bars are one pixel
+high; and from which they are three."""
 BARE = frozenset({Class.MINERALS, Class.GEYSER, Class.ROCKS, Class.BARRIER})
-"""What has no bars until it is damaged."""
+"""Classes that have no bars until they are damaged."""
 
 
 class DrawnUnit(NamedTuple):
@@ -65,7 +65,7 @@ class ScenePainter:
         self._ground = PaintedGround(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)
 
     def paint(self, frame: Frame) -> Image:
-        """The image of this frame."""
+        """Return the image of this frame."""
         screen = self._screen
         image = self._ground.paint(frame.world, frame.player, screen.view(frame.camera), fog=frame.fogged)
         actors = self._actors(frame)
@@ -79,7 +79,7 @@ class ScenePainter:
         return image
 
     def _actors(self, frame: Frame) -> list[DrawnUnit]:
-        """The units in view in drawing order, from below to above, the larger ones first."""
+        """Return the units in view in drawing order, from below to above, the larger ones first."""
         sight, screen = frame.sight, self._screen
         x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
         radius = sight.radius * self._scale
@@ -103,7 +103,7 @@ class ScenePainter:
             self._wardrobe.sprite(looks[actor.row]).stamp(image, int(actor.x), int(actor.y))
 
     def _looks(self, frame: Frame) -> list[SpriteLook]:
-        """The look of each unit of the sight."""
+        """Return the look of each unit of the sight."""
         sight = frame.sight
         turn = np.round(sight.facing * (DIRECTIONS / (2 * math.pi))).astype(np.int64) % DIRECTIONS
         turn *= ~self._types.structure[sight.row]
@@ -114,7 +114,7 @@ class ScenePainter:
         return list(map(SpriteLook._make, zip(*(column.tolist() for column in columns), strict=True)))
 
     def _blips(self, image: Image, frame: Frame) -> None:
-        """Where radar tells of somebody: dark discs without a type."""
+        """Draw dark discs without a type where radar detects a unit."""
         for point in blips(frame.world, self._types, frame.player):
             x, y = self._pixel(frame, point)
             marks.dot(image, (x, y), BLIP_RADIUS * self._scale, palette.BLIP)
@@ -191,7 +191,7 @@ class ScenePainter:
             marks.bars(image, int(actor.x), bottom, size, shares, border=int(actor.radius >= TINY))
 
     def _buffs(self, image: Image, frame: Frame, actors: list[DrawnUnit]) -> None:
-        """A pip for each buff, below the unit."""
+        """Draw a pip for each buff, below the unit."""
         worn = seen_buffs(frame.world, frame.sight)
         if worn is None:
             return
@@ -206,7 +206,7 @@ class ScenePainter:
 
 
 def _level(unit: UnitType) -> int:
-    """How high above the ground a type is drawn: structures, walkers, those that walk over the others, flyers."""
+    """Return the drawing level of a type: structures, walkers, those that walk over the others, flyers."""
     if unit.flying:
         return 3
     return 2 if "air" in unit.planes else 0 if unit.structure else 1

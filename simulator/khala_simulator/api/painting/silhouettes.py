@@ -2,7 +2,7 @@
 
 An outline is half a polygon, from the nose at (x, 0) over the left side to the tail, in radii of the unit: x is
 forward, y to the left; the right side mirrors it. Types without an outline of their own have that of their class, so
-that every type of the tables can be drawn. Drawn from what the units are like, not from the game's pictures.
+that every type of the tables can be drawn. The shapes follow what the units are, not the game's pictures.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Class(enum.Enum):
 
 
 def _ring(count: int, radii: tuple[float, ...] = (1.0,), turn: float = 0.0) -> Points:
-    """Half of a star or a regular polygon of `count` corners with these radii in turn."""
+    """Return half of a star or a regular polygon of `count` corners with these radii in turn."""
     corners = ((math.pi * 2 * k / count + turn, radii[k % len(radii)]) for k in range(count // 2 + 1))
     return tuple((r * math.cos(a), r * math.sin(a)) for a, r in corners)
 
@@ -182,17 +182,17 @@ _MARKS: dict[Class, Callable[[UnitType], bool]] = {
     Class.MELEE: lambda unit: all(weapon.melee for weapon in unit.weapons),
     Class.RANGED: lambda _: True,
 }
-"""By what a class is known; the first that holds."""
+"""The test for each class; the first that holds decides."""
 
 
 def class_of(unit: UnitType) -> Class:
-    """What a unit of this type is at a glance."""
+    """Return the class of a unit type."""
     return next(kind for kind, holds in _MARKS.items() if holds(unit))
 
 
 @functools.lru_cache(maxsize=1024)
 def outline_of(unit: UnitType) -> Points:
-    """Half of the outline of this type."""
+    """Return half of the outline of this type."""
     for name in (unit.name, _FORMS.sub("", unit.name)):
         if name in OUTLINES:
             return OUTLINES[name]
@@ -202,7 +202,7 @@ def outline_of(unit: UnitType) -> Points:
 
 @functools.lru_cache(maxsize=1024)
 def code_of(unit: UnitType) -> str:
-    """Two or three capitals that stand for this type; none for what lies on the ground."""
+    """Return the two or three capitals of this type; none for objects on the ground."""
     if class_of(unit) in _BARREN:
         return ""
     for name in (unit.name, _FORMS.sub("", unit.name)):

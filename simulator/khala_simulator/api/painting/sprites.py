@@ -1,7 +1,7 @@
 """Units as small images with soft edges, made once for each look and stamped wherever such a unit is.
 
 The body of a type in the colours of a side is drawn once, facing right and twice as large as it will be; turning it,
-shrinking it, and adding what does not turn with it (shadow, light, letters) gives its sprite in one of a few
+shrinking it, and adding the parts that do not turn with it (shadow, light, letters) makes its sprite in one of a few
 directions. Above: `scene.py`. Below: `silhouettes.py`, `palette.py`.
 """
 
@@ -46,18 +46,18 @@ RINGED = frozenset({Class.MASSIVE, Class.CAPITAL})
 NOSE = ((1.22, 0), (0.74, 0.2), (0.74, 0))
 """The tick that shows where a unit faces, as half an outline."""
 GHOST, UNFINISHED = 0.5, 0.75
-"""Opacity of what is cloaked or not real, and of what is being built."""
+"""Opacity of units that are cloaked or not real, and of those being built."""
 SHADOW = 0.5
 LIGHT = 0.35
 """How much lighter a body is at its upper left than in the middle."""
 MAX_BYTES = 24 << 20
-"""Sprites of one size that are kept; beyond it all are made anew."""
+"""Sprites of one size that are kept; beyond it all are made again."""
 _SHIFT = 4
 """OpenCV takes fractions of pixels as whole numbers of sixteenths."""
 
 
 class SpriteLook(NamedTuple):
-    """What a sprite depends on, besides its size."""
+    """What a sprite depends on, apart from its size."""
 
     row: int  # of the type in the catalog
     side: int  # key of palette.LIVERIES
@@ -68,7 +68,7 @@ class SpriteLook(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Sprite:
-    """An image that is laid over another: `paint + image * keep / 255`."""
+    """An image that is put over another: `paint + image * keep / 255`."""
 
     paint: Image  # [h, w, 3]
     keep: Image  # [h, w, 3] 255 where nothing is painted; three times the same, which is ten times as fast as once
@@ -76,7 +76,7 @@ class Sprite:
     top: int
 
     def stamp(self, image: Image, column: int, row: int) -> None:
-        """Lays the sprite over an image, the unit at this pixel; what is outside is left away."""
+        """Put the sprite over an image, the unit at this pixel; clip what is outside."""
         left, top = column + self.left, row + self.top
         (rows, columns), (height, width) = image.shape[:2], self.paint.shape[:2]
         x0, y0, x1, y1 = max(0, left), max(0, top), min(columns, left + width), min(rows, top + height)
@@ -98,7 +98,7 @@ class Wardrobe:
         self._bytes = 0
 
     def sprite(self, look: SpriteLook) -> Sprite:
-        """The sprite of a look."""
+        """Return the sprite of a look."""
         sprite = self._sprites.get(look)
         if sprite is None:
             sprite = self._sprites[look] = self._make(look)
@@ -130,7 +130,7 @@ class Wardrobe:
 
 @functools.lru_cache(maxsize=4)
 def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
-    """The sprites of a catalog at this scale, shared by all games of the process."""
+    """Return the sprites of a catalog at this scale, shared by all games of the process."""
     return Wardrobe(load_catalog(version).units, pixels_per_cell)
 
 
@@ -138,7 +138,7 @@ def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
 
 
 def draw_body(unit: UnitType, livery: PlayerColors, radius: float, *, unfinished: bool) -> Floats:
-    """A unit facing right, `_finer` times larger than it is shown: its rim, its body, what is on it."""
+    """Return a unit facing right, `_finer` times larger than it is shown: its rim, its body, and its details."""
     kind, easel = class_of(unit), _Easel(radius)
     body = easel.outline(outline_of(unit))
     easel.lay(cv2.dilate(body, _disc(max(1, round(easel.radius * 0.1)))), livery.rim)
@@ -160,7 +160,7 @@ def draw_body(unit: UnitType, livery: PlayerColors, radius: float, *, unfinished
 
 
 class _Easel:
-    """A body in the making: masks laid over each other in their colours."""
+    """A body in the making: masks over each other in their colours."""
 
     def __init__(self, radius: float) -> None:
         self.finer = _finer(radius)
@@ -169,7 +169,7 @@ class _Easel:
         self.image = np.zeros((self.size, self.size, 4), np.float32)
 
     def outline(self, half: tuple[tuple[float, float], ...], scale: float = 1.0) -> Mask:
-        """The inside of a mirrored outline."""
+        """Return the mask of a mirrored outline."""
         left = np.array(half) * (scale * self.radius)
         points = np.concatenate([left, left[::-1] * (1, -1)]) * (1, -1) + (self.size - 1) / 2
         mask = np.zeros((self.size, self.size), np.uint8)
@@ -177,16 +177,16 @@ class _Easel:
         return mask
 
     def inside(self, mask: Mask, margin: float) -> Mask:
-        """A mask without a margin, given in radii."""
+        """Return a mask without a margin, given in radii."""
         return cv2.erode(mask, _disc(max(self.finer, round(self.radius * margin))))
 
     def stripes(self, mask: Mask) -> Mask:
-        """Every other diagonal stripe of a mask."""
+        """Return every other diagonal stripe of a mask."""
         line = np.arange(self.size) // (2 * self.finer)
         return mask * ((line[:, None] + line) % 2).astype(np.uint8)
 
     def lay(self, mask: Mask, colour: Colour, part: float = 1.0) -> None:
-        """Paints over what is there."""
+        """Paint over the present image."""
         cover = mask.astype(np.float32)[..., None] * np.float32(part / 255)
         self.image *= 1 - cover
         self.image += cover * np.array([*colour, 255], np.float32)
@@ -201,7 +201,7 @@ def _half(radius: float) -> int:
 
 
 def _turned(body: Floats, angle: float, finer: int) -> Floats:
-    """A body turned counter-clockwise and shrunk to the size in which it is shown."""
+    """Return a body turned counter-clockwise and shrunk to the size in which it is shown."""
     side, cos, sin = len(body) // finer, math.cos(angle) * finer, math.sin(angle) * finer
     middle, large = (side - 1) / 2, (len(body) - 1) / 2
     inverse = np.array(
@@ -217,7 +217,7 @@ def _over(lower: Floats, upper: Floats) -> Floats:
 
 
 def _shadow(cover: Floats, radius: float) -> Floats:
-    """The shadow of a shape, to the lower right of it."""
+    """Return the shadow of a shape, to the lower right of it."""
     shift = radius * 0.38
     side = len(cover)
     move = np.array([[0.92, 0, side * 0.04 + shift], [0, 0.92, side * 0.04 + shift * 1.2]], np.float32)
@@ -234,7 +234,7 @@ def _light(side: int) -> Floats:
 
 @functools.lru_cache(maxsize=512)
 def _letters(code: str, radius: float, side: int, livery: PlayerColors) -> Floats:
-    """Capitals in the middle of an image, with an edge around them."""
+    """Return an image with capitals in its middle, with an edge around them."""
     size = side * FINER
     mask = _text(code, size, LETTER_HEIGHT * radius * FINER, LETTERS_WIDTH * radius * FINER)
     image = np.zeros((size, size, 4), np.float32)
@@ -245,7 +245,7 @@ def _letters(code: str, radius: float, side: int, livery: PlayerColors) -> Float
 
 
 def _text(text: str, size: int, height: float, width: float) -> Mask:
-    """Capitals in the middle of a square mask, no larger than this."""
+    """Return a square mask with capitals in its middle, no larger than this."""
     font, mask = cv2.FONT_HERSHEY_SIMPLEX, np.zeros((size, size), np.uint8)
     (wide, tall), _ = cv2.getTextSize(text, font, 1.0, 1)
     scale = min(height / tall, width / wide)
@@ -257,7 +257,7 @@ def _text(text: str, size: int, height: float, width: float) -> Mask:
 
 
 def _cut_out(image: Floats) -> Sprite:
-    """The part of an image on which there is paint."""
+    """Return the painted part of an image."""
     cover = np.minimum(np.round(image[..., 3]), 255)
     rows, columns = np.flatnonzero(cover.any(axis=1)), np.flatnonzero(cover.any(axis=0))
     box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))

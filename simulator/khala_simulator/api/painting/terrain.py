@@ -1,7 +1,7 @@
 """A block of a map as an image: height as lightness, slopes in relief, cliffs with edges, ramps in stripes.
 
-Only what never changes; knows no units and no player. A block is painted with a margin of its surroundings, so that
-blocks fit together. Above: `ground.py`.
+Only the parts that never change; knows no units and no player. A block is painted with a margin of its surroundings, so
+that blocks fit together. Above: `ground.py`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 MARGIN = 3
-"""Cells around a block that have a say in how it looks."""
+"""Cells around a block that influence its look."""
 LIGHT = (-0.62, 0.62)
 """Direction from which the light falls, in the world: from the upper left."""
 RELIEF = 0.34
@@ -49,7 +49,7 @@ class Cells(NamedTuple):
 
 
 def paint_block(terrain: Terrain, cells: Cells, density: int) -> Image:
-    """The ground of some cells with `density` pixels per cell, north at the top; void outside of the map."""
+    """Return the ground of some cells with `density` pixels per cell, north at the top; void outside of the map."""
     near = Cells(cells.x0 - MARGIN, cells.y0 - MARGIN, cells.x1 + MARGIN, cells.y1 + MARGIN)
     walk = _smooth(_window(terrain.walk, near), density)
     solid = _smooth(_window(terrain.cliff > 0, near), density)
@@ -69,12 +69,12 @@ def paint_block(terrain: Terrain, cells: Cells, density: int) -> Image:
 
 
 def blend(colour: Floats, paint: palette.Colour, part: NDArray[np.floating[Any]]) -> None:
-    """Mixes a paint into an image, `part` [rows, columns] of it."""
+    """Mix a paint into an image, `part` [rows, columns] of it."""
     colour += (np.array(paint, np.float32) - colour) * part[..., None].astype(np.float32)
 
 
 def _window(grid: NDArray[Any], cells: Cells, more: int = 0) -> Floats:
-    """Part of a grid, its northernmost row first; beyond the map as at its border, masks false."""
+    """Return part of a grid, its northernmost row first; beyond the map as at its border, masks false."""
     rows, columns = np.arange(cells.y0, cells.y1 + more)[::-1], np.arange(cells.x0, cells.x1 + more)
     inside = ((rows >= 0) & (rows < grid.shape[0]))[:, None] & ((columns >= 0) & (columns < grid.shape[1]))
     rows, columns = np.clip(rows, 0, grid.shape[0] - 1), np.clip(columns, 0, grid.shape[1] - 1)
@@ -83,14 +83,14 @@ def _window(grid: NDArray[Any], cells: Cells, more: int = 0) -> Floats:
 
 
 def _smooth(part: Floats, density: int) -> Mask:
-    """A mask of cells as a mask of pixels, its corners rounded."""
+    """Return a mask of cells as a mask of pixels, its corners rounded."""
     hard = cv2.resize(part, None, fx=density, fy=density, interpolation=cv2.INTER_NEAREST)
     result: Mask = cv2.GaussianBlur(hard, (0, 0), density * ROUND, borderType=cv2.BORDER_REPLICATE) > 0.5
     return result
 
 
 def _heights(terrain: Terrain, cells: Cells, density: int) -> Floats:
-    """Ground z of every pixel, between the corners of its cell."""
+    """Return the ground z of every pixel, interpolated between the corners of its cell."""
     corners = _window(terrain.vertices, cells, more=1)
     size = ((cells.x1 - cells.x0) * density, (cells.y1 - cells.y0) * density)
     inverse = np.array([[1 / density, 0, 0.5 / density], [0, 1 / density, 0.5 / density]], np.float32)
@@ -100,7 +100,7 @@ def _heights(terrain: Terrain, cells: Cells, density: int) -> Floats:
 
 @functools.lru_cache(maxsize=16)
 def _floor(terrain: Terrain) -> tuple[float, float]:
-    """The lowest and the highest ground on which something can stand, but for rare extremes."""
+    """Return the lowest and the highest usable ground, except for rare extremes."""
     floor = terrain.vertices[:-1, :-1][terrain.cliff > 0]
     if not floor.size:
         return 8.0, 12.0
@@ -116,7 +116,7 @@ def _tint(terrain: Terrain, height: Floats) -> Floats:
 
 
 def _relief(height: Floats, density: int) -> Floats:
-    """Light and shade of slopes, as a factor."""
+    """Return light and shade of slopes, as a factor."""
     soft = cv2.GaussianBlur(height, (0, 0), density * 0.2)
     east = cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=density / 8)
     north = -cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=density / 8)
@@ -124,14 +124,14 @@ def _relief(height: Floats, density: int) -> Floats:
 
 
 def _stripe(colour: Floats, height: Floats, ramp: Mask) -> None:
-    """Ramps are sandy and striped across their slope."""
+    """Paint ramps in sand, striped across their slope."""
     blend(colour, palette.RAMP, 0.45 * ramp)
     dark = np.mod(height, CONTOUR) < CONTOUR / 2
     colour *= np.where(ramp & dark, 0.86, 1.0).astype(np.float32)[..., None]
 
 
 def _hatch(colour: Floats, rock: Mask, density: int) -> None:
-    """Ground that nobody can walk on is hatched; the hatching goes on from block to block."""
+    """Hatch unwalkable ground; the hatching continues from block to block."""
     rows, columns = rock.shape
     line = (np.arange(rows)[:, None] + np.arange(columns)) % density < max(1, density // 6)
     colour *= np.where(rock & line, 0.72, 1.0).astype(np.float32)[..., None]
@@ -139,7 +139,7 @@ def _hatch(colour: Floats, rock: Mask, density: int) -> None:
 
 @functools.lru_cache(maxsize=4)
 def _noise(terrain: Terrain) -> Floats:
-    """Two draws per cell, always the same."""
+    """Return two random values per cell, always the same."""
     width, height = terrain.size
     return np.random.default_rng(7).standard_normal((2 * height, 2 * width)).astype(np.float32)
 
@@ -154,7 +154,7 @@ def _grain(colour: Floats, terrain: Terrain, cells: Cells) -> None:
 
 
 def _edges(colour: Floats, walk: Mask, height: Floats, density: int) -> None:
-    """A dark line where walking ends, and a bright one above it where the ground falls away."""
+    """Draw a dark line where walking ends, and a bright one above it where the ground falls away."""
     size = max(1, round(density / 8)) * 2 + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     whole = walk.astype(np.uint8)

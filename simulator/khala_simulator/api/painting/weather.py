@@ -1,7 +1,7 @@
 """Effects on the screen: storms, scans, force, biles on their way; each in the look of its kind, at its true radius.
 
-Those that lie on the ground are painted before the units, those that hang over them after. Above: `scene.py`.
-Below: `effects.py`, which says what the player perceives.
+Effects on the ground are painted before the units, those that hang over them after. Above: `scene.py`. Below:
+`effects.py`, which says what the player perceives.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 BOLTS = 7
 GOLDEN = 0.618034
 EDGE_SIDE = 0.65
-"""How much of its edge's colour an effect has from the side that made it."""
+"""How much of its edge's colour an effect takes from the side that made it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Manner:
     fill: float  # opacity of the disc
     above: bool  # over the units
     figure: Callable[[Image, Point, float, Colour, int], None] | None = None
-    """What is drawn into the disc: image, centre, radius in pixels, colour, age in loops."""
+    """A function that draws into the disc: image, centre, radius in pixels, colour, age in loops."""
 
 
 def _bolts(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
-    """Lightning from the middle outward, other bolts in every loop."""
+    """Draw lightning from the middle outward, new bolts in every loop."""
     glare = palette.mix(colour, (255, 255, 255), 0.75)
     for k in range(BOLTS):
         start = 2 * math.pi * (k + age * GOLDEN % 1) / BOLTS
@@ -63,13 +63,13 @@ def _bolts(image: Image, centre: Point, radius: float, colour: Colour, age: int)
 
 
 def _rings(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
-    """Rings that run outward."""
+    """Draw rings that run outward."""
     for k in range(3):
         marks.ring(image, centre, radius * ((k + age % 16 / 16) / 3), colour)
 
 
 def _cross(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
-    """A sight that says: here it will hit."""
+    """Draw cross-hairs where it will hit."""
     far = radius * 1.7
     for dx, dy in ((far, 0.0), (0.0, far)):
         marks.line(image, (centre[0] - dx, centre[1] - dy), (centre[0] + dx, centre[1] + dy), colour)
@@ -77,7 +77,7 @@ def _cross(image: Image, centre: Point, radius: float, colour: Colour, age: int)
 
 
 def _teeth(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
-    """Teeth around the edge, pointing inward."""
+    """Draw teeth around the edge, pointing inward."""
     for k in range(12):
         cos, sin = math.cos(k * math.pi / 6 + age * 0.01), math.sin(k * math.pi / 6 + age * 0.01)
         one = (centre[0] + radius * cos, centre[1] + radius * sin)
@@ -104,7 +104,7 @@ OTHER = Manner((240, 240, 240), 0.2, above=False)
 
 
 def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
-    """Paints the effects that lie on the ground, and returns those that hang above."""
+    """Paint the effects on the ground, and return those that hang above."""
     if not frame.world.area_effects:
         return []
     areas = seen_area_effects(frame.world, frame.player, through_fog=not frame.fogged)
@@ -114,7 +114,7 @@ def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
 
 
 def paint_above(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) -> None:
-    """Paints the effects that hang over the units."""
+    """Paint the effects that hang over the units."""
     if areas:
         _paint(image, frame, screen, areas)
 
@@ -144,7 +144,7 @@ def _side(area: AreaEffect, frame: Frame) -> int:
 
 
 def _disc(image: Image, centre: Point, radius: float, manner: Manner, edge: Colour) -> None:
-    """A translucent disc with an edge, painted on the square around it."""
+    """Paint a translucent disc with an edge, on the square around it."""
     (rows, columns), reach = image.shape[:2], math.ceil(radius) + 2
     x0, y0 = max(0, int(centre[0]) - reach), max(0, int(centre[1]) - reach)
     region = image[y0 : min(rows, int(centre[1]) + reach + 1), x0 : min(columns, int(centre[0]) + reach + 1)]
