@@ -1,9 +1,10 @@
-"""Between PySC2 and text: what an agent sees, and what its words do.
+"""Between PySC2 and text: agents' observations, and the commands that their replies become.
 
-    task      what is played and by whom          catalog, knowledge, maps    tables, from data
-    game      the game, behind an interface       pysc2_game, compat          … on PySC2, the only part that blocks
-    state     what one player knows at a moment   frames, names               geometry; numbers and their names
-    observe   snapshot → views and text           act                         words → commands → the game
+    task      the map, the agents, their units    catalogue, knowledge   text actions; facts about types; both from data
+    game      the game, behind an interface       compat                 PySC2 on today's Python
+    state     a player's state at one moment      frames, names          geometry; numbers and their names
+    observe   snapshot → views and text           act                    words → commands → the game
+    rules     why something is not possible now   auto                   arguments that an agent leaves open
 
 A turn goes through it like this (`khala_orchestrator.match` has the loop):
 
@@ -11,6 +12,6 @@ A turn goes through it like this (`khala_orchestrator.match` has the loop):
     joint = actor.joint(sight, {agent: parse(reply) for agent, reply in replies.items()})
     turn = await game.act(joint.commands)
 
-Synchronous and pure, except `game` and `pysc2_game`. Above it: `orchestrator`. Below it: `protocol`. It knows nothing
-of buses, of who answers when, or of which program the game is.
+Synchronous and pure, except `game`, which blocks. Above it: `orchestrator`. Below it: `protocol`. It knows no bus, no
+deadline, and not which program the game is.
 """

@@ -1,20 +1,19 @@
-"""Makes PySC2 4.0.0 importable on today's Python, and leaves no trace behind.
+"""Make PySC2 4.0.0 importable on today's Python, without lasting changes.
 
 Three things stand between PySC2 4.0.0 (2022) and Python 3.11 or newer:
 
 * its requirement `s2clientprotocol` ships stubs for a protobuf that is gone. The package
   `pys2clientprotocol` installs the same import name for the current protobuf (see the overrides in
-  `pyproject.toml`); nothing is left to do here but to check it, which `protobuf_kind` allows;
+  `pyproject.toml`); `protobuf_kind` only checks it;
 * `pysc2.lib.features` builds its colour palettes at import, and `pysc2.lib.colors` shuffles them with
-  `random.shuffle(palette, function)`. Python 3.11 removed the second parameter, so it is given back
-  while these two are being imported, and taken away again;
+  `random.shuffle(palette, function)`. Python 3.11 removed the second parameter, so it is restored
+  for the import of these two, and removed again;
 * `pysc2.env.sc2_env` imports a renderer, and with it pygame, which greets on stdout, and skvideo, which
   imports the deprecated `scipy.misc` and most of SciPy: two of the three seconds that PySC2 takes. The greeting and the
   warnings are muted for the import only; skvideo is imported when the renderer writes a video, which Khala never does.
 
-All that the bridge uses of PySC2 is imported here, and taken from here by the other modules, so that the order
-of imports is right by construction, also where warnings are errors. It is no adapter: PySC2 itself stays as it
-was installed.
+The other modules take everything that they use of PySC2 from here, so that the order of imports is right by
+construction, also where warnings are errors. It is not an adapter: PySC2 itself stays as it was installed.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def _shuffle(x: MutableSequence[object], random_: Callable[[], float] | None = None) -> None:
-    """`random.shuffle` as it was up to Python 3.10: the same draws in the same order."""
+    """Shuffle as `random.shuffle` of Python 3.10 does: the same draws in the same order."""
     if random_ is None:
         _SHUFFLE(x)
         return
@@ -48,7 +47,7 @@ _VIDEO = "pysc2.lib.video_writer"
 
 @contextlib.contextmanager
 def old_shuffle() -> Iterator[None]:
-    """Gives `random.shuffle` its two-parameter form inside the block."""
+    """Give `random.shuffle` its two-parameter form inside the block."""
     random.shuffle = _shuffle
     try:
         yield
@@ -58,7 +57,7 @@ def old_shuffle() -> Iterator[None]:
 
 @contextlib.contextmanager
 def quiet_pygame() -> Iterator[None]:
-    """Keeps pygame, which PySC2 imports for its renderer, from greeting on stdout."""
+    """Keep pygame, which PySC2 imports for its renderer, from printing a greeting."""
     name = "PYGAME_HIDE_SUPPORT_PROMPT"
     before = os.environ.get(name)
     os.environ[name] = "1"
@@ -72,7 +71,7 @@ def quiet_pygame() -> Iterator[None]:
 
 
 class _Late(ModuleType):
-    """A module that is imported when something of it is used."""
+    """A module that is imported when it is first used."""
 
     def __getattr__(self, name: str) -> object:
         return getattr(importlib.import_module(self.__name__), name)
@@ -80,7 +79,7 @@ class _Late(ModuleType):
 
 @contextlib.contextmanager
 def late_video() -> Iterator[None]:
-    """Give the renderer a stand-in for the module that writes videos, which imports the real one when it is used."""
+    """Replace the renderer's video module with a stand-in that imports the real one when it is used."""
     stand_in = _Late(_VIDEO)
     sys.modules.setdefault(_VIDEO, stand_in)
     try:
@@ -91,7 +90,7 @@ def late_video() -> Iterator[None]:
 
 
 def protobuf_kind() -> str:
-    """The protobuf implementation in use: `upb` is fast, `python` is about 80 times slower."""
+    """Return the protobuf implementation in use: `upb` is fast, `python` is about 80 times slower."""
     from google.protobuf.internal import api_implementation  # noqa: PLC0415  # only the doctor asks
 
     return api_implementation.Type()

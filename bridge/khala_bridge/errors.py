@@ -2,9 +2,9 @@
 
     khala_protocol.errors.KhalaError
     ├── GameError            the game could not be started, died, hangs or broke its contract
-    │   ├── GameMissing      there is no StarCraft II, or no such map, where it was looked for
+    │   ├── GameMissing      StarCraft II or the map is not where it should be
     │   └── GameHangs        the game did not answer in time and was ended
-    └── CatalogueError       the tables of actions or functions are wrong, or not those of the PySC2 that is installed
+    └── CatalogueError       the tables of actions or functions are wrong, or do not fit the installed PySC2
 
 A wrong action of a model is none of these: it is a `khala_protocol.messages.Rejection`.
 """
@@ -19,7 +19,7 @@ class GameError(KhalaError):
 
 
 class GameMissing(GameError):
-    """There is no game, or no map, where it was looked for."""
+    """The game or the map is not where it should be."""
 
 
 class GameHangs(GameError):
@@ -27,4 +27,4 @@ class GameHangs(GameError):
 
 
 class CatalogueError(KhalaError):
-    """A table of text actions or of functions contradicts itself, or the PySC2 that is installed."""
+    """A table of text actions or of functions contradicts itself or the installed PySC2."""

@@ -1,4 +1,4 @@
-"""The three frames of positions, and the ways between them.
+"""The three frames of positions, and the conversions between them.
 
 *World*: the game's own coordinates, origin at the bottom left, y up. It never leaves the host.
 *Screen*: square cells around the centre of a team's camera, origin at the top left, y down.
@@ -57,17 +57,17 @@ class MapFrame:
         return self.minimap_size / max(self.width, self.height)
 
     def minimap(self, x: float, y: float) -> MinimapPoint:
-        """A world position on the minimap."""
+        """Return the minimap position of a world position."""
         scale = self._cells_per_unit
         return MinimapPoint(x * scale, (self.height - y) * scale)
 
     def world(self, point: MinimapPoint) -> WorldPoint:
-        """A minimap position in the world; the inverse of `minimap`."""
+        """Return the world position of a minimap position; the inverse of `minimap`."""
         scale = self._cells_per_unit
         return WorldPoint(point.x / scale, self.height - point.y / scale)
 
     def holds(self, point: WorldPoint) -> bool:
-        """Whether a world position lies on the playable part of the map."""
+        """Return True if a world position is on the playable part of the map."""
         x0, y0, x1, y1 = self.playable
         return x0 <= point.x <= x1 and y0 <= point.y <= y1
 
@@ -86,24 +86,24 @@ class Camera:
         return self.size / CAMERA_WIDTH
 
     def screen(self, x: float, y: float) -> ScreenPoint:
-        """A world position on the screen; outside of `[0, size)` when the camera does not see it."""
+        """Return the screen position of a world position; outside of `[0, size)` if the camera does not see it."""
         scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
         return ScreenPoint((x - self.x + half) * scale, (self.y - y + half) * scale)
 
     def world(self, point: ScreenPoint) -> WorldPoint:
-        """A screen position in the world; the inverse of `screen`."""
+        """Return the world position of a screen position; the inverse of `screen`."""
         scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
         return WorldPoint(point.x / scale - half + self.x, self.y + half - point.y / scale)
 
     def sees(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which of these world positions are on the screen: (n, 2) → (n,)."""
+        """Return which of these world positions are on the screen: (n, 2) → (n,)."""
         half = CAMERA_WIDTH / 2
         right, down = places[:, 0] - self.x, self.y - places[:, 1]
         seen: NDArray[np.bool_] = (right >= -half) & (right < half) & (down >= -half) & (down < half)
         return seen
 
     def bounds(self, world: MapFrame) -> tuple[float, float, float, float]:
-        """The part of the screen that lies on the playable map: x0, y0, x1, y1 in screen cells."""
+        """Return the part of the screen that is on the playable map: x0, y0, x1, y1 in screen cells."""
         left, bottom, right, top = world.playable
         x0, y0 = self.screen(left, top)
         x1, y1 = self.screen(right, bottom)

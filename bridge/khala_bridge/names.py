@@ -1,7 +1,7 @@
-"""Names of the numbers that the game speaks in: unit types, buffs, upgrades, orders, abilities, as PySC2 has them.
+"""Names for the game's numbers: unit types, buffs, upgrades, orders, abilities, as in PySC2.
 
-Names only; what a unit can do is told by `khala_bridge.knowledge`. A number that PySC2 does not know (the game
-is newer than it) gets a name made of the number, never an error.
+Names only; `khala_bridge.knowledge` says what a unit can do. A number that PySC2 does not know (the game is newer)
+gets a name made of the number, never an error.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ _FORM = re.compile(r"_(pt|unit|quick|autocast)$")  # how a raw function takes it
 
 
 def unit_name(unit_type: int) -> str:
-    """Name of a unit type without its race, `Stalker`."""
+    """Return the name of a unit type without its race, `Stalker`."""
     return _UNITS.get(unit_type) or f"Unit{unit_type}"
 
 
 def buff_name(buff: int) -> str:
-    """Name of a buff, `GravitonBeam`."""
+    """Return the name of a buff, `GravitonBeam`."""
     return _BUFFS.get(buff) or f"Buff{buff}"
 
 
 def upgrade_name(upgrade: int) -> str:
-    """Name of an upgrade, `Blink`."""
+    """Return the name of an upgrade, `Blink`."""
     return _UPGRADES.get(upgrade) or f"Upgrade{upgrade}"
 
 
 @functools.cache
 def order_name(ability: int) -> str:
-    """Name of an order, `Attack`, in its general form where there is one."""
+    """Return the name of an order, `Attack`, in its general form if there is one."""
     function = actions.RAW_ABILITY_ID_TO_FUNC_ID.get(ability)
     if function is None:
         return f"Ability{ability}"

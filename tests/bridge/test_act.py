@@ -75,7 +75,7 @@ def world(unit: Make, snapshot: Callable[..., Snapshot]) -> Callable[..., Snapsh
 
 @pytest.fixture
 def act(task: Callable[..., TaskConfig], world: Callable[..., Snapshot]) -> Callable[..., JointAction]:
-    """The joint action of one reply of the agent above."""
+    """Return the joint action of one reply of the agent above."""
 
     def play(reply: str, *, teams: slice = slice(None), max_actions: int = 9, **fields: Any) -> JointAction:
         agent = AGENT.model_copy(update={"teams": AGENT.teams[teams]})

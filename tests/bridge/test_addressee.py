@@ -49,7 +49,7 @@ AGENT = {
 
 @pytest.fixture
 def act(task: Callable[..., TaskConfig], unit: Make, snapshot: Callable[..., Snapshot]) -> Callable[..., JointAction]:
-    """The joint action of one reply of an agent with four teams of units and one of the side."""
+    """Return the joint action of one reply of an agent with four teams of units and one of the side."""
 
     def play(reply: str, **changed: Any) -> JointAction:
         units = [

@@ -55,7 +55,7 @@ class Table:
         """Whether the camera stays where it is, as at the edge of a map."""
 
     def put(self, tag: int, kind: str, x: float, y: float, **traits: Any) -> int:
-        """One more unit."""
+        """Return one more unit."""
         self.places[tag], self.types[tag], self.traits[tag] = (x, y), kind, traits
         return tag
 
@@ -87,12 +87,12 @@ class Table:
                 return played
 
     def functions(self) -> list[tuple[str, list[Any]]]:
-        """Every PySC2 function that was called, with its arguments."""
+        """Return every PySC2 function that was called, with its arguments."""
         calls = [action for step in self.steps for action in step.actions if not isinstance(action, sc_pb.Action)]
         return [(pysc2.FUNCTIONS[call.function].name, [list(map(int, a)) for a in call.arguments]) for call in calls]
 
     def moves(self) -> list[tuple[float, float]]:
-        """Where the camera was sent."""
+        """Return where the camera was sent."""
         sent = [action for step in self.steps for action in step.actions if isinstance(action, sc_pb.Action)]
         centres = [action.action_raw.camera_move.center_world_space for action in sent]
         return [(centre.x, centre.y) for centre in centres]
@@ -125,7 +125,7 @@ class Table:
         return {tag for tag in mine if self.types.get(tag, "Stalker") == kind}
 
     def _click(self, how: int, px: int, py: int) -> None:
-        """Hits the unit that was put on the table last, of those under the pixel."""
+        """Hit the unit that was put on the table last, of those under the pixel."""
         x = (px + 0.5 - 64) * 24 / 128 + self.camera[0]
         y = self.camera[1] - (py + 0.5 - 64) * 24 / 128
         reach = {tag: self.traits.get(tag, {}).get("radius", 0.0) + 0.14 for tag in self.places}
@@ -151,7 +151,7 @@ def table(unit: Make, snapshot: Snap) -> Callable[..., Table]:
 
 @pytest.fixture
 def joint(task: Callable[..., TaskConfig]) -> Callable[..., JointAction]:
-    """The joint action of a reply to a table, of an agent with one team of Stalkers."""
+    """Return the joint action of a reply to a table, of an agent with one team of Stalkers."""
 
     def decide(table: Table, reply: str = REPLY, **team: Any) -> JointAction:
         config = task("3s_vs_3z")
@@ -421,7 +421,7 @@ def test_what_covers_a_target_is_seen_on_the_feature_layers(seen: str, clicked: 
 
 
 def _layers(unit_type: int, owner: int) -> Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]:
-    """Feature layers that show this type of unit everywhere."""
+    """Return feature layers that show this type of unit everywhere."""
     size = common_pb2.Size2DI(x=128, y=128)
 
     def change(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:

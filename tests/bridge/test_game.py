@@ -138,7 +138,7 @@ class StubEnv:
 
 
 def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[StepResult, ...]]:
-    """Plays plans of two players that return how many steps they took."""
+    """Play plans of two players that return how many steps they took."""
 
     def plan(steps: list[PlanStep]) -> Plan:
         for step in steps:
@@ -172,7 +172,7 @@ def test_plans_end_with_the_episode() -> None:
 
 
 def lay_out(directory: Path, *, script: str = "#!/bin/sh\nexit 3\n", maps: bool = True) -> Path:
-    """A directory that looks like an install, whose game is a script."""
+    """Return a directory that looks like an install, whose game is a script."""
     binary = directory / "Versions" / "Base75689" / "SC2_x64"
     binary.parent.mkdir(parents=True)
     binary.write_text(script)

@@ -27,7 +27,7 @@ STALKER, FOE = 0x100040001, 0x100180001
 
 @pytest.fixture
 def first_team(task: Task) -> Callable[..., TeamObservation]:
-    """The first team of the shipped task 3s_vs_3z, after one or more snapshots."""
+    """Return the first team of the shipped task 3s_vs_3z, after one or more snapshots."""
 
     def see(*snapshots: Snapshot, **changed: Any) -> TeamObservation:
         observer = Observer(task("3s_vs_3z", **changed))

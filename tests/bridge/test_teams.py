@@ -165,7 +165,7 @@ NUMBERS = {
 def followed(
     agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None
 ) -> list[dict[int, str]]:
-    """Agent and team of every unit at each moment; a moment says of what type the units are then."""
+    """Return agent and team of every unit at each moment; a moment says of what type the units are then."""
     roster = TeamRoster(agents)
     found: list[dict[int, str]] = []
     for moment in moments:

@@ -52,7 +52,7 @@ class Scene:
 
 @pytest.fixture
 def play(task: Callable[..., TaskConfig], unit: Make, snapshot: Callable[..., Snapshot]) -> Callable[..., JointAction]:
-    """The joint action of a reply in a scene."""
+    """Return the joint action of a reply in a scene."""
 
     def act(scene: Scene, *calls: str) -> JointAction:
         own = [unit(tag, scene.unit_type, 10 + i, 10, **scene.fields) for i, tag in enumerate((A, B, C)[: scene.count])]

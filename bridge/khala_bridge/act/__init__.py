@@ -1,9 +1,8 @@
-"""What the words of agents do: recognise → translate → execute.
+"""From the words of agents to commands: recognise → translate → execute.
 
-`recognise` reads calls by the catalogue; `translate` makes commands of them that know units and world points and no
-frame; `raw` and `screen` play the same commands in two ways, as plans of steps that `khala_bridge.game.game` carries
-out.
-`actor` is the way through all of it.
+`recognise` matches calls with the catalogue. `translate` turns them into commands, which name units and world points
+and no frame. `raw` and `screen` play the same commands in two ways, as plans of steps that `khala_bridge.game.game`
+carries out. `actor` runs all of it.
 """
 
 from khala_bridge.act.actor import Actor, JointAction, executor_of

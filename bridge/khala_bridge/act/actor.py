@@ -1,11 +1,11 @@
-"""From the replies of a side to one joint action: the inward half of a turn.
+"""From the replies of a side to one joint action: the second half of a turn.
 
-    joint = Actor(task).joint(sight, {"Zealots": parse(text), …})      what everybody wants, checked
+    joint = Actor(task).joint(sight, {"Zealots": parse(text), …})      what every agent wants, checked
     plan = executor.plan(joint.commands, sight.snapshot, loops)        played by khala_bridge.game.game
 
-All calls of a turn draw on the same minerals, vespene, supply and workers, in the order of the agents in the task and
-of their words; what the host does by itself comes last, with what nobody ordered. An actor keeps nothing between two
-turns. Whose reply counts and when it is too late is decided above.
+All calls of a turn share the same minerals, vespene, supply and workers, in the order of the agents in the task and
+of their words. The host's own orders come last, for units that no agent ordered. An actor keeps nothing between two
+turns. The layer above decides which replies count and when one is too late.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class JointAction:
-    """What a side does in one turn, and what became of each agent's words."""
+    """The commands of a side in one turn, and the result of each agent's calls."""
 
     commands: tuple[Command, ...] = ()
     """In the order of the agents in the task, and of their calls."""
@@ -45,19 +45,19 @@ class JointAction:
 
 
 class Actor:
-    """Makes one joint action of what the agents of a side said."""
+    """Makes one joint action from the replies of a side's agents."""
 
     def __init__(self, task: TaskConfig) -> None:
-        """Takes the task, which says what each agent may be told."""
+        """Take the task, which says which actions each agent has."""
         self._task = task
         self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
 
     def joint(self, sight: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
-        """The joint action of a turn.
+        """Return the joint action of a turn.
 
         Args:
-            sight: what the agents see at the moment at which their replies are to take effect.
-            replies: by agent; an agent without one goes on with what it does.
+            sight: what the agents see at the moment when their replies take effect.
+            replies: by agent; the units of an agent without a reply continue.
         """
         translator = Translator(sight, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
         commands: list[Command] = []
@@ -99,5 +99,5 @@ class Actor:
 
 
 def executor_of(task: TaskConfig) -> Executor:
-    """The executor that a task asks for."""
+    """Return the executor that a task asks for."""
     return RawExecutor() if task.executor == "raw" else ScreenExecutor()

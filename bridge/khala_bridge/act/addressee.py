@@ -1,4 +1,4 @@
-"""Whom a call speaks to: the words of a heading, or their absence → teams of the agent.
+"""The addressee of a call: the heading above it, or no heading → teams of the agent.
 
 | heading | means |
 |---|---|
@@ -6,11 +6,11 @@
 | a kind of units, if one team is called so: `Stalkers` for Stalker-1 | that team |
 | the name of the agent itself, if it has one team | that team |
 | several teams with commas or "and" between | each of them |
-| "all teams" in some language, "both teams" if there are two | each that may ever be told such an action |
-| none | the only team; or the one whose unit is named first; or the only one that may ever be told such an action |
+| "all teams" in some language, "both teams" if there are two | each that has such an action |
+| none | the only team; or the one whose unit is named first; or the only one that has such an action |
 | any, with an action for units of the whole side | the team of the side that has it |
 
-Words only, as in `khala_bridge.act.recognise` above it: whether the team can do it now is not asked.
+Words only, as in `khala_bridge.act.recognise` above it; whether the team can do it now is checked later.
 """
 
 from __future__ import annotations
@@ -41,24 +41,24 @@ _TEAM_WORD = re.compile(r"(?:the\s+)?teams?\s+", re.IGNORECASE)
 
 
 class Addressees:
-    """The teams of one agent, as the calls of a reply may speak to them."""
+    """The teams of one agent, as its calls may address them."""
 
     def __init__(self, agent: AgentObservation, words: Vocabulary) -> None:
-        """Takes what the agent sees now, which names its teams, and the names that it may say."""
+        """Take the agent's present observation, which names its teams, and the names that it may use."""
         self._agent = agent
         self._words = words
         self._by_name = {squashed(team.view.name): team for team in agent.teams}
 
     def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamObservation]:
-        """The teams that a call speaks to, at least one.
+        """Return the teams that a call addresses, at least one.
 
         Args:
-            heading: the team as written above the call; None if there was none.
-            action: what they are to do.
+            heading: the team as written above the call; None without a heading.
+            action: the action of the call.
             tags: the tags among its arguments.
 
         Raises:
-            CallRejected: no team is meant, or one that is not there, or more than one may be.
+            CallRejected: the call fits no team, names a missing one, or fits more than one.
         """
         if not self._agent.teams:
             raise CallRejected("unknown_team", "You have no units left, so no team can act.")
@@ -71,16 +71,16 @@ class Addressees:
         return named
 
     def listening(self, heading: str | None) -> Sequence[TeamObservation]:
-        """The team of a heading, or all of them."""
+        """Return the team of a heading, or all of them."""
         team = None if heading is None else self._one(heading)
         return self._agent.teams if team is None else [team]
 
     def _able(self, action: Action) -> list[TeamObservation]:
-        """The teams that may ever be told to do it."""
+        """Return the teams that have the action."""
         return [team for team in self._agent.teams if self._words.has(team, action)]
 
     def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamObservation:
-        """The team that is meant where none is named."""
+        """Return the team that a call without a heading means."""
         teams = self._agent.teams
         if len(teams) == 1:
             return teams[0]
@@ -92,7 +92,7 @@ class Addressees:
         raise CallRejected("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
 
     def _named(self, heading: str, action: Action) -> Sequence[TeamObservation]:
-        """The teams that a heading names."""
+        """Return the teams that a heading names."""
         plain = squashed(heading)
         if team := self._one(heading):
             return [team]
@@ -108,7 +108,7 @@ class Addressees:
         raise CallRejected("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
 
     def _one(self, name: str) -> TeamObservation | None:
-        """The one team that a name can mean."""
+        """Return the one team that a name can mean."""
         plain = squashed(name)
         if found := self._by_name.get(plain):
             return found

@@ -1,8 +1,8 @@
-"""Where to click on the real screen so as to hit a unit or a place, as one snapshot shows it.
+"""Where to click on the real screen to hit a unit or a place, by one snapshot.
 
-A click hits whatever is on top. So a unit is clicked where nothing else covers it, or where the feature layers show
-it in spite of that; a unit that is covered all over cannot be hit. Geometry and reading only: who is clicked, and
-what for, is the business of `khala_bridge.act.screen`.
+A click hits the topmost unit. So a unit is clicked where nothing else covers it, or where the feature layers show
+it all the same; a unit that is covered completely cannot be hit. Geometry and reading only: `khala_bridge.act.screen`
+decides which unit to click, and why.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ class RealScreen:
     """The screen and the minimap of a snapshot, with the camera where the game has it."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        """Reads the camera of the raw data and the sizes of the feature layers."""
+        """Read the camera of the raw data and the sizes of the feature layers."""
         sizes = snapshot.info.pictures
         self._snapshot = snapshot
         self._size, self._minimap_size = sizes.screen, sizes.minimap
         self.camera = snapshot.camera
 
     def pixel(self, place: WorldPoint) -> Pixel | None:
-        """The pixel of a place of the world; None if the screen does not show it."""
+        """Return the pixel of a world position; None if the screen does not show it."""
         px = math.floor((place.x - self.camera.x) / self._scale + self._size[0] / 2)
         py = math.floor((self.camera.y - place.y) / self._scale + self._size[1] / 2)
         return (px, py) if self._holds(px, py) else None
 
     def minimap(self, place: WorldPoint) -> Pixel:
-        """The pixel of the minimap for a place of the world."""
+        """Return the minimap pixel of a world position."""
         width, height = self._minimap_size
         x, y = self._snapshot.info.frame(Frames(minimap=float(width))).minimap(place.x, place.y)
         return min(max(math.floor(x), 0), width - 1), min(max(math.floor(y), 0), height - 1)
 
     def hit(self, unit: Unit) -> Pixel | None:
-        """A pixel at which a click hits this very unit; None if it is off the screen or covered all over.
+        """Return a pixel where a click hits this unit; None if it is off the screen or covered completely.
 
-        The middle if that is free, else the nearest pixel of its disc that no other unit covers, else the nearest
-        at which the feature layers show its type and owner on top.
+        That is its middle if free, else the nearest pixel of its disc that no other unit covers, else the nearest
+        one where the feature layers show its type and owner on top.
         """
         pixels = [pixel for pixel in self._disc(unit) if self._holds(*pixel)]
         others = self._beside(unit)
@@ -62,9 +62,9 @@ class RealScreen:
         return next(free, None) or next((pixel for pixel in pixels if self._shows(unit, pixel)), None)
 
     def bare(self, place: WorldPoint) -> Pixel | None:
-        """The pixel of the bare ground that is nearest to a place, if there is one within `BARE_WITHIN`.
+        """Return the nearest pixel of bare ground, if there is one within `BARE_WITHIN` of a place.
 
-        Otherwise the pixel of the place itself; None if the screen does not show it.
+        Otherwise return the pixel of the place itself; None if the screen does not show it.
         """
         middle = self.pixel(place)
         if middle is None:
@@ -85,7 +85,7 @@ class RealScreen:
         return 0 <= px < self._size[0] and 0 <= py < self._size[1]
 
     def _world(self, pixel: Pixel) -> WorldPoint:
-        """The middle of a pixel."""
+        """Return the middle of a pixel."""
         px, py = pixel
         return WorldPoint(
             self.camera.x + (px + 0.5 - self._size[0] / 2) * self._scale,
@@ -93,7 +93,7 @@ class RealScreen:
         )
 
     def _disc(self, unit: Unit) -> Iterator[Pixel]:
-        """The pixels of a unit from its middle outwards; at least the one of its middle."""
+        """Yield the pixels of a unit from its middle outwards; at least the one of its middle."""
         px = math.floor((unit.pos.x - self.camera.x) / self._scale + self._size[0] / 2)
         py = math.floor((self.camera.y - unit.pos.y) / self._scale + self._size[1] / 2)
         reach = int(unit.radius / self._scale)
@@ -102,7 +102,7 @@ class RealScreen:
                 yield px + dx, py + dy
 
     def _beside(self, unit: Unit) -> list[Unit]:
-        """The other units that touch it, seen from above."""
+        """Return the other units that touch it, seen from above."""
         return [
             other
             for other in self._snapshot.units.values()
@@ -110,12 +110,12 @@ class RealScreen:
         ]
 
     def _covers(self, unit: Unit, pixel: Pixel, slack: float = 0.5) -> bool:
-        """Whether a unit lies under a pixel; `slack` in pixels."""
+        """Return True if a unit covers a pixel; `slack` in pixels."""
         place = self._world(pixel)
         return math.dist(place, unit.pos) <= unit.radius + slack * self._scale
 
     def _shows(self, unit: Unit, pixel: Pixel) -> bool:
-        """Whether the feature layers have a unit of its type and owner on top; True if there are no layers."""
+        """Return True if the feature layers show its type and owner on top, or if there are no layers."""
         layers = self._snapshot.pictures
         seen_type, seen_owner = layers.layer_pixel("unit_type", *pixel), layers.layer_pixel("player_relative", *pixel)
         return seen_type in {None, unit.unit_type} and seen_owner in {None, unit.alliance}
@@ -123,6 +123,6 @@ class RealScreen:
 
 @functools.cache
 def _around(reach: int) -> tuple[Pixel, ...]:
-    """Offsets in a square around a pixel, the nearest first."""
+    """Return offsets in a square around a pixel, the nearest first."""
     square = ((dx, dy) for dx in range(-reach, reach + 1) for dy in range(-reach, reach + 1))
     return tuple(sorted(square, key=lambda offset: (offset[0] ** 2 + offset[1] ** 2, offset)))

@@ -1,7 +1,7 @@
-"""What a target has to be, and may not be, for an action: the game's target filters, in words.
+"""What the target of an action must be and must not be: the game's target filters, in words.
 
-The words of the filters are those of `khala_bridge.knowledge` (`AbilityFacts.must`, `must_not`); those that say nothing
-of a unit that is in sight (`missile`, `item`, …) or that the API does not show (`stasis`) are left to the game.
+The words of the filters are those of `khala_bridge.knowledge` (`AbilityFacts.must`, `must_not`). The game alone judges
+those that do not apply to units in sight (`missile`, `item`, …) or that the API does not show (`stasis`).
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _BARRED = {
 
 
 def unfit(action: Action, unit: Unit) -> str | None:
-    """What the target of an action has to be and this unit is not: `an enemy unit`; None if it will do."""
+    """Return what the target of an action must be and this unit is not: `an enemy unit`; None if the unit fits."""
     enemy = unit.alliance == Alliance.ENEMY
     if action.target == "enemy" and not enemy:
         return "an enemy unit"
@@ -77,13 +77,13 @@ def unfit(action: Action, unit: Unit) -> str | None:
 
 
 def needs_sight(action: Action) -> bool:
-    """Whether the place that an action is aimed at has to be in sight."""
+    """Return True if the place that an action is aimed at must be in sight."""
     facts = _facts(action.function)
     return facts is not None and facts.target != "unit" and "visible" in facts.must
 
 
 def _is(word: str, unit: Unit, known: UnitFacts | None) -> bool | None:
-    """Whether a word of the filters holds for a unit; None if nothing is known of its type."""
+    """Return whether a word of the filters applies to a unit; None if its type is unknown."""
     if word in _STATES:
         return _STATES[word](unit)
     if known is None:

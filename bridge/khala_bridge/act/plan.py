@@ -1,8 +1,8 @@
-"""What an executor makes of commands: a plan, played step by step by `khala_bridge.game.game`.
+"""Plans: an executor turns commands into one, and `khala_bridge.game.game` plays it step by step.
 
-A plan is a generator and touches no game: it yields what has to enter one `SC2Env.step`, is sent the snapshot that
-this step led to, and returns what it played. So both executors can be tested without a game, and the game needs to
-know nothing of executors. A plan ends when it is sent a snapshot of an episode that is over.
+A plan is a generator and touches no game: it yields the input of one `SC2Env.step`, receives the snapshot after that
+step, and returns what it played. So both executors can be tested without a game, and the game does not know executors.
+A plan ends when it receives a snapshot of an episode that is over.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ GameAction: TypeAlias = Any
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
-    """What enters one `SC2Env.step`."""
+    """The input of one `SC2Env.step`."""
 
     actions: tuple[GameAction, ...]
     loops: int
-    """Game loops that pass with it, at least 1."""
+    """Game loops that pass during the step, at least 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class GameRefusal:
-    """A command that did not do what was asked, found out while it was played."""
+    """A command that failed while it was played."""
 
     agent: str
     rejection: Rejection
@@ -44,7 +44,7 @@ class GameRefusal:
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """What came of a plan."""
+    """The result of a plan."""
 
     functions: tuple[str, ...] = ()
     """What entered the game, in PySC2's words."""
@@ -58,14 +58,14 @@ class Executor(Protocol):
     """Plays commands in one of two ways."""
 
     def begin(self) -> None:
-        """Forgets the episode before."""
+        """Forget the episode before."""
 
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:
-        """A plan that carries the commands out and lets `loops` game loops pass, or more if it needs them."""
+        """Return a plan that carries the commands out in `loops` game loops, or more if it needs them."""
 
 
 def refuse(command: Command, why: str) -> GameRefusal | None:
-    """The game said no to a command; `why` is the end of a sentence. None if it was the host's own command."""
+    """Return the refusal of a command by the game; None for the host's own command. `why` ends a sentence."""
     said = command.said
     if said is None:
         return None
@@ -76,7 +76,7 @@ def refuse(command: Command, why: str) -> GameRefusal | None:
 
 
 def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameRefusal, ...]:
-    """The refusals among the errors that the game reported; one for each command at most."""
+    """Return the refusals among the errors that the game reported; one for each command at most."""
     found: dict[int, GameRefusal | None] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
@@ -91,15 +91,15 @@ def _order(command: Command) -> str:
 
 
 def words(result: str) -> str:
-    """A result of the game's action errors in words, `CantTargetAirUnits` → `cant target air units`."""
+    """Return the name of an action error of the game in words, `CantTargetAirUnits` → `cant target air units`."""
     return "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in result).strip()
 
 
 def written(name: str, *arguments: object) -> str:
-    """A function as reports show it, `Attack_unit(now, [0x1, 0x2], 0x3)`."""
+    """Return a function as reports show it, `Attack_unit(now, [0x1, 0x2], 0x3)`."""
     return f"{name}({', '.join(map(str, arguments))})"
 
 
 def listed(tags: Iterable[int]) -> str:
-    """Tags as reports show them."""
+    """Return tags as reports show them."""
     return f"[{', '.join(map(hex, tags))}]"

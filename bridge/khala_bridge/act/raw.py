@@ -1,7 +1,7 @@
 """The raw executor: every command is one raw unit command, and all of them enter the game in one step.
 
-No camera, no selection, no screen: units and targets are named by their tags and by points of the world, so a joint
-action costs one `SC2Env.step` however many teams and agents had a part in it.
+No camera, no selection, no screen: tags and world points name units and targets, so a joint action costs one
+`SC2Env.step` for any number of teams and agents.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ class RawExecutor:
     """Plays commands through the raw interface; keeps no state."""
 
     def begin(self) -> None:
-        """Nothing is remembered."""
+        """Do nothing: there is no state."""
 
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:  # noqa: ARG002  # the other executor looks at it
-        """One step with all commands, and `loops` game loops."""
+        """Return a plan of one step with all commands, `loops` game loops long."""
         after = yield PlanStep(tuple(_action(command) for command in commands), loops)
         return Played(tuple(_words(command) for command in commands), refused_by_game(commands, after))
 
 
 def _action(command: Command) -> GameAction:
-    """What a command is in the words of the SC2 API."""
+    """Return a command as an action of the SC2 API."""
     ability_id = command.function.ability_id
     if command.function.kind == "autocast":
         return autocast_switch(ability_id, command.units)
@@ -40,7 +40,7 @@ def _action(command: Command) -> GameAction:
 
 
 def _words(command: Command) -> str:
-    """As PySC2's raw functions are written, `Attack_unit(now, [0x1], 0x2)`."""
+    """Return a command as a raw function of PySC2, `Attack_unit(now, [0x1], 0x2)`."""
     stem, units = command.function.stem, listed(command.units)
     if command.function.kind == "autocast":
         return written(f"{stem}_autocast", units)

@@ -1,7 +1,7 @@
-"""Calls as written → actions of the catalogue, or rejections that say what would be right.
+"""Calls as written → actions of the catalogue, or rejections that name the right form.
 
-Only words are judged here: is there such an action, has it these arguments, is there such a team. What is
-possible in the game now is judged in `khala_bridge.act.translate`. Repaired is what can mean one thing only:
+Only words are judged here: whether the action exists, takes these arguments, and whether the team exists.
+`khala_bridge.act.translate` judges what is possible in the game now. A call that can mean only one thing is repaired:
 
 | written | taken as |
 |---|---|
@@ -11,7 +11,7 @@ possible in the game now is judged in `khala_bridge.act.translate`. Repaired is 
 | a point before the tags | the tags, then the point |
 | `None` for no argument | no argument |
 
-Everything else is said, with what is nearest to it.
+Everything else is rejected, with the nearest valid names.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["CallRejected", "Recognised", "recognise", "reject"]
 
 EXAMPLES: dict[ArgKind, str] = {"tag": "0x100140001", "screen": "[12, 9.5]", "minimap": "[30, 41]"}
-_SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, no tags
+_SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, not tags
 _LONGEST_TAG = 20  # digits of 2^64
 _NOTHING = frozenset({"none", "null", "nil", "n/a", "-"})
 
@@ -45,9 +45,9 @@ class Recognised:
     action: Action
     team: TeamObservation
     tags: tuple[int, ...]
-    """Tags among its arguments, in their order."""
+    """Tags among its arguments, in order."""
     point: Point | None
-    """The point among its arguments, in the frame that the action says."""
+    """The point among its arguments, in the action's frame."""
 
     @property
     def text(self) -> str:
@@ -56,18 +56,18 @@ class Recognised:
 
     @property
     def written(self) -> str:
-        """The call alone, as the catalogue would have it written: `<Attack_Unit(0x1)>`."""
+        """The call alone, in the catalogue's spelling: `<Attack_Unit(0x1)>`."""
         tags = tuple(map(hex, self.tags))
         return written(self.action.name, tags if self.point is None else (*tags, self.point))
 
 
 def recognise(call: Call, words: Vocabulary, addressees: Addressees) -> list[Recognised] | Rejection:
-    """What a call means: one action, or one for each team if it speaks to several.
+    """Return what a call means: one action, or one for each team that it addresses.
 
     Args:
         call: as read in the reply.
-        words: the names that the agent may say.
-        addressees: the teams that it may speak to.
+        words: the names that the agent may use.
+        addressees: the teams that it may address.
     """
     try:
         action = _action(call, words, addressees)
@@ -98,7 +98,7 @@ def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | Non
 
 
 def _typed(argument: str | Point) -> int | Point | str:
-    """A tag as a number, a point as it is, anything else as text."""
+    """Return a tag as a number, a point as it is, anything else as text."""
     if not isinstance(argument, str):
         return argument
     if argument.startswith("0x"):

@@ -1,4 +1,4 @@
-"""How a call leaves the checks when it cannot be carried out: with a reason, and a sentence that a model can act on.
+"""Rejected calls: a reason, and a sentence that a model can act on.
 
 The lowest module of `khala_bridge.act`.
 """
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class CallRejected(Exception):
-    """Leaves the checks of a call with the reason of its rejection."""
+    """Raised by the checks of a call, with the reason of its rejection."""
 
     def __init__(self, reason: RejectionReason, message: str) -> None:
         self.reason, self.message = reason, message
@@ -23,7 +23,7 @@ class CallRejected(Exception):
 
 
 def reject(call: Call, refused: CallRejected, team: str | None = None) -> Rejection:
-    """A rejection of a call, with its place in the reply."""
+    """Return a rejection of a call, with its place in the reply."""
     return Rejection(
         reason=refused.reason, message=refused.message, text=render(call), start=call.start, team=team or call.team
     )

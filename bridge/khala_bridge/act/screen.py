@@ -1,20 +1,19 @@
 """The screen executor: camera, selection and functions of the screen, one in a game loop, as the paper plays.
 
-For each team that has commands: move the camera to its head, select who is meant, call the function. It costs a game
-loop and an `SC2Env.step` for each of these; what a picture of the real screen shows, and what can be compared with
-the paper's runs, is bought with that. Positions are taken from the snapshot of the moment, since units move on
-while others are being told. Who is selected is read back from the game; what the hand did not get right is clicked
-again, and a command whose units cannot be selected is refused, never given to others.
+For each team with commands: move the camera to its head, select the units, call the function. Each of these costs a
+game loop and an `SC2Env.step`; in return there are pictures of the real screen, and runs that compare with the paper's.
+Positions come from the newest snapshot, since units move on while others get their orders. The selection is read back
+from the game: a wrong click is repeated. A command whose units cannot be selected is refused, never given to others.
 
-| who is meant | how they are selected |
+| units of the command | how they are selected |
 |---|---|
 | a whole team of kind `group` with a control group | recall; the group is set when its units are not in it yet |
 | WarpGates that warp in | `select_warp_gates`: the game takes one that is ready |
 | Larvae that hatch | a click on their hatchery, `select_larva`: the game takes one of them |
 | the only idle worker; the whole army | `select_idle_worker`; `select_army` |
-| anybody else | `select_point`: all of a type on the screen at once if all of them are meant, else one by one |
+| any others | `select_point`: all of a type on the screen at once if all of them are meant, else one by one |
 
-The camera goes to a target that is not on the screen, and back to the team if the team's screen shows it.
+The camera moves to a target that is not on the screen, or back to the team if the team's screen shows the target.
 """
 
 from __future__ import annotations
@@ -41,21 +40,21 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot, Unit
 
 SAME_PLACE = 0.25
-"""World units within which the camera is where it should be; it snaps to a grid in the game."""
+"""World units by which the camera may be off; it snaps to a grid in the game."""
 
 
 class ScreenExecutor:
-    """Plays commands through camera, selection and screen; remembers who is in which control group."""
+    """Plays commands through camera, selection and screen; remembers the units of each control group."""
 
     def __init__(self) -> None:
         self._groups: dict[int, frozenset[int]] = {}
 
     def begin(self) -> None:
-        """Control groups are empty in a new game."""
+        """Forget the control groups, which are empty in a new game."""
         self._groups = {}
 
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:
-        """One step for each move of the camera, selection and function, then what is left of `loops`."""
+        """Return a plan: one step for each camera move, selection and function, then the rest of `loops`."""
         tour = _Tour(snapshot, self._groups)
         places = {_team(command): place for place, command in reversed(list(enumerate(commands)))}
         in_order = sorted(commands, key=lambda command: (command.said is None, places[_team(command)]))
@@ -68,7 +67,7 @@ class ScreenExecutor:
 
 
 def _team(command: Command) -> tuple[str, str]:
-    """Whose command it is; the host's own are a group of their own, and come last."""
+    """Return the team of a command; the host's own commands form a group of their own, which comes last."""
     if command.said is None:
         return "", ""
     team = command.said.team.team
@@ -76,11 +75,11 @@ def _team(command: Command) -> tuple[str, str]:
 
 
 class _EpisodeOver(Exception):
-    """Ends a tour where the game ended."""
+    """Raised to end a tour when the game has ended."""
 
 
 class _Tour:
-    """One round of the teams: where the game is now, and what was played so far."""
+    """One round of the teams: the present snapshot, and what was played so far."""
 
     def __init__(self, snapshot: Snapshot, groups: dict[int, frozenset[int]]) -> None:
         self.now = snapshot
@@ -91,14 +90,14 @@ class _Tour:
         self._wanted: WorldPoint | None = None
 
     def step(self, action: GameAction | None, loops: int = 1) -> Generator[PlanStep, Snapshot, None]:
-        """Lets something enter the game, and loops pass."""
+        """Play one step with these actions."""
         self.now = yield PlanStep(() if action is None else (action,), loops)
         self.loops += loops
         if self.now.ended:
             raise _EpisodeOver
 
     def look_at(self, place: WorldPoint) -> Generator[PlanStep, Snapshot, None]:
-        """Moves the camera, unless it is there or was sent there last."""
+        """Move the camera, unless it is there already or was last sent there."""
         if self._wanted is not None and math.dist(place, self._wanted) < SAME_PLACE:
             return
         self._wanted = place
@@ -106,13 +105,13 @@ class _Tour:
         yield from self.step(camera_move(place))
 
     def function(self, name: str, *arguments: object) -> Generator[PlanStep, Snapshot, None]:
-        """Calls a function of PySC2."""
+        """Call a function of PySC2."""
         shown = [list(value) if isinstance(value, tuple) else value for value in arguments]
         self.functions.append(written(name, *shown))
         yield from self.step(pysc2.FUNCTIONS[name](*arguments))
 
     def visit(self, commands: Sequence[Command]) -> Generator[PlanStep, Snapshot, None]:
-        """Carries out the commands of one team."""
+        """Carry out the commands of one team."""
         home = _home(commands[0])
         if home is not None:
             yield from self.look_at(home)
@@ -145,20 +144,20 @@ class _Tour:
     # --- the target -------------------------------------------------------------------------------------------
 
     def _place(self, command: Command) -> WorldPoint:
-        """Where the target is now."""
+        """Return where the target is now."""
         assert command.target is not None  # the catalogue gives functions with a target to actions with a target
         if not isinstance(command.target, int):
             return command.target
         return self._unit(command.target).pos
 
     def _unit(self, tag: int) -> Unit:
-        """A target that is a unit, even one that is only remembered, as a geyser under the fog of war."""
+        """Return a target that is a unit, even one that is only remembered, as a geyser under the fog of war."""
         if unit := self.now.known.get(tag):
             return unit
         raise Missed("the target is gone")
 
     def _pixel(self, command: Command) -> Generator[PlanStep, Snapshot, Pixel]:
-        """Where to click for the target, with the camera moved if that is needed."""
+        """Return where to click for the target, with the camera moved if that is needed."""
         for place in (None, _home(command), self._place(command)):
             if place is not None:
                 yield from self.look_at(place)
@@ -171,7 +170,7 @@ class _Tour:
         if isinstance(command.target, int):
             pixel = screen.hit(self._unit(command.target))
         elif "unit" in raw_forms(command.function.ability_id):
-            pixel = screen.bare(place)  # a click on somebody would mean him and not the place
+            pixel = screen.bare(place)  # a click on a unit would mean the unit and not the place
         else:
             pixel = screen.pixel(place)
         if pixel is None:
@@ -180,7 +179,7 @@ class _Tour:
 
 
 def _home(command: Command) -> WorldPoint | None:
-    """Where a team's camera is; None for one without a screen of its own."""
+    """Return where a team's camera is; None for one without a screen of its own."""
     if command.said is None or command.said.team.camera is None:
         return None
     return WorldPoint(command.said.team.camera.x, command.said.team.camera.y)

@@ -1,7 +1,7 @@
-"""The hand that selects units on the screen: the shortest way that fits, checked against what the game says.
+"""The hand that selects units on the screen: by the shortest way that fits, checked against the game's selection.
 
-Above it is the tour of `khala_bridge.act.screen`, which lends it the camera and the functions; below it
-`khala_bridge.act.aim` says where to click. It selects own units only, and gives no orders.
+Above it is the tour of `khala_bridge.act.screen`, which provides the camera and the functions; below it is
+`khala_bridge.act.aim`, which says where to click. The hand selects own units only, and gives no orders.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     Way: TypeAlias = Generator[PlanStep, Snapshot, None]
 
 TRIES = 2
-"""Clicks on one unit before it is given up."""
+"""Clicks on one unit before the hand gives up."""
 LARGE = 6
-"""Units from which on it is worth a try whether they are the whole army."""
+"""Number of units from which `select_army` is worth a try."""
 HATCHERIES = frozenset({"Hatchery", "Lair", "Hive"})
 
 
@@ -34,27 +34,27 @@ class Missed(Exception):
 
 
 class Tour(Protocol):
-    """What the hand needs: the game as it is now, the camera and the functions of PySC2."""
+    """What the hand needs: the present snapshot, the camera and the functions of PySC2."""
 
     now: Snapshot
 
     def look_at(self, place: WorldPoint) -> Way:
-        """Moves the camera."""
+        """Move the camera."""
 
     def function(self, name: str, *arguments: object) -> Way:
-        """Calls a function."""
+        """Call a function."""
 
 
 class Hand:
     """Selects the units of commands, in one episode."""
 
     def __init__(self, tour: Tour, groups: dict[int, frozenset[int]]) -> None:
-        """Takes who is in which control group; what the hand sets is noted there."""
+        """Take the units of each control group; the hand notes there what it sets."""
         self._tour = tour
         self._groups = groups
 
     def select(self, command: Command) -> Way:
-        """Sees to it that the living units of a command are selected, and nobody else.
+        """Select the living units of a command, and no others.
 
         Raises:
             Missed: they are gone, or cannot be selected, or not without others.
@@ -78,7 +78,7 @@ class Hand:
             yield from self._tour.function("select_control_group", "set", group)
             self._groups[group] = selected
 
-    # --- what is so -------------------------------------------------------------------------------------------
+    # --- the state -------------------------------------------------------------------------------------------
 
     @property
     def _selected(self) -> frozenset[int]:
@@ -88,7 +88,7 @@ class Hand:
         return frozenset(tag for tag in command.units if tag in self._tour.now.units)
 
     def _group(self, command: Command) -> int | None:
-        """The control group of the team, if the whole of it is meant."""
+        """Return the control group of the team, if the command is for the whole team."""
         if command.said is None:
             return None
         team = command.said.team.team
@@ -106,7 +106,7 @@ class Hand:
         return wanted == selected
 
     def _one_will_do(self, command: Command) -> bool:
-        """Whether one unit of those that are selected carries it out, whoever else of its type is selected."""
+        """Return True if one selected unit is enough, so that others of its type may be selected too."""
         if command.function.stem.startswith("TrainWarp_"):
             return self._types(command) == {"WarpGate"}
         return command.function.stem.startswith("Train_") and self._types(command) == {"Larva"}
@@ -114,7 +114,7 @@ class Hand:
     # --- short ways -------------------------------------------------------------------------------------------
 
     def _short_ways(self, command: Command) -> Iterator[Way]:
-        """Ways that take one or two functions, where they may lead to the right selection."""
+        """Yield the ways of one or two functions that may lead to the right selection."""
         tour, wanted = self._tour, self._alive(command)
         player = tour.now.player
         group = self._group(command)
@@ -132,7 +132,7 @@ class Hand:
             yield tour.function("select_army", "select")
 
     def _larvae(self, command: Command) -> Way:
-        """The hatchery at which a Larva lies, and then its Larvae."""
+        """Select the hatchery of a Larva, and then its Larvae."""
         larva = self._tour.now.units[min(self._alive(command))]
         homes = [u for u in self._tour.now.own if u.name in HATCHERIES]
         if not homes:
@@ -144,7 +144,7 @@ class Hand:
     # --- clicks -----------------------------------------------------------------------------------------------
 
     def _click_all(self, command: Command) -> Way:
-        """Clicks whoever is not selected yet, and away whoever should not be; those on the screen first."""
+        """Click the units that the selection lacks, and those that must leave it; those on the screen first."""
         tries: Counter[int] = Counter()
         fresh = bool(self._selected - self._alive(command))
         while True:
@@ -165,12 +165,12 @@ class Hand:
             fresh = False
 
     def _of_a_kind(self, tag: int, screen: RealScreen) -> frozenset[int]:
-        """The own units of the same type that are on the screen."""
+        """Return the own units of the same type that are on the screen."""
         kind = self._tour.now.units[tag].unit_type
         return frozenset(u.tag for u in self._tour.now.own if u.unit_type == kind and screen.pixel(u.pos))
 
     def _click(self, tag: int, how: str) -> Way:
-        """A click on a unit, with the camera moved to it if it is not on the screen; none if it is covered."""
+        """Click a unit, and move the camera to it first if it is not on the screen; do nothing if it is covered."""
         unit = self._tour.now.units.get(tag)
         if unit is not None and RealScreen(self._tour.now).pixel(unit.pos) is None:
             yield from self._tour.look_at(unit.pos)

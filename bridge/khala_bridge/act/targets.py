@@ -1,9 +1,8 @@
-"""At what an order is aimed: tags and points of a call → units and places of the world, or what is wrong with them.
+"""The targets of orders: tags and points of a call → units and world points, or what is wrong with them.
 
-A team aims at what stands on its screen and at its own units wherever they are; a rule of `khala_bridge.auto` may be
-told of anything that the side knows, such as a mineral field in the fog. Near misses of a tag are named, never taken:
-the wrong target may be the worst one. Knows no ability of the units that are to do it, except what their targets may
-be.
+A team aims at units on its screen and at its own units anywhere. A rule of `khala_bridge.auto` takes anything that the
+side knows, such as a mineral field in the fog. A rejection names near misses of a tag, but none is taken: the wrong
+target may be the worst one. This module knows nothing of the acting units' abilities, except what their targets may be.
 """
 
 from __future__ import annotations
@@ -35,23 +34,23 @@ _WHOSE = {
     Alliance.NEUTRAL: "nobody's",
 }
 MOST_SLIPS = 2
-"""Wrong digits up to which a tag may be a slip of another one."""
+"""Wrong digits up to which a tag counts as a slip of another one."""
 SHORTEST = 6
-"""Characters that a tag which was cut needs to be known by: `0x1008`."""
+"""Characters by which a cut tag is still known: `0x1008`."""
 
 
 class Targets:
-    """What can be aimed at, at the moment of a sight."""
+    """The possible targets at the moment of an observation."""
 
     def __init__(self, sight: SideObservation) -> None:
         self._sight = sight
         self._units = sight.snapshot.units
 
     def named(self, said: Recognised) -> tuple[int, ...]:
-        """The units that the first arguments name.
+        """Return the units that the first arguments name.
 
         Raises:
-            CallRejected: one of them is no unit of the team, or named twice.
+            CallRejected: one of them is not a unit of the team, or is named twice.
         """
         tags = said.tags[: said.action.named]
         for tag in tags:
@@ -63,10 +62,10 @@ class Targets:
         return tags
 
     def unit(self, said: Recognised) -> Unit:
-        """The unit that the last tag names.
+        """Return the unit that the last tag names.
 
         Raises:
-            CallRejected: there is none, it is dead or out of sight, or the action cannot be used on it.
+            CallRejected: the unit does not exist, is dead or out of sight, or does not fit the action.
         """
         tag, anywhere = said.tags[-1], said.action.rule is not None or said.team.camera is None
         unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
@@ -80,10 +79,11 @@ class Targets:
         return unit
 
     def place(self, said: Recognised) -> WorldPoint:
-        """The point among the arguments, in the world.
+        """Return the point among the arguments, in the world.
 
         Raises:
-            CallRejected: it lies outside of its frame, beyond the edge of the map, or where it would have to be seen.
+            CallRejected: it is outside of its frame, beyond the edge of the map, or out of sight for an action that
+                needs sight.
         """
         point = self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
         if needs_sight(said.action) and not self._is_seen(point):
@@ -94,7 +94,7 @@ class Targets:
         return point
 
     def instead(self, said: Recognised, place: WorldPoint) -> str:
-        """A place that would do, as the end of a sentence: on the team's screen if it is there, else on the minimap."""
+        """Return a valid place as the end of a sentence: on the team's screen if it is there, else on the minimap."""
         camera = said.team.camera
         if camera is not None:
             x, y = camera.screen(place.x, place.y)
@@ -104,7 +104,7 @@ class Targets:
         return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
 
     def _is_seen(self, point: WorldPoint) -> bool:
-        """Whether the player sees a place now; not doubted where the game showed no map."""
+        """Return True if the player sees a place now, or if the game sent no map."""
         if not self._sight.snapshot.visibility.data:
             return True
         cells = land_of(self._sight.snapshot).sight  # (w, h)
@@ -155,7 +155,7 @@ class Targets:
 
     @functools.cached_property
     def _remembered(self) -> dict[int, Unit]:
-        """What is there under the fog as far as the side knows: resources and structures that it saw once."""
+        """What the side remembers under the fog: resources and structures that it saw once."""
         return self._sight.snapshot.known
 
     def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
@@ -193,7 +193,7 @@ class Targets:
         return next((team.view.name for team in teams if tag in team.team.tags), None)
 
     def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
-        """The tag that was most likely meant, as the end of a sentence; None if none is like it."""
+        """Return the tag that was most likely meant, as the end of a sentence; None if no tag is similar."""
         wanted = hex(tag)
         slips = ((_slips(wanted, hex(known)), known) for known in tags)
         _slip, meant = min(((slip, known) for slip, known in slips if slip is not None), default=(0, None))
@@ -209,9 +209,9 @@ class Targets:
 
 
 def _slips(wanted: str, known: str) -> int | None:
-    """Slips between a tag as written and one that is there, if they are few: 0 for a tag that was only cut.
+    """Return the number of slips between a written tag and an existing one, if they are few: 0 for a tag that was cut.
 
-    One digit too many or too few is one slip, up to two may be others. Two tags of units differ in two or three.
+    One digit too many or too few is one slip, up to two may be wrong. Two tags of units differ in two or three.
     """
     if known.startswith(wanted) and len(wanted) >= SHORTEST:
         return 0
@@ -224,7 +224,7 @@ def _slips(wanted: str, known: str) -> int | None:
 
 
 def _shows(camera: Camera | None, unit: Unit) -> bool:
-    """Whether a unit stands on a camera's screen."""
+    """Return True if a camera's screen shows a unit."""
     if camera is None:
         return False
     right, down, half = unit.pos.x - camera.x, camera.y - unit.pos.y, CAMERA_WIDTH / 2

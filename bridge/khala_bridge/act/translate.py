@@ -1,16 +1,16 @@
-"""Recognised actions → commands to the game, checked against the state that they meet.
+"""Recognised actions → commands to the game, checked against the present state.
 
-A command knows units, a function, a unit or a point of the world as its target, and whether it waits behind earlier
-orders. It knows no frame: the two executors play the same commands.
+A command holds units, a function, a unit or a world point as its target, and whether it waits behind earlier orders.
+It has no frame: the two executors play the same commands.
 
-    who       units of the team, those that are named, or whoever a rule of `khala_bridge.auto` finds
-    may they  `khala_bridge.rules`; only the units that can do it are told to
-    at what   `khala_bridge.act.targets`
+    units     those of the team, those that are named, or those that a rule of `khala_bridge.auto` finds
+    possible  `khala_bridge.rules`; only the units that can do it get the order
+    target    `khala_bridge.act.targets`
 
-Order of the commands of one turn, unit by unit: the first one replaces what the unit did, a later one waits for it
-if the action queues (the catalogue says), and replaces it if not. In the paper it is the first queueing function of a
-*team* that replaces, which makes an order to a second unit wait behind that unit's old order, and lets an attack
-cancel a skill of the same reply, since here all commands of a turn reach the game in one loop.
+Order of the commands of one turn, unit by unit: the first one replaces what the unit did. A later one waits for it
+if the action queues (the catalogue says), and replaces it if not. In the paper the first queueing function of a *team*
+replaces. Then an order to a second unit would wait behind that unit's old order, and an attack would cancel a skill of
+the same reply, since here all commands of a turn reach the game in one loop.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
-"""Kinds of abilities that one unit of a team is enough for."""
+"""Kinds of abilities for which one unit of a team is enough."""
 FREE = Cost(0.0, 0.0, 0.0)
 
 
@@ -48,7 +48,7 @@ class Command:
     """One order to some units."""
 
     said: Recognised | None
-    """The call that it carries out; None for an order that the host gives by itself."""
+    """The call that it carries out; None for the host's own order."""
     function: Function
     """PySC2's function for it, which names the ability."""
     units: tuple[int, ...]
@@ -58,10 +58,10 @@ class Command:
 
 
 class Translator:
-    """Translates the calls of one turn, one after the other, those of all agents of a side."""
+    """Translates the calls of one turn, of all agents of a side, one after the other."""
 
     def __init__(self, sight: SideObservation, max_actions: Mapping[str, int]) -> None:
-        """Takes what the agents see now, and by agent how many actions one team may have in a turn."""
+        """Take the present observation, and by agent the number of actions that one team may have in a turn."""
         self._sight = sight
         self._snapshot = sight.snapshot
         self._max_actions = max_actions
@@ -73,7 +73,7 @@ class Translator:
         self._count: dict[tuple[str, str], int] = {}
 
     def translate(self, said: Recognised) -> list[Command] | Rejection:
-        """Commands for a call: none for an action that orders nothing, two if only some of its units have to wait."""
+        """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait."""
         try:
             orders = self._orders(said)
         except CallRejected as refused:
@@ -81,7 +81,7 @@ class Translator:
         return [command for order in orders for command in self.commands(order, said)]
 
     def commands(self, order: RuleOrder, said: Recognised | None = None) -> list[Command]:
-        """An order in its place behind those that its units were given before in this turn."""
+        """Return the commands of an order, behind the earlier orders of its units in this turn."""
         queues = said is not None and said.action.queue
         first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
         later = tuple(tag for tag in order.units if queues and tag in self.ordered)
@@ -90,10 +90,10 @@ class Translator:
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
 
     def _orders(self, said: Recognised) -> list[RuleOrder]:
-        """What a call orders; it is counted if it can be carried out.
+        """Return the orders of a call, and count the call if it can be carried out.
 
         Raises:
-            CallRejected: it cannot.
+            CallRejected: it cannot be carried out.
         """
         count = (said.team.team.agent, said.team.team.name)
         if said.action.rule is not None:
@@ -110,9 +110,9 @@ class Translator:
         return found
 
     def _book(self, orders: Iterable[RuleOrder]) -> None:
-        """Takes from the ledger what orders cost and which units they keep busy; rules do so themselves.
+        """Enter the costs and the busy units of orders in the ledger; rules do so themselves.
 
-        Energy only of a single unit: of a group that casts at one target, the game chooses who does it.
+        Energy is entered only for a single unit: in a group that casts at one target, the game chooses the caster.
         """
         for order in orders:
             self.ledger.take(*order.units)
@@ -134,7 +134,7 @@ class Translator:
         return self._count.get(count, 0) < self._max_actions[count[0]]
 
     def _by_rule(self, said: Recognised, rule: str) -> list[RuleOrder]:
-        """What a rule makes of a call; it takes the price from the ledger itself."""
+        """Return the orders that a rule makes of a call; the rule takes the price from the ledger itself."""
         units = self._having(said, self._units(said)) if said.team.team.tags else ()
         tag = self._targets.unit(said).tag if said.action.target_kind == "tag" else None
         point = None if said.point is None else self._targets.place(said)
@@ -145,7 +145,7 @@ class Translator:
             raise CallRejected(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
 
     def _as_said(self, said: Recognised) -> list[RuleOrder]:
-        """The order of a call whose words say it all."""
+        """Return the order of a call that leaves nothing open."""
         function = said.action.pysc2
         if function is None and not said.team.team.tags:
             return []
@@ -161,10 +161,10 @@ class Translator:
             case _:
                 return [RuleOrder(function, able, self._targets.place(said))]
 
-    # --- who --------------------------------------------------------------------------------------------------
+    # --- units --------------------------------------------------------------------------------------------------
 
     def _units(self, said: Recognised) -> tuple[int, ...]:
-        """The units that are spoken of, those that are there."""
+        """Return the units that a call means, as far as they exist."""
         tags = self._targets.named(said) if said.action.named else said.team.team.tags
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
@@ -172,7 +172,7 @@ class Translator:
         return found
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
-        """Those of some units that may be told to do it, as the task says."""
+        """Return the units that have the action by the task."""
         listed = self._sight.agents[said.team.team.agent].agent.actions
         types = {tag: self._snapshot.units[tag].name for tag in tags}
         found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
@@ -181,7 +181,7 @@ class Translator:
         return found
 
     def _able(self, said: Recognised, function: Function, tags: tuple[int, ...]) -> tuple[int, ...]:
-        """Those of some units that can do it now; one, if one is enough for it."""
+        """Return the units that can do it now; only one, if one is enough."""
         use = use_of(function, at_unit=said.action.target_kind == "tag")
         found = {tag: why_not(use, self._side.units[tag], self._side, self.ledger) for tag in tags}
         able = tuple(tag for tag, why in found.items() if why is None)
@@ -204,10 +204,10 @@ class Translator:
         why = "; ".join(dict.fromkeys(reasons))
         return CallRejected("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
 
-    # --- at what ----------------------------------------------------------------------------------------------
+    # --- targets ----------------------------------------------------------------------------------------------
 
     def _at_unit(self, said: Recognised, function: Function, able: tuple[int, ...]) -> RuleOrder:
-        """The order at the unit that is named, for those of the able ones that it can be aimed at by."""
+        """Return the order at the named unit, for the able units that can aim at it."""
         unit = self._targets.unit(said)
         if said.action.aim == "place":
             return RuleOrder(function, able, WorldPoint(unit.pos.x, unit.pos.y))
@@ -228,12 +228,12 @@ class Translator:
 
     @staticmethod
     def _hits(unit: Unit, target: Unit) -> bool:
-        """Whether a unit has a weapon for another one; one of which no weapon is known is not doubted."""
+        """Return True if a unit has a weapon against another one, or if its weapons are unknown."""
         return _reaches(unit.name, target.name, _is_aloft(target))
 
 
 def _is_aloft(unit: Unit) -> bool:
-    """Whether a unit is hit in the air: what flies, and what a Phoenix holds up with its beam."""
+    """Return True if a unit is hit in the air: it flies, or a Phoenix holds it up with its beam."""
     return unit.is_flying or any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)
 
 

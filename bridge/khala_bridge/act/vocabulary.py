@@ -1,7 +1,7 @@
-"""The names that one agent may say: its actions by any spelling of them, and those that a wrong name is near to.
+"""The names that one agent may use: its actions in any spelling, and the nearest ones to a wrong name.
 
-Made once for an agent of a task. Case, underscores, blanks and hyphens make no difference to a name, since no two
-actions differ in nothing else; aliases of the catalogue count as names. Above it is `khala_bridge.act.recognise`.
+Made once for an agent of a task. Case, underscores, blanks and hyphens do not matter, since no two actions differ only
+in these; aliases of the catalogue count as names. Above it is `khala_bridge.act.recognise`.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig
 
 CLOSE = 0.8
-"""Similarity of two names, 0 to 1, above which one is taken for a slip of the other."""
+"""Similarity of two names, 0 to 1, above which one counts as a slip of the other."""
 ALIKE = 0.7
-"""Likeness of two names, 0 to 2, above which one is worth mentioning where the other was said."""
+"""Likeness of two names, 0 to 2, above which a refusal of one mentions the other."""
 NEAREST = 3
 """Actions that a refusal names at most."""
 
 
 class Vocabulary:
-    """What an agent may say."""
+    """The names that an agent may use."""
 
     def __init__(self, agent: AgentConfig) -> None:
-        """Takes the names of all actions of its teams."""
+        """Take the names of all actions of its teams."""
         self._agent = agent
         self._actions: dict[str, Action] = {}
         self._catalogue = agent.catalogue()
@@ -42,17 +42,17 @@ class Vocabulary:
                 self._actions.setdefault(squashed(alias), action)
 
     def find(self, name: str) -> Action | None:
-        """The action of this name, in any spelling; None if the agent has no such action."""
+        """Return the action of this name, in any spelling; None if the agent has no such action."""
         return self._actions.get(squashed(name))
 
     def has(self, team: TeamObservation, action: Action) -> bool:
-        """Whether a team may ever be told to do an action, with the units that it has now."""
+        """Return True if a team has an action, with its present units."""
         return action.name in team.team.config.actions or any(
             action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
         )
 
     def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
-        """What some teams may be told instead of a wrong name, as the end of a sentence."""
+        """Return the actions that some teams have instead of a wrong name, as the end of a sentence."""
         wanted, words = squashed(name), _words(name)
         known = list(self._sayable(list(teams)))
         likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
@@ -66,7 +66,7 @@ class Vocabulary:
         return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
 
     def _sayable(self, teams: list[TeamObservation]) -> Iterable[Action]:
-        """What some teams may be told, in the order in which it is listed; everything if there are none."""
+        """Return the actions of some teams, in the order of the task's lists; all actions if there are no teams."""
         if not teams:
             return self._catalogue
         types = dict.fromkeys(unit.type for team in teams for unit in team.view.units)
@@ -76,12 +76,12 @@ class Vocabulary:
 
 @functools.lru_cache(maxsize=8192)
 def squashed(name: str) -> str:
-    """A name without what models vary in it: case, underscores, blanks, hyphens."""
+    """Return a name without what models vary in it: case, underscores, blanks, hyphens."""
     return "".join(filter(str.isalnum, name)).casefold()
 
 
 def _likeness(pairs: frozenset[str], words: frozenset[str], known: str) -> float:
-    """How like a name another one is: by pairs of letters (Dice's coefficient), and by the words that both have."""
+    """Return the likeness of two names: by pairs of letters (Dice's coefficient), and by common words."""
     its_pairs = _pairs(squashed(known))
     letters = 2 * len(pairs & its_pairs) / max(len(pairs) + len(its_pairs), 1)
     return letters + len(words & _words(known)) / max(len(words), 1)

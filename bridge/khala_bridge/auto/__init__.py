@@ -1,6 +1,6 @@
-"""What the host finds out for an agent that left it open: who trains, where a building stands, which way to scout.
+"""The host's rules for what an agent left open: which unit trains, where a building stands, which way to scout.
 
-A rule never overrides what an agent said; it finds the argument that is missing, or says why there is none.
+A rule never overrides an agent; it finds the missing argument, or says why there is none.
 """
 
 from khala_bridge.auto.army import army_attack, army_defend, army_retreat

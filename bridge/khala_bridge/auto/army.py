@@ -1,4 +1,4 @@
-"""Orders to the whole army, with the plain meaning of their words; where to is what the host finds."""
+"""Orders to the whole army, with the plain meaning of their words; the host finds the place."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     from khala_bridge.state import Unit
 
 NEAR_ARMY: Final = 24.0
-"""Enemies so near to the middle of the army are fought first; the paper's figure."""
+"""Enemies within this distance of the middle of the army are fought first; the paper's figure."""
 NEAR_ONE: Final = 20.0
-"""Enemies so near to any unit of it, too; the same."""
+"""Enemies within this distance of any unit of the army, too; the paper's figure."""
 INTRUDES: Final = 15.0
-"""Enemies so near to an own structure are intruders; the same."""
+"""Enemies within this distance of an own structure are intruders; the paper's figure."""
 
 
 def army_attack(ask: RuleRequest) -> list[RuleOrder]:
-    """Fights its way to enemies near the army, else to the nearest known enemy structure, else to where they may be.
+    """Send the army, fighting, to enemies near it, else to the nearest known enemy structure, else to unseen places.
 
-    Of the enemies near it those that fight come first, then structures and workers.
+    Among the enemies near it, those that fight come first, then structures and workers.
 
     Raises:
         NotAvailable: there is no army that is free.
@@ -53,7 +53,7 @@ def army_attack(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def army_defend(ask: RuleRequest) -> list[RuleOrder]:
-    """Fights intruders, those nearest to a town hall first; without any it waits in front of the foremost base.
+    """Send the army against intruders, those nearest to a town hall first; without any, in front of the foremost base.
 
     Queens fight intruders too, and do not wait.
 
@@ -72,7 +72,7 @@ def army_defend(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def army_retreat(ask: RuleRequest) -> list[RuleOrder]:
-    """Goes back to the foremost base without fighting.
+    """Send the army back to the foremost base without fighting.
 
     Raises:
         NotAvailable: there is no army that is free, or nothing to retreat to.
@@ -84,7 +84,7 @@ def army_retreat(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def _army(ask: RuleRequest, *, home: bool = False) -> list[Unit]:
-    """The army, without units that an agent has ordered in this turn: what was said of them holds."""
+    """Return the army without the units that an agent has ordered in this turn."""
     found = army(ask.snapshot, home=home)
     if not found:
         raise not_available(ask, "you have no army; train units first.")
@@ -95,7 +95,7 @@ def _army(ask: RuleRequest, *, home: bool = False) -> list[Unit]:
 
 
 def _middle(units: list[Unit]) -> WorldPoint:
-    x, y = np.median([place(unit) for unit in units], axis=0).tolist()  # who is far behind does not move it
+    x, y = np.median([place(unit) for unit in units], axis=0).tolist()  # stragglers do not move it
     return WorldPoint(x, y)
 
 
@@ -112,7 +112,7 @@ def _nearest(units: list[Unit], to: list[WorldPoint]) -> WorldPoint:
 
 
 def _rally(ask: RuleRequest, middle: WorldPoint) -> WorldPoint:
-    """In front of the base to which the enemy has the shortest way; where the army is if there is no base."""
+    """Return the point in front of the base nearest to the enemy by its ways; the army's own place without a base."""
     land = land_of(ask.snapshot)
     fronts = [front(land, place(hall)) for hall in land.own_halls]
     enemies = land.ground.starts

@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground import Base, Land
 
 NEAR = 10.0
-"""What is built near a unit stands at most so far from it, in world units."""
+"""World units within which a structure stands that is built near a unit."""
 ON_GEYSER = 2.0
-"""A point so near to the middle of a geyser means the geyser."""
+"""A point within this distance of the middle of a geyser means the geyser."""
 OF_BASE = 12.0
-"""A unit so near to a place for a town hall means this place."""
+"""A unit within this distance of a place for a town hall means this place."""
 
 
 def build_at(ask: RuleRequest) -> list[RuleOrder]:
-    """Builds at a point, on the nearest cells of the grid.
+    """Build at a point, on the nearest cells of the grid.
 
     Raises:
-        NotAvailable: nobody builds it, it is too dear or has to wait for others, or it cannot stand there.
+        NotAvailable: there is no builder, it is too dear or has to wait for others, or it cannot stand there.
     """
     assert ask.point is not None, f"{ask.action.name} is said with a point"
     ask.able()
@@ -48,7 +48,7 @@ def build_at(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def build_near(ask: RuleRequest) -> list[RuleOrder]:
-    """Builds near a unit: a town hall on the base place of its resources, gas on the geyser, others as near as may be.
+    """Build near a unit: a town hall on the base place of its resources, gas on the geyser, others as near as possible.
 
     Raises:
         NotAvailable: as `build_at`, or there is no place near it.
@@ -73,7 +73,7 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def lock_base(ask: RuleRequest) -> list[RuleOrder]:
-    """Builds on the very place where a town hall would gather a resource best, so that nobody else can have it.
+    """Build on the very place where a town hall would gather a resource best, so that no other player can take it.
 
     Raises:
         NotAvailable: as `build_at`.
@@ -85,7 +85,7 @@ def lock_base(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def build_auto(ask: RuleRequest) -> list[RuleOrder]:
-    """Builds where the host finds it best, with a worker of the side that goes back to the minerals afterwards.
+    """Build where the host finds it best, with a worker of the side that goes back to the minerals afterwards.
 
     Raises:
         NotAvailable: there is no place, or as `build_at`.
@@ -108,13 +108,13 @@ def build_auto(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def _checked(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
-    """The orders to build at the middle of some cells, which somebody else than the host has chosen."""
+    """Return the orders to build at the middle of some cells, which the host has not chosen itself."""
     _check_site(ask, land_of(ask.snapshot), middle)
     return _at(ask, middle)
 
 
 def _at(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
-    """The orders to build at the middle of some cells."""
+    """Return the orders to build at the middle of some cells."""
     structure = _structure(ask)
     worker, queued = builder(ask, middle)
     orders = _go(ask, worker, middle, queued=queued)
@@ -139,7 +139,7 @@ def _go(ask: RuleRequest, worker: Unit, target: WorldPoint | int, *, queued: boo
 
 
 def _back_to_work(ask: RuleRequest, build: RuleOrder) -> list[RuleOrder]:
-    """Sends a worker that outlives its work back to the mineral field that is nearest to where it built."""
+    """Send a worker that outlives its work back to the mineral field that is nearest to where it built."""
     worker = ask.snapshot.units[build.units[0]]
     land = land_of(ask.snapshot)
     fields = [u for u in land.standing("mineral_field") if u.tag in ask.snapshot.units]
@@ -156,7 +156,7 @@ def _back_to_work(ask: RuleRequest, build: RuleOrder) -> list[RuleOrder]:
 
 
 def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
-    """Raises if the structure cannot stand there, with the nearest place where it can."""
+    """Raise an error if the structure cannot stand there, with the nearest place where it can."""
     structure = _structure(ask)
     footprint = footprint_need(structure)
     allowed = legal(land, ask.ledger, structure)
@@ -172,7 +172,7 @@ def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
 
 
 def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
-    """Why a structure cannot stand on a cell and those around it, as half a sentence."""
+    """Return why a structure cannot stand on a cell and those around it, as half a sentence."""
     site, footprint = sites()[_structure(ask)], footprint_need(_structure(ask))
     cells = [(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells]
     if not all(land.ground.holds(x, y) and land.ground.buildable[x, y] for x, y in cells):
@@ -197,7 +197,7 @@ def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
 
 
 def _lack(structure: str) -> str:
-    """What is usually missing where a structure has no place."""
+    """Return what is usually missing if a structure has no place."""
     match sites()[structure].ground:
         case "powered":
             return " in the field of a Pylon; build a Pylon first"
@@ -208,7 +208,7 @@ def _lack(structure: str) -> str:
 
 
 def _named(ask: RuleRequest) -> Unit:
-    """The unit that says where; it may be one that is only remembered."""
+    """Return the unit that names the place; it may be one that is only remembered."""
     unit = None if ask.tag is None else land_of(ask.snapshot).unit(ask.tag)
     if unit is None:
         raise NotAvailable(
@@ -218,7 +218,7 @@ def _named(ask: RuleRequest) -> Unit:
 
 
 def _base_of(ask: RuleRequest, unit: Unit) -> Base:
-    """The place for a town hall that a unit lies at."""
+    """Return the place for a town hall beside a unit."""
     bases = land_of(ask.snapshot).bases
     found = min(bases, key=lambda base: (math.dist(base.place, place(unit)), base.place), default=None)
     if found is None or math.dist(found.place, place(unit)) > OF_BASE:
@@ -230,7 +230,7 @@ def _base_of(ask: RuleRequest, unit: Unit) -> Base:
 
 
 def _free_geysers(ask: RuleRequest) -> list[Unit]:
-    """Geysers on which no gas structure stands or is going to stand, by ascending tags."""
+    """Return the geysers without a gas structure or a planned one, by ascending tags."""
     land = land_of(ask.snapshot)
     standing = land.standing("geyser")
     taken = {_spot(unit) for unit in standing if name(unit) in GAS_STRUCTURES}
@@ -245,7 +245,7 @@ def _spot(unit: Unit) -> tuple[int, int]:
 
 
 def _has_gas(unit: Unit) -> bool:
-    """Whether a geyser holds anything; of one that is only remembered it is not known, and hoped."""
+    """Return True if a geyser holds gas, or is only remembered, so that its content is unknown."""
     return unit.is_remembered or unit.vespene_contents > 0
 
 

@@ -1,4 +1,4 @@
-"""Which worker builds: one that is missed least, of those the nearest to the place."""
+"""Which worker builds: of those with the least important work, the nearest to the place."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def builder(ask: RuleRequest, where: WorldPoint) -> tuple[Unit, bool]:
-    """The worker that builds at a place, and whether the order waits behind those that it has.
+    """Return the worker that builds at a place, and whether the order waits behind those that it has.
 
-    Of a team the nearest one, and a second structure waits for the first. Of the side the nearest one among those that
-    are idle or gather minerals and carry nothing; then those that carry something, then those that gather gas. What
-    builds, scouts or was ordered by an agent in this turn is left alone.
+    In a team: the nearest one, and a second structure waits for the first. In the whole side: the nearest one among
+    those that are idle or gather minerals and carry nothing; then those that carry something, then those that gather
+    gas. Workers that build, scout or were ordered by an agent in this turn are left alone.
 
     Raises:
         NotAvailable: there is none.
@@ -38,7 +38,7 @@ def _of_team(ask: RuleRequest, able: list[Unit], where: WorldPoint) -> tuple[Uni
 
 
 def _has_more_to_do(ask: RuleRequest, unit: Unit) -> bool:
-    """Whether a worker builds already, or was told so in this turn."""
+    """Return True if a worker builds already, or was ordered to in this turn."""
     return unit.tag in ask.ledger.busy or any(built_by(order.ability_id) for order in unit.orders)
 
 
@@ -50,7 +50,7 @@ _IDLE, _LADEN, _ON_GAS, _USED = range(4)
 
 
 def use(snapshot: Snapshot, unit: Unit) -> int:
-    """How much a worker would be missed: 0 if it is idle or gathers minerals, 3 if it does anything but gather."""
+    """Return how important a worker's work is: 0 if idle or gathering minerals, 3 for anything but gathering."""
     if unit.orders and not is_doing(unit, ability("Harvest_Gather_screen"), ability("Harvest_Return_quick")):
         return _USED
     if is_on_gas(snapshot, unit):
@@ -59,7 +59,7 @@ def use(snapshot: Snapshot, unit: Unit) -> int:
 
 
 def is_on_gas(snapshot: Snapshot, unit: Unit) -> bool:
-    """Whether a worker gathers gas."""
+    """Return True if a worker gathers gas."""
     target = land_of(snapshot).unit(unit.orders[0].target_unit_tag) if unit.orders else None
     return target is not None and name(target) in GAS_STRUCTURES
 

@@ -1,4 +1,4 @@
-"""Abilities of the side that one unit of several can use: the one that can, and what at."""
+"""Abilities that one of several units of the side can use: which unit uses them, and on what."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def cast(ask: RuleRequest) -> list[RuleOrder]:
-    """Lets one unit that can now use an ability, at what the words name.
+    """Order one unit that can do it now to use an ability, at the target of the call.
 
-    If it has to go there, the nearest one; if the whole map is in reach, that with the most energy.
+    It is the nearest one if it has to go there, and the one with the most energy if the whole map is in reach.
 
     Raises:
         NotAvailable: no unit can.
@@ -29,10 +29,10 @@ def cast(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def recall_near(ask: RuleRequest) -> list[RuleOrder]:
-    """Recalls the units around the one that is named.
+    """Recall the units around the named one.
 
     Raises:
-        NotAvailable: nobody can.
+        NotAvailable: no unit can.
     """
     _, where = _target(ask)
     if where is None:
@@ -42,7 +42,7 @@ def recall_near(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def stop_building(ask: RuleRequest) -> list[RuleOrder]:
-    """Lets structures call off the newest of what they train or research, those of the team or the one that is named.
+    """Cancel the newest training or research of the team's structures, or of the named one.
 
     Raises:
         NotAvailable: they do nothing.
@@ -57,10 +57,10 @@ def stop_building(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def cancel_building(ask: RuleRequest) -> list[RuleOrder]:
-    """Calls off, or halts, the building of the structure that is named; what of it stands is what the game makes of it.
+    """Cancel or halt the building of the named structure; the game decides which.
 
     Raises:
-        NotAvailable: it is no structure in the making, or the game does not take it.
+        NotAvailable: it is not a structure under construction, or the game does not allow it.
     """
     unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
     if unit is None or not unit.is_own or not is_structure(unit):
@@ -76,11 +76,11 @@ def cancel_building(ask: RuleRequest) -> list[RuleOrder]:
     return [RuleOrder(ask.function, (unit.tag,))]
 
 
-# who ------------------------------------------------------------------------------------------------------------------
+# units ----------------------------------------------------------------------------------------------------------------
 
 
 def caster(ask: RuleRequest, where: WorldPoint | None) -> Unit:
-    """The unit of the action's types that can use its ability now, noted in the ledger.
+    """Return the unit of the action's types that can use its ability now, noted in the ledger.
 
     Raises:
         NotAvailable: there is none; the text says what is missing.
@@ -91,7 +91,7 @@ def caster(ask: RuleRequest, where: WorldPoint | None) -> Unit:
 
 
 def note(ask: RuleRequest, unit: Unit) -> None:
-    """Notes in the ledger that a unit uses the action's ability: a structure goes on with its other work."""
+    """Note in the ledger that a unit uses the action's ability; a structure continues its other work."""
     facts = ask.facts(name(unit))
     ask.ledger.energy[unit.tag] += int(facts.energy) if facts is not None else 0
     if not is_structure(unit):
@@ -99,7 +99,7 @@ def note(ask: RuleRequest, unit: Unit) -> None:
 
 
 def casters(ask: RuleRequest, where: WorldPoint | None) -> list[Unit]:
-    """Every unit that can use the action's ability now, that which should first; never none."""
+    """Return every unit that can use the action's ability now, the best one first; at least one."""
     able = ask.able()
     facts = ask.facts(able[0].type)
     goes = facts is not None and facts.range is not None
@@ -112,11 +112,11 @@ def casters(ask: RuleRequest, where: WorldPoint | None) -> list[Unit]:
     return sorted((ask.snapshot.units[unit.tag] for unit in able), key=rank)
 
 
-# what at --------------------------------------------------------------------------------------------------------------
+# targets --------------------------------------------------------------------------------------------------------------
 
 
 def _target(ask: RuleRequest) -> tuple[int | WorldPoint | None, WorldPoint | None]:
-    """What the words aim at, as the function takes it, and where that is."""
+    """Return the target of the call, as the function takes it, and its place."""
     if ask.tag is None:
         return ask.point, ask.point
     unit = land_of(ask.snapshot).unit(ask.tag)

@@ -1,4 +1,4 @@
-"""Chrono Boost for what an agent names by its use: the economy, the army or research."""
+"""Chrono Boost for a purpose that an agent names: the economy, the army or research."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 BOOSTED: Final = 281
 """The game's number of the buff of Chrono Boost."""
 WARP: Final = "TrainWarp_Zealot_screen"
-"""What a WarpGate can always do that has nothing to wait for."""
+"""The ability that a WarpGate always has unless it recharges."""
 
 
 def chrono_economy(ask: RuleRequest) -> list[RuleOrder]:
-    """Boosts a structure that trains workers.
+    """Boost a structure that trains workers.
 
     Raises:
-        NotAvailable: none does, or no Nexus can.
+        NotAvailable: no structure does, or no Nexus can.
     """
     why = "no Nexus trains Probes that is not boosted yet; train Probes first."
     return _boost(ask, [unit for unit, facts in _at_work(ask) if _is_worker(facts)], why)
 
 
 def chrono_military(ask: RuleRequest) -> list[RuleOrder]:
-    """Boosts a structure that trains anything else, or else a WarpGate that recharges.
+    """Boost a structure that trains something other than workers, or else a WarpGate that recharges.
 
     Raises:
-        NotAvailable: none does, or no Nexus can.
+        NotAvailable: no structure does, or no Nexus can.
     """
     why = "no structure trains an army unit that is not boosted yet; train one first."
     training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
@@ -45,17 +45,17 @@ def chrono_military(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def chrono_research(ask: RuleRequest) -> list[RuleOrder]:
-    """Boosts a structure that researches.
+    """Boost a structure that researches.
 
     Raises:
-        NotAvailable: none does, or no Nexus can.
+        NotAvailable: no structure does, or no Nexus can.
     """
     why = "no structure researches anything that is not boosted yet; research something first."
     return _boost(ask, [unit for unit, facts in _at_work(ask) if facts.researches is not None], why)
 
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
-    """Finished own structures with what they work on, those with the most of it left first."""
+    """Return the finished own structures with their work, those with the most work left first."""
     busy = [unit for unit in finished(ask.snapshot.own) if is_structure(unit) and unit.orders]
     found = [(unit, abilities().get(unit.orders[0].ability_id)) for unit in busy]
     known = [(unit, facts) for unit, facts in found if facts is not None]
@@ -68,7 +68,7 @@ def _is_worker(facts: AbilityFacts) -> bool:
 
 
 def _recharging(ask: RuleRequest) -> list[Unit]:
-    """WarpGates from which the game takes no Zealot, though it would be paid for."""
+    """Return the WarpGates that cannot warp in a Zealot now, though the player could pay for one."""
     known = ask.snapshot.abilities
     zealot = abilities()[ability(WARP)]
     if known is None or ask.ledger.short_of(price_of(zealot)):
@@ -78,7 +78,7 @@ def _recharging(ask: RuleRequest) -> list[Unit]:
 
 
 def _boost(ask: RuleRequest, targets: Sequence[Unit], nothing: str) -> list[RuleOrder]:
-    """Boosts the first of some structures that is not boosted yet."""
+    """Boost the first of some structures that is not boosted yet."""
     aimed = ask.ledger.aimed
     left = [u for u in targets if BOOSTED not in u.buff_ids and (ask.function.name, u.tag) not in aimed]
     if not left:

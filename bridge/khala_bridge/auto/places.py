@@ -1,4 +1,4 @@
-"""Which of the free places the host takes when an agent leaves it open."""
+"""The choice of one free place when an agent leaves it open."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground.terrain import Floats
 
 OWN_GAS: Final = 10.0
-"""A geyser so near to a town hall belongs to it; farther ones are not worth the way."""
+"""A geyser within this distance of a town hall belongs to it; farther ones are not worth the way."""
 PYLON_WISH: Final = 40.0
-"""A Pylon that powers so many new places is as good as one that powers more; about half of what is possible."""
+"""A Pylon that powers this many new places is as good as one that powers more; about half of what is possible."""
 PYLON_AWAY: Final = 7.0
-"""How far from its town hall a Pylon stands best, in world units."""
+"""Best distance of a Pylon from its town hall, in world units."""
 OUTWARD: Final = 7.0
-"""How far in front of a town hall its defence stands, in world units."""
+"""Distance of a town hall's defence in front of it, in world units."""
 FRONT: Final = frozenset({"PhotonCannon", "ShieldBattery", "Bunker", "SpineCrawler"})
-"""Structures that stand where the enemy comes from."""
+"""Structures that stand on the enemy's side of a base."""
 AMONG_WORKERS: Final = frozenset({"MissileTurret", "SporeCrawler"})
 """Structures that guard workers from the air."""
 
 
 def for_structure(land: Land, ledger: Ledger, structure: str) -> tuple[int, int] | None:
-    """The cell of the best place at the own bases for a structure that is no town hall and on no geyser, if any."""
+    """Return the best cell at the own bases for a structure, if any; not for town halls and gas structures."""
     grid, corner = good(land, ledger, structure), on_corner(structure)
     halls = [place(unit) for unit in land.own_halls]
     if structure == "Pylon":
@@ -51,7 +51,7 @@ def for_structure(land: Land, ledger: Ledger, structure: str) -> tuple[int, int]
 
 
 def _anchors(land: Land) -> list[WorldPoint]:
-    """What a base is when it has no town hall, or no room: everything own that stands."""
+    """Return the points that make up a base without a town hall or without room: all own structures."""
     return [place(u) for kind in ("town_hall", "square_3", "square_2") for u in _own(land.standing(kind))]
 
 
@@ -60,7 +60,7 @@ def _own(units: list[Unit]) -> list[Unit]:
 
 
 def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Floats:
-    """(w, h) cost of a place for a Pylon: few new places in its field, and far from where it stands best."""
+    """Return the cost (w, h) of a place for a Pylon: high for few new places in its field, or a wrong distance."""
     away = near(land, halls, reach=BASE_REACH, corner=True)
     power = np.minimum(new_power(land, ledger), PYLON_WISH)
     cost: Floats = np.abs(away - PYLON_AWAY) + (PYLON_WISH - power) / 2
@@ -68,7 +68,7 @@ def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Floats:
 
 
 def front(land: Land, hall: WorldPoint) -> WorldPoint:
-    """The point in front of a town hall: on the side from which an enemy walks to it."""
+    """Return the point in front of a town hall, on the side from which an enemy arrives."""
     enemies = [start for start in land.ground.starts if math.dist(start, hall) > OUTWARD]
     if not enemies:
         return hall
@@ -79,7 +79,7 @@ def front(land: Land, hall: WorldPoint) -> WorldPoint:
 
 
 def workplace(land: Land, hall: WorldPoint) -> WorldPoint:
-    """The middle of the ways that the workers of a town hall walk."""
+    """Return the middle of the workers' ways at a town hall."""
     of_base = next((base for base in land.bases if math.dist(base.place, hall) < OWN_GAS), None)
     if of_base is None or not of_base.fields:
         return hall
@@ -88,10 +88,10 @@ def workplace(land: Land, hall: WorldPoint) -> WorldPoint:
 
 
 def free_base(ask: RuleRequest, land: Land, structure: str) -> WorldPoint:
-    """The place for a town hall that is the shortest way from the own bases.
+    """Return the free place for a town hall with the shortest way from the own bases.
 
     Raises:
-        NotAvailable: every place that can be walked to is taken.
+        NotAvailable: every place that workers can walk to is taken.
     """
     footprint = footprint_need(structure)
     allowed = legal(land, ask.ledger, structure)
@@ -110,14 +110,14 @@ def free_base(ask: RuleRequest, land: Land, structure: str) -> WorldPoint:
 
 
 def _is_held(land: Land, place_: WorldPoint) -> bool:
-    """Whether somebody's town hall stands at a place or near it, or one of an enemy who began there is likely to."""
+    """Return True if a town hall stands at or near a place, or if it is an unseen start of an enemy."""
     unseen = not land.sight[int(place_.x), int(place_.y)]
     begun = unseen and any(math.dist(start, place_) < OWN_GAS for start in land.ground.starts)
     return begun or any(math.dist(place(hall), place_) < OWN_GAS for hall in land.halls)
 
 
 def free_geyser(ask: RuleRequest, geysers: list[Unit]) -> Unit:
-    """The free geyser that is nearest to a finished town hall.
+    """Return the free geyser that is nearest to a finished town hall.
 
     Raises:
         NotAvailable: no town hall has one.

@@ -1,7 +1,7 @@
-"""Who trains, morphs and researches: the producer that an action leaves open.
+"""Training, morphing and research: the choice of the producer if an action leaves it open.
 
-An idle producer is preferred, then the one with the shortest queue, since a model that orders five Zealots from two
-Gateways means five; ties go to the lower tag. A Reactor makes two places of one, a Larva is used once.
+An idle producer comes first, then the one with the shortest queue, since a model that orders five Zealots from two
+Gateways means five; the lower tag wins a tie. A Reactor makes two places of one, a Larva is used once.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def train(ask: RuleRequest) -> list[RuleOrder]:
-    """Orders one unit, morph or add-on from the best of the producers.
+    """Order one unit, morph or add-on from the best producer.
 
     Raises:
-        NotAvailable: there is no producer, or none that can now.
+        NotAvailable: there is no producer, or none can do it now.
     """
     best = min(_producers(ask), key=lambda unit: _rank(ask, unit))
     facts = ask.facts(best.type)
@@ -35,7 +35,7 @@ def train(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def research(ask: RuleRequest) -> list[RuleOrder]:
-    """Orders an upgrade where it is researched; of one with levels the next.
+    """Order an upgrade where it is researched; the next level, if it has levels.
 
     Raises:
         NotAvailable: it is known or under way already, or cannot be researched now.
@@ -50,7 +50,7 @@ def research(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def morph_warpgates(ask: RuleRequest) -> list[RuleOrder]:
-    """Turns every Gateway that works on nothing into a WarpGate.
+    """Turn every idle Gateway into a WarpGate.
 
     Raises:
         NotAvailable: there is none, or the upgrade is missing.
@@ -60,11 +60,11 @@ def morph_warpgates(ask: RuleRequest) -> list[RuleOrder]:
     return [RuleOrder(ask.function, ready)]
 
 
-# which of them --------------------------------------------------------------------------------------------------------
+# the producer ---------------------------------------------------------------------------------------------------------
 
 
 def _producers(ask: RuleRequest) -> list[UnitState]:
-    """Those that can now; for an add-on those that have room for it, which is all that the game may mean by its no."""
+    """Return the producers that can do it now; for an add-on those with room, as the game may refuse for that alone."""
     facts = abilities().get(ask.function.ability_id)
     if facts is None or facts.does != "build_addon":
         return ask.able()
@@ -95,7 +95,7 @@ def _has_room(ask: RuleRequest, land: Land, unit: UnitState) -> bool:
 
 
 def _rank(ask: RuleRequest, unit: UnitState) -> tuple[int, int, int]:
-    """The less, the sooner a new order of this producer is done."""
+    """Return a rank: the lower, the sooner this producer finishes a new order."""
     load = unit.orders + ask.ledger.queued[unit.tag]
     return load // (2 if unit.addon in stand_ins("Reactor") else 1), load, unit.tag
 

@@ -1,6 +1,6 @@
-"""What a rule is asked, and what it answers: orders, or why there are none.
+"""The question to a rule, and its answer: orders, or why there are none.
 
-Rules are pure functions of a snapshot and the ledger of the turn; the ground is found by the snapshot. Above them is
+Rules are pure functions of a snapshot and the ledger of the turn; the snapshot leads to the ground. Above them is
 `khala_bridge.act.translate`.
 """
 
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RuleRequest:
-    """An action, and what the words of the agent left to find out."""
+    """An action, and the arguments that the agent gave."""
 
     action: Action
     snapshot: Snapshot
     ledger: Ledger
     units: tuple[int, ...] = ()
-    """Those of the team that are alive, or the unit that was named; () for a side team."""
+    """The living units of the team, or the named unit; () for a side team."""
     tag: int | None = None
-    """The unit among the arguments that is the target or says where."""
+    """The unit among the arguments that is the target or names the place."""
     point: WorldPoint | None = None
 
     @property
     def function(self) -> Function:
-        """What the action ends in; actions with a rule end in something."""
+        """The function that the action ends in; every action with a rule has one."""
         function = self.action.pysc2
         assert function is not None, f"{self.action.name} has a rule and no function"
         return function
 
     def facts(self, unit_type: str) -> AbilityFacts | None:
-        """What is known of the action's ability, by the type of its user where that makes a difference."""
+        """Return the facts of the action's ability, by the type of its user where that makes a difference."""
         number = self.function.ability_id
         return facts_for(number, unit_type, self.side.upgrades) or abilities().get(number)
 
@@ -55,7 +55,7 @@ class RuleRequest:
         return side_of(self.snapshot)
 
     def able(self) -> list[UnitState]:
-        """Return the units that can do it now, of those that the words name or of the side; never none.
+        """Return the units that can do it now, of those that the call names or of the side; at least one.
 
         Raises:
             NotAvailable: no unit can.
@@ -77,11 +77,11 @@ class RuleRequest:
             self.ledger.pay(price_of(facts))
 
     def has(self, tag: int) -> bool:
-        """Whether the game would take the action's ability from a unit now; true if the game was not asked."""
+        """Return True if the game would take the action's ability from a unit now, or if it was not asked."""
         return self.can(tag, self.function.ability_id)
 
     def can(self, tag: int, ability: int) -> bool:
-        """Whether the game would take an ability from a unit now; true if the game was not asked."""
+        """Return True if the game would take an ability from a unit now, or if it was not asked."""
         known = self.snapshot.abilities
         return known is None or ability in known.get(tag, ())
 
@@ -102,7 +102,7 @@ class RuleOrder:
 
 
 class NotAvailable(Exception):
-    """There is nothing that the rule could answer; the message is a sentence for the model."""
+    """The rule finds no order; the message is a sentence for the model."""
 
     def __init__(
         self, reason: RejectionReason, message: str, place: WorldPoint | None = None, why: Unavailable | None = None
@@ -119,6 +119,6 @@ Rule: TypeAlias = Callable[[RuleRequest], list[RuleOrder]]
 
 
 def not_available(ask: RuleRequest, why: str | Unavailable) -> NotAvailable:
-    """What stands in the way now, as an error to raise: `Build_Pylon is not possible now: <why>`."""
+    """Return the error to raise if something stands in the way: `Build_Pylon is not possible now: <why>`."""
     said, judged = (why, None) if isinstance(why, str) else (of_side(why), why)
     return NotAvailable("not_available", f"{ask.action.name} is not possible now: {said}", why=judged)

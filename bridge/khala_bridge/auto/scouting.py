@@ -1,4 +1,4 @@
-"""What was not seen yet, and who goes to look: where enemies may be, in the order in which it is worth a look."""
+"""Scouting: the places where enemies may be, the most promising first, and the unit that goes there."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground import Land
 
 ROUND_LOOPS: Final = 1344
-"""A minute: when everything was seen once, the first place to look at changes so often."""
+"""A minute: when everything was seen once, the first place to look at changes this often."""
 SAME_PLACE: Final = 4.0
-"""A unit that is on its way to a point so near looks at the place already."""
+"""A unit on its way to a point within this distance of a place scouts the place already."""
 CELL: Final = 8
 """Side of the squares into which the rest of the map is cut, in cells."""
 
 
 def scout(ask: RuleRequest) -> list[RuleOrder]:
-    """Sends the nearest free unit of a kind to where the enemy may be and nobody looks yet.
+    """Send the nearest free unit of a kind to the first place that no unit scouts yet.
 
     Raises:
-        NotAvailable: there is no such unit that is free.
+        NotAvailable: no such unit is free.
     """
     units = [u for u in finished(of_types(ask.snapshot, ask.action.units)) if u.tag not in ask.ledger.busy]
     if not units:
@@ -41,7 +41,7 @@ def scout(ask: RuleRequest) -> list[RuleOrder]:
     places = unseen_places(ask.snapshot, home)
     goals = {unit.tag: goal for unit in ask.snapshot.own if (goal := _goal(unit)) is not None}
     looking = [(n, unit) for unit in units if (n := _seen_by(places, goals.get(unit.tag))) is not None]
-    if looking:  # it goes on, so that the same words mean the same in the next turn
+    if looking:  # it continues, so that the same words mean the same in the next turn
         number, unit = min(looking, key=lambda found: (found[0], found[1].tag))
         return _look(ask, unit, places[number])
     watched = {_seen_by(places, WorldPoint(*goal)) for goal in (*goals.values(), *ask.ledger.looks)}
@@ -56,29 +56,29 @@ def _look(ask: RuleRequest, unit: Unit, to: WorldPoint) -> list[RuleOrder]:
 
 
 def _goal(unit: Unit) -> WorldPoint | None:
-    """The point that a unit walks to; nobody who builds there or gathers has one."""
+    """Return the point that a unit walks to; None if it builds or gathers."""
     if not is_doing(unit, ability("Move_screen"), ability("Attack_screen")):
         return None
     return unit.orders[0].target_world_space_pos
 
 
 def _seen_by(places: list[WorldPoint], goal: WorldPoint | None) -> int | None:
-    """Which of the places somebody looks at who goes to a point."""
+    """Return the number of the place that a unit scouts on its way to a point."""
     if goal is None:
         return None
     return next((n for n, p in enumerate(places) if abs(p.x - goal.x) + abs(p.y - goal.y) <= SAME_PLACE), None)
 
 
 def _needed(snapshot: Snapshot, unit: Unit) -> int:
-    """How much a unit would be missed where it is."""
+    """Return how important a unit's present work is."""
     return int(use(snapshot, unit)) if is_worker(unit) else 0
 
 
 def unseen_places(snapshot: Snapshot, home: WorldPoint) -> list[WorldPoint]:
-    """Places to look for the enemy, the most promising first; never none.
+    """Return places to look for the enemy, the most promising first; at least one.
 
-    First where players begin and nobody looked yet, then places for a base that were not seen, then the rest of the
-    map that was not; when everything was seen once, what is out of sight now, beginning elsewhere every minute.
+    First unseen starts of players, then unseen places for a base, then the unseen rest of the map. When everything was
+    seen once: the starts and base places that are out of sight now, with another one first every minute.
     """
     land = land_of(snapshot)
 
@@ -107,7 +107,7 @@ def _cell(land: Land, point: WorldPoint) -> tuple[int, int]:
 
 
 def _squares(land: Land, home: WorldPoint) -> list[WorldPoint]:
-    """The middles of the squares of the map to which one can walk from home."""
+    """Return the middles of the map's squares that units can walk to from home."""
     width, height = land.ground.size
     x, y = np.meshgrid(np.arange(CELL // 2, width, CELL), np.arange(CELL // 2, height, CELL), indexing="ij")
     walkable = np.isfinite(land.ground.ways_from(home)[x, y])

@@ -1,8 +1,8 @@
-"""Where a structure may stand, and which of these places is the best one if an agent leaves it open.
+"""Where a structure may stand, and which place is the best one if an agent leaves it open.
 
-`legal` is what the game asks: ground, creep, power, distance to resources. `good` is what a player asks besides: the
-ways of workers and the places of town halls stay free, an add-on has its room, and nobody is walled in. All over the
-whole map at once, on grids `[x, y]` of the cells that `Footprint.cell` gives.
+`legal` is what the game demands: ground, creep, power, distance to resources. `good` is what a player wants as well:
+the ways of workers and the places of town halls stay free, an add-on has room, and no unit is walled in. Everything is
+computed for the whole map at once, on grids `[x, y]` of the cells that `Footprint.cell` returns.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground.terrain import Bools, Floats
 
 PYLON_REACH: Final = 4
-"""A structure of 3 x 3 whose middle is at most so many cells away on both axes is in the field of a Pylon (6.5)."""
+"""A structure of 3 x 3 whose middle is at most this many cells away on both axes is in the field of a Pylon (6.5)."""
 BASE_REACH: Final = 16.0
 """A place that is farther from every town hall, as the crow flies, belongs to no base."""
 
 
 def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
-    """(w, h) where the game would let the player place a structure, as far as he can know."""
+    """Return the cells (w, h) where the game allows the structure, as far as the player can know."""
     return _fitting(land, structure, _ground(land, ledger, structure))
 
 
 def _fitting(land: Land, structure: str, ground: Bools) -> Bools:
-    """(w, h) where a structure may stand if its cells may be on this ground."""
+    """Return the cells (w, h) where a structure may stand if its cells may be on this ground."""
     site, footprint = sites()[structure], footprint_need(structure)
     result = everywhere(ground & land.clear if site.clear else ground, footprint.cells)
     return result & land.powered(corner=on_corner(structure)) if site.ground == "powered" else result
 
 
 def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
-    """(w, h) the cells on which some part of the structure may stand."""
+    """Return the cells (w, h) on which a part of the structure may stand."""
     site = sites()[structure]
     ground = land.free & ~promised(land, ledger)
     if site.ground == "creep":
@@ -55,7 +55,7 @@ def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
 
 
 def promised(land: Land, ledger: Ledger) -> Bools:
-    """(w, h) where earlier calls of this turn are going to build."""
+    """Return the cells (w, h) on which earlier calls of this turn are going to build."""
     taken = np.zeros(land.ground.size, np.bool_)
     for x0, y0, x1, y1 in ledger.sites:
         taken[max(int(x0), 0) : int(np.ceil(x1)), max(int(y0), 0) : int(np.ceil(y1))] = True
@@ -63,10 +63,10 @@ def promised(land: Land, ledger: Ledger) -> Bools:
 
 
 def good(land: Land, ledger: Ledger, structure: str) -> Bools:
-    """(w, h) where a structure may stand and is in nobody's way; what is asked for least is dropped first.
+    """Return the cells (w, h) where a structure may stand out of the way; the least important wish is dropped first.
 
-    Never dropped: what the game asks, the ways of workers, the places of town halls, and that the place was seen and
-    can be walked to.
+    Never dropped: the game's demands, the ways of workers, the places of town halls, and that the place was seen and
+    workers can walk to it.
     """
     ground = _ground(land, ledger, structure) & ~land.kept
     result = _fitting(land, structure, ground & (land.sight > 0)) & _reached(land)
@@ -81,7 +81,7 @@ def good(land: Land, ledger: Ledger, structure: str) -> Bools:
 
 
 def best(grid: Bools, cost: Floats) -> tuple[int, int] | None:
-    """The cell with the least cost among those that are marked; of equal ones that with the least coordinates."""
+    """Return the marked cell with the least cost; among equal ones the one with the least coordinates."""
     costs = np.where(grid, np.round(cost, 3), np.inf)
     place = int(np.argmin(costs))
     x, y = divmod(place, grid.shape[1])
@@ -89,14 +89,14 @@ def best(grid: Bools, cost: Floats) -> tuple[int, int] | None:
 
 
 def footprint_need(structure: str) -> Footprint:
-    """The cells that a structure needs; every structure that can be placed has some."""
+    """Return the cells that a structure needs; every structure that can be placed has some."""
     found = footprint_of(structure)
     assert found is not None, f"{structure} stands in sites.yaml and has no footprint"
     return found
 
 
 def on_corner(structure: str) -> bool:
-    """Whether the middle of a structure is on the corner of its cell."""
+    """Return True if the middle of a structure is on the corner of its cell."""
     return footprint_need(structure).size[0] % 2 == 0
 
 
@@ -106,7 +106,7 @@ def _with_addon(structure: str) -> Cells:
 
 
 def _reached(land: Land) -> Bools:
-    """(w, h) where a worker can walk from any own town hall; everywhere if there is none."""
+    """Return the cells (w, h) that a worker can walk to from any own town hall; all cells if there is none."""
     reached = np.zeros(land.ground.size, np.bool_)
     for hall in land.own_halls:
         reached |= np.isfinite(land.ground.ways_from(WorldPoint(hall.pos.x, hall.pos.y)))
@@ -114,10 +114,10 @@ def _reached(land: Land) -> Bools:
 
 
 def _open_around(land: Land, ledger: Ledger, cells: Cells) -> Bools:
-    """(w, h) where a structure cuts no way off: the cells around it that can be walked on are one piece.
+    """Return the cells (w, h) where a structure cuts no way off: the walkable cells around it are one piece.
 
-    Who goes round such a structure can go everywhere that he could go before, so that no gap is closed, no unit locked
-    in and no add-on walled up, wherever the structure stands.
+    A unit can walk round such a structure to every place that it could reach before: no gap is closed, no unit is
+    locked in and no add-on walled up, wherever the structure stands.
     """
     open_ = land.open & ~land.planned & ~promised(land, ledger)
     width, height = open_.shape
@@ -133,7 +133,7 @@ def _open_around(land: Land, ledger: Ledger, cells: Cells) -> Bools:
 
 
 def _ring(cells: Cells) -> list[tuple[int, int]]:
-    """The cells around the rectangle of some cells, in the order in which one walks around it."""
+    """Return the cells around the rectangle of some cells, in the order of a walk around it."""
     xs, ys = zip(*cells, strict=True)
     x0, x1, y0, y1 = min(xs) - 1, max(xs) + 1, min(ys) - 1, max(ys) + 1
     bottom = [(x, y0) for x in range(x0, x1)]
@@ -143,11 +143,11 @@ def _ring(cells: Cells) -> list[tuple[int, int]]:
     return bottom + right + top + left
 
 
-# what makes a place good ----------------------------------------------------------------------------------------------
+# the cost of a place --------------------------------------------------------------------------------------------------
 
 
 def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, corner: bool = False) -> Floats:
-    """(w, h) straight distance of each cell to the nearest of some points; infinite beyond a reach.
+    """Return the straight distance (w, h) of each cell to the nearest of some points; infinite beyond a reach.
 
     Measured from the cell's middle, or its lower left corner, which is the middle of structures of 2 x 2.
     """
@@ -162,7 +162,7 @@ def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, cor
 
 
 def new_power(land: Land, ledger: Ledger) -> Floats:
-    """(w, h) how many new places for a structure of 3 x 3 a Pylon would power, of those that are in nobody's way."""
+    """Return the number (w, h) of new places for a structure of 3 x 3, in no unit's way, that a Pylon would power."""
     places = everywhere(_ground(land, ledger, "Gateway") & ~land.kept, footprint_need("Gateway").cells)
     places &= ~land.powered(corner=False)
     for left, bottom, right, top in ledger.sites:  # it may be a Pylon; either way the next one stands elsewhere
@@ -172,7 +172,7 @@ def new_power(land: Land, ledger: Ledger) -> Floats:
 
 
 def _sum_around(grid: Bools, reach: int) -> Floats:
-    """(w, h) how many cells are marked among those at most so many steps below and to the left, or less above."""
+    """Return the number (w, h) of marked cells at most `reach` steps below and to the left, or fewer above."""
     sums = np.pad(grid.astype(np.float32).cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     low, high = ([np.clip(np.arange(n) + shift, 0, n) for n in grid.shape] for shift in (-reach, reach))
     total: Floats = (

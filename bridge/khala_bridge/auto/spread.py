@@ -1,4 +1,4 @@
-"""What races do with the energy of their bases: MULEs, larvae and creep, where an agent leaves the place open."""
+"""Uses of the energy of bases: MULEs, larvae and creep, where an agent leaves the place open."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground import Land
 
 INJECTED: Final = 11
-"""The game's number of the buff of a hatchery that is to give more larvae."""
+"""The game's number of the buff of an injected hatchery."""
 HATCHERIES: Final = ("Hatchery", "Lair", "Hive")
 TUMORS: Final = ("CreepTumor", "CreepTumorBurrowed", "CreepTumorQueen")
 TUMOR_REACH: Final = 9.5
-"""How far from itself a tumor plants the next one: half a cell less than the game allows, against rounding."""
+"""Distance at which a tumor plants the next one: half a cell less than the game allows, against rounding."""
 QUEEN_REACH: Final = 30.0
-"""How far a Queen walks to plant a tumor, in world units."""
+"""Distance that a Queen walks to plant a tumor, in world units."""
 OWN_FIELD: Final = 10.0
-"""A mineral field so near to a town hall is its own."""
+"""A mineral field within this distance of a town hall is its own."""
 
 
 def mule(ask: RuleRequest) -> list[RuleOrder]:
-    """Drops a MULE on the richest mineral field of the finished bases.
+    """Drop a MULE on the richest mineral field of the finished bases.
 
     Raises:
         NotAvailable: no Orbital Command can, or there are no minerals at the bases.
@@ -55,7 +55,7 @@ def mule(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def inject(ask: RuleRequest) -> list[RuleOrder]:
-    """Lets Queens inject every finished hatchery that needs it, each the nearest one.
+    """Order Queens to inject every finished hatchery that needs it, each the nearest one.
 
     Raises:
         NotAvailable: no Queen can, or no hatchery needs it.
@@ -78,10 +78,10 @@ def inject(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def creep_tumor(ask: RuleRequest) -> list[RuleOrder]:
-    """Plants a tumor with every tumor that can, or else with one Queen, where it brings the creep on most.
+    """Plant a tumor with every tumor that can, or else with one Queen, where it spreads the creep most.
 
     Raises:
-        NotAvailable: nobody can, or there is no room on creep in sight.
+        NotAvailable: no unit can, or there is no room on creep in sight.
     """
     able = casters(ask, None)
     tumors = [unit for unit in able if name(unit) in TUMORS]
@@ -99,7 +99,7 @@ def creep_tumor(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def _edge(ask: RuleRequest, land: Land, unit: Unit, reach: float) -> WorldPoint | None:
-    """The free place on creep within reach of a unit that is farthest from all tumors and hatcheries."""
+    """Return the free place on creep, within reach of a unit, that is farthest from all tumors and hatcheries."""
     free = land.free & land.creep & (land.sight >= SEEN_NOW) & ~land.kept & ~promised(land, ask.ledger)
     away = near(land, [place(unit)], reach=reach)
     sources = [place(u) for u in of_types(ask.snapshot, (*TUMORS, *HATCHERIES))]

@@ -1,4 +1,4 @@
-"""Warping in: which gate is ready, and where in a power field there is room."""
+"""Warping in: the gate that is ready, and the free places in power fields."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ if TYPE_CHECKING:
 BODY: Final = 0.625
 """Radius of the widest unit that is warped in, a Stalker, in world units."""
 CROWD: Final = 7.0
-"""Units so near to a power field make it a crowded one."""
+"""Units within this distance make a power field crowded."""
 BESIDE: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 """A cell and its four neighbours."""
 FAST: Final = {"Nexus": 7.0, "Gateway": 6.5, "WarpGate": 6.5}
-"""How near to one of these structures a Pylon warps in fast, in world units."""
+"""Distance to one of these structures within which a Pylon warps in fast, in world units."""
 
 
 class PowerField(NamedTuple):
-    """What a model may want to know of one of its power fields before it warps in there."""
+    """A power field, as far as it matters to a model that wants to warp in there."""
 
     tag: int
     """Of the Pylon or phasing WarpPrism."""
     fast: bool
-    """Whether units are there soon after they are warped in."""
+    """Whether units warp in fast there."""
     room: bool
-    """Whether one more unit has room."""
+    """Whether there is room for one more unit."""
 
 
 def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
-    """The player's power fields, by ascending tags."""
+    """Return the player's power fields, by ascending tags."""
     ledger = ledger_of(snapshot)
     return tuple(
         PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
@@ -53,10 +53,10 @@ def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
 
 
 def warp_near(ask: RuleRequest) -> list[RuleOrder]:
-    """Warps a unit in as near to a Pylon or phasing WarpPrism as there is room.
+    """Warp a unit in as near to a Pylon or phasing WarpPrism as there is room.
 
     Raises:
-        NotAvailable: no gate is ready, the price is not there, or there is no room in that field.
+        NotAvailable: no gate is ready, the resources do not suffice, or there is no room in that field.
     """
     land = land_of(ask.snapshot)
     source = next((s for s in land.power_sources if s.tag == ask.tag), None)
@@ -78,10 +78,10 @@ def warp_near(ask: RuleRequest) -> list[RuleOrder]:
 
 
 def warp_auto(ask: RuleRequest) -> list[RuleOrder]:
-    """Warps a unit in at the field where it is soonest there and the fewest own units stand.
+    """Warp a unit in at the fastest field, and among equal ones where the fewest own units stand.
 
     Raises:
-        NotAvailable: no gate is ready, the price is not there, or no field has room.
+        NotAvailable: no gate is ready, the resources do not suffice, or no field has room.
     """
     gate = _gate(ask)
     for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _crowded(ask, source)):
@@ -100,15 +100,15 @@ def _warp(ask: RuleRequest, gate: Unit, cell: tuple[int, int]) -> list[RuleOrder
 
 
 def _gate(ask: RuleRequest) -> Unit:
-    """The gate that is ready; of several that with the least tag."""
+    """Return the gate that is ready; among several the one with the least tag."""
     return ask.snapshot.units[ask.able()[0].tag]
 
 
-# where ----------------------------------------------------------------------------------------------------------------
+# places ---------------------------------------------------------------------------------------------------------------
 
 
 def _crowded(ask: RuleRequest, source: PowerSource) -> tuple[bool, int, int]:
-    """The less, the better a field is for the next unit."""
+    """Return a rank: the lower, the better a field is for the next unit."""
     middle = (source.pos.x, source.pos.y)
     units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]
     return not _is_fast(ask.snapshot, source), len(units) + len(ask.ledger.sites), source.tag
@@ -124,7 +124,7 @@ def _is_fast(snapshot: Snapshot, source: PowerSource) -> bool:
 
 
 def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int, int] | None:
-    """The cell nearest to a source where a unit touches nobody; one with free cells beside it before others."""
+    """Return the nearest cell to a source where a unit touches no other; cells with free neighbours come first."""
     land = land_of(snapshot)
     ground = land.open & ~promised(land, ledger)
     free = ground & land.powered(corner=False, by=source.tag) & ~_bodies(snapshot, land, source)
@@ -134,7 +134,7 @@ def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int,
 
 
 def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:
-    """(w, h) the cells in whose middle a unit would touch another one, around a power source."""
+    """Return the cells (w, h) around a power source in whose middle a unit would touch another one."""
     result = np.zeros(land.ground.size, np.bool_)
     reach = source.radius + 2
     for unit in snapshot.units.values():
@@ -150,6 +150,6 @@ def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:
 
 
 def _is_neutral_ground(unit: Unit) -> bool:
-    """Whether a unit is a resource or an obstacle, whose footprint is known to the land."""
+    """Return True if a unit is a resource or an obstacle, whose footprint the land knows."""
     known = kind(unit)
     return known is not None and known.race == "neutral" and not known.speed

@@ -1,7 +1,7 @@
-"""What the host does by itself when a task says so: workers gather, town halls train them, Gateways become WarpGates.
+"""The host's own orders, if a task asks for them: workers gather, town halls train them, Gateways become WarpGates.
 
-Extra orders after those of the agents, with what these leave: never to a unit that an agent has ordered in the same
-turn, never with minerals that an agent has spent. `AutoConfig` says what is switched on; by default nothing is.
+They come after the agents' orders and use what is left: never a unit that an agent has ordered in the same turn, never
+minerals that an agent has spent. `AutoConfig` says what is switched on; by default nothing is.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AutoConfig
 
 PER_FIELD: Final = 2
-"""Workers that a mineral field keeps busy."""
+"""Workers for each mineral field."""
 PER_GAS: Final = 3
 OF_HALL: Final = 10.0
-"""Resources so near to a town hall are gathered into it."""
+"""Resources within this distance of a town hall are gathered into it."""
 MOST_WORKERS: Final = 75
-"""More are never trained by the host; the paper's figure."""
+"""Workers up to which the host trains more; the paper's figure."""
 TRAINED: Final = {
     "Nexus": "Train_Probe_quick",
     "CommandCenter": "Train_SCV_quick",
@@ -46,12 +46,12 @@ MORPH: Final = "Morph_WarpGate_quick"
 
 
 def automatic(auto: AutoConfig, snapshot: Snapshot, ledger: Ledger, ordered: frozenset[int]) -> list[RuleOrder]:
-    """The orders of the host's own that go with a joint action, deterministic.
+    """Return the host's own orders beside a joint action; deterministic.
 
     Args:
-        auto: what the host does.
+        auto: what is switched on.
         snapshot: what the agents saw.
-        ledger: what their calls left; is written on.
+        ledger: what their calls left; it is changed.
         ordered: tags of the units that agents have ordered in this turn.
     """
     taken = ordered | ledger.busy
@@ -87,7 +87,7 @@ def _can(function: str, tag: int, snapshot: Snapshot, ledger: Ledger) -> bool:
 
 
 def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int]) -> list[RuleOrder]:
-    """One worker from each idle town hall, of Larvae as many as there are town halls."""
+    """Return orders for one worker from each idle town hall; from Larvae, as many as there are town halls."""
     posts = _posts(snapshot)
     making = [order for unit in snapshot.own for order in unit.orders if order.ability_id in _trainings()]
     left = min(sum(post.room for post in posts), MOST_WORKERS - len(workers(snapshot))) - len(making)
@@ -132,7 +132,7 @@ class _Post:
 
 
 def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[RuleOrder]:
-    """Sends idle workers to work, and some from full places to those with room."""
+    """Send idle workers to work, and some from full places to those with room."""
     posts = _posts(snapshot)
     if not posts:
         return []
@@ -141,7 +141,7 @@ def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[RuleOr
 
 
 def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[RuleOrder]:
-    """Idle workers at the places that need them most, one after the other."""
+    """Yield each idle worker with the place that needs it most."""
     for worker in idle:
         post = _post_for(posts, worker)
         post.has += 1
@@ -149,7 +149,7 @@ def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[RuleOrder]:
 
 
 def _posts(snapshot: Snapshot) -> list[_Post]:
-    """Every place where workers can gather into a finished town hall, by the tags of the halls."""
+    """Return every place where workers gather for a finished town hall, by the tags of the halls."""
     land = land_of(snapshot)
     fields = [unit for unit in land.standing("mineral_field") if unit.tag in snapshot.units]
     gas = [u for u in finished(of_types(snapshot, GAS_STRUCTURES)) if u.vespene_contents > 0]
@@ -167,7 +167,7 @@ def _posts_of(hall: Unit, fields: list[Unit], gas: list[Unit]) -> Iterator[_Post
 
 
 def _post_for(posts: list[_Post], worker: Unit) -> _Post:
-    """The place for an idle worker: at the nearest town hall with room where it is emptiest, else the nearest."""
+    """Return the place for an idle worker: the emptiest at the nearest town hall with room, else the nearest."""
 
     def rank(post: _Post) -> tuple[bool, float, float, bool, int]:
         return not post.room, round(math.dist(post.hall, place(worker)), 3), post.fill, post.gas, post.target
@@ -176,7 +176,7 @@ def _post_for(posts: list[_Post], worker: Unit) -> _Post:
 
 
 def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[RuleOrder]:
-    """Workers of full places for emptier ones: to the gas of the same base, and from full bases to others."""
+    """Yield moves of workers from full places to emptier ones: to the gas of the same base, and to other bases."""
     free = [
         worker
         for worker in workers(snapshot)
@@ -195,7 +195,7 @@ def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[i
 
 
 def _gives(source: _Post, to: _Post) -> bool:
-    """Whether the mineral fields of a town hall have a worker to spare for another place."""
+    """Return True if the mineral fields of a town hall have a worker to spare for another place."""
     if to.gas and source.hall == to.hall:
         return source.fill > to.fill
     return not to.gas and source.hall != to.hall and source.has > source.wants

@@ -1,8 +1,8 @@
 """The model of a text action: an entry of the catalogue.
 
-It says what an action is called, what it takes, who may use it and in which of PySC2's functions it ends. It decides
-nothing: whether a call fits it is the business of `khala_bridge.act.recognise`, whether it may be done now that of
-`khala_bridge.act.translate`. Which actions there are is told by `khala_bridge.catalogue.catalogue`.
+It holds an action's name, its arguments, its units and the function of PySC2 that it ends in. It decides nothing:
+`khala_bridge.act.recognise` checks whether a call fits it, `khala_bridge.act.translate` whether it is possible now.
+`khala_bridge.catalogue.catalogue` lists the actions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ArgKind: TypeAlias = Literal["tag", "screen", "minimap"]
 Subject: TypeAlias = Literal["team", "unit", "two_units", "side"]
 GROUP_SELECTOR = "group:"
-"""Begins what stands in a task for all actions of a group: `group:skill`."""
+"""Begins the name that stands in a task for all actions of a group: `group:skill`."""
 
 
 class Action(Frozen):
@@ -28,30 +28,30 @@ class Action(Frozen):
     name: str = ""
     args: tuple[ArgKind, ...] = ()
     about: str
-    """What a model is told of it."""
+    """Its description for a model."""
     group: str = "basic"
-    """Kind of action, by which tasks can ask for many at once: `basic`, `skill`, `train`, …"""
+    """Kind of action, so that tasks can ask for many at once: `basic`, `skill`, `train`, …"""
     race: Literal["protoss", "terran", "zerg"] | None = None
-    """Whose it is; None for every race."""
+    """The race that has it; None for every race."""
     aliases: tuple[str, ...] = ()
     """Other spellings of the name, as the paper or its code has them."""
     subject: Subject = "team"
-    """Who carries it out: the whole team, the unit or the two units that the first arguments name, or units of the
+    """The units that carry it out: the whole team, the one or two units that the first arguments name, or units of the
     whole side that its rule chooses."""
     units: tuple[str, ...] = ()
-    """Unit types that have it, for `side` those that carry it out; () for every type."""
+    """Unit types that have it; for `side` those that carry it out; () for every type."""
     function: str | None = None
     """PySC2's function that it ends in, as in `FUNCTIONS`; None for an action that orders nothing."""
     aim: Literal["unit", "place"] = "unit"
-    """Whether a tag names the target itself, or only the place where it stands."""
+    """Whether a tag names the target itself, or only its place."""
     target: Literal["enemy", "own"] | None = None
-    """Whose unit the target may be; None for anybody's."""
+    """Owner of the target; None for any owner."""
     queue: bool = False
-    """Whether it waits for the orders that the unit was given earlier in the same reply."""
+    """Whether it waits for the unit's earlier orders of the same reply."""
     rule: str | None = None
-    """Rule of `khala_bridge.auto` that finds who carries it out, or where; None if the words say it all."""
+    """Rule of `khala_bridge.auto` that finds the unit or the place; None if the call leaves nothing open."""
     produces: str | None = None
-    """Unit type or upgrade that comes of it."""
+    """Unit type or upgrade that it produces."""
 
     @property
     def named(self) -> int:
@@ -60,7 +60,7 @@ class Action(Frozen):
 
     @property
     def target_kind(self) -> ArgKind | None:
-        """What the target is given as; None for an action without a target."""
+        """The kind of the target argument; None for an action without a target."""
         return self.args[self.named] if len(self.args) > self.named else None
 
     @property
@@ -75,9 +75,9 @@ class Action(Frozen):
 
     @functools.cached_property
     def spec(self) -> ActionSpec:
-        """What an agent is told of it."""
+        """The action as an agent's briefing describes it."""
         return ActionSpec(name=self.name, args=self.args, description=self.about)
 
     def fits(self, unit_type: str) -> bool:
-        """Whether units of this type have it at all."""
+        """Return True if units of this type have it."""
         return not self.units or unit_type in self.units

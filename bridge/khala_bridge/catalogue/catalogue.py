@@ -1,9 +1,9 @@
-"""The catalogue of text actions: those that were written by hand, and those that follow from PySC2's functions.
+"""The catalogue of text actions: those written by hand, and those generated from PySC2's functions.
 
 The files of `bridge/khala_bridge/data/actions/` hold the actions of the paper and others that deserve words of their
-own; `khala_bridge.catalogue.generated` makes one of every function that none of them stands for, and the forms for a
-single unit. What contradicts itself or PySC2's functions is found while the whole is loaded. It does not import PySC2:
-that PySC2 has every function that is named here is checked where a game starts.
+own. `khala_bridge.catalogue.generated` adds an action for every other function, and the forms for a single unit.
+Loading finds contradictions among actions and with PySC2's functions. It does not import PySC2: the start of a game
+checks that PySC2 has every function that is named here.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ GROUPS = {
     "easy-control": "The whole army, and scouts.",
     GENERATED: "Made by rule: for functions of PySC2 that no other action stands for, and for one unit alone.",
 }
-"""The groups of actions that a task can ask for, in the order in which they are shown, and what is in them."""
+"""The groups of actions that a task can ask for, in the order in which they are shown, with their contents."""
 _KEY = re.compile(r"  (\w+):")
 """Begins an action in a file."""
 
 
 @functools.cache
 def catalogue() -> dict[str, Action]:
-    """Every text action by name: the files in the order of their names, then what follows from them.
+    """Return every text action by name: the files in the order of their names, then the generated ones.
 
     Raises:
         CatalogueError: an entry contradicts another one or PySC2's functions.
@@ -82,7 +82,7 @@ def catalogue() -> dict[str, Action]:
 
 @functools.cache
 def curated() -> dict[str, Action]:
-    """The actions of the files, by name.
+    """Return the actions of the files, by name.
 
     Raises:
         CatalogueError: an entry contradicts another one or PySC2's functions.
@@ -91,10 +91,10 @@ def curated() -> dict[str, Action]:
 
 
 def read(*files: Path) -> dict[str, Action]:
-    """The actions of some files, by name, in their order.
+    """Return the actions of some files, by name, in their order.
 
     Raises:
-        CatalogueError: what is wrong, with the file and the line in which the action begins.
+        CatalogueError: an entry is wrong; the text names the file and the line in which the action begins.
     """
     found: dict[str, Action] = {}
     spellings = _Spellings()
@@ -119,7 +119,7 @@ def _action(place: str, fields: dict[str, Any]) -> Action:
 
 
 def _lines(file: Path) -> dict[str, list[int]]:
-    """Numbers of the lines in which actions begin, by name."""
+    """Return the numbers of the lines in which actions begin, by name."""
     found: dict[str, list[int]] = {}
     for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
         if match := _KEY.match(line):
@@ -128,7 +128,7 @@ def _lines(file: Path) -> dict[str, list[int]]:
 
 
 def _twice(lines: list[int]) -> str | None:
-    """YAML takes the last of several equal keys without a word."""
+    """Return what is wrong if a name stands in several lines; YAML silently takes the last of several equal keys."""
     return f"it stands in line {lines[0]} as well" if len(lines) > 1 else None
 
 
@@ -139,20 +139,20 @@ def _by_any_name() -> dict[str, Action]:
 
 
 def alias_of(name: str) -> Action | None:
-    """The action of this name or alias, in any case of letters; None if there is none."""
+    """Return the action of this name or alias, in any case of letters; None if there is none."""
     return _by_any_name().get(name.casefold())
 
 
 def chosen(names: Iterable[str], unit_type: str | None = None) -> tuple[str, ...]:
-    """Names of actions, with each `group:<name>` replaced by the actions of that group, each once.
+    """Return the names of actions, with each `group:<name>` replaced by the actions of that group, each once.
 
     Args:
         names: names of actions and groups; `group:<name>/<race>` takes only those of one race and of every race.
-        unit_type: of a group only what units of this type have, and no more than they are told one by one; None for
-            the actions of a side.
+        unit_type: of a group, take only the actions of teams and single units that units of this type have; None to
+            take only those of a side.
 
     Raises:
-        ValueError: there is no such group, or a side is given actions of several races.
+        ValueError: there is no such group, or a side has actions of several races.
     """
     found: dict[str, None] = {}
     for name in names:
@@ -184,14 +184,14 @@ def _close(name: str, known: Iterable[str]) -> str:
 
 
 def example(action: Action) -> str:
-    """A call as an agent would write it, with made-up arguments."""
+    """Return a call as an agent would write it, with made-up arguments."""
     tags = iter(("0x1002c0001", "0x100340002"))
     points = {"screen": "[15, 9]", "minimap": "[40, 25]"}
     return f"<{action.name}({', '.join(points.get(kind) or next(tags) for kind in action.args)})>"
 
 
 def catalogue_sha256() -> str:
-    """Hash of the whole catalogue, for the run card."""
+    """Return the hash of the whole catalogue, for the run card."""
     digest = hashlib.sha256()
     for action in catalogue().values():
         digest.update(action.model_dump_json().encode())
@@ -205,7 +205,7 @@ class _Spellings:
         self._owners: dict[str, str] = {}
 
     def add(self, action: Action) -> str | None:
-        """Takes an action's names; what is wrong if another one has one of them."""
+        """Add an action's names; return what is wrong if another action has one of them."""
         for name in (action.name, *action.aliases):
             owner = self._owners.setdefault(name.casefold(), action.name)
             if owner != action.name or (name != action.name and name.casefold() == action.name.casefold()):

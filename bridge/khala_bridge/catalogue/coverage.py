@@ -1,4 +1,4 @@
-"""Which text actions end in which of PySC2's functions, for all of them: the proof that the catalogue is complete.
+"""The text actions that end in each of PySC2's functions: the proof that the catalogue is complete.
 
 Above it: the pages of the documentation, and `khala actions --functions`. Below it: the catalogue.
 """
@@ -14,18 +14,18 @@ from khala_bridge.catalogue.generated import without_words
 
 
 class Coverage(NamedTuple):
-    """One function, and how it is reached."""
+    """One function, and the text actions that reach it."""
 
     function: Function
     actions: tuple[str, ...]
     """Names of the text actions that end in it, in the order of the catalogue."""
     reason: str
-    """Why there is none; empty if there is one."""
+    """Why there is no action; empty if there is one."""
 
 
 @functools.cache
 def coverage() -> tuple[Coverage, ...]:
-    """Every function of PySC2 once, in the order of their ids."""
+    """Return every function of PySC2 once, in the order of their ids."""
     found: dict[str, list[str]] = {name: [] for name in functions()}
     for action in catalogue().values():
         if action.function is not None:

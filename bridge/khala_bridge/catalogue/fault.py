@@ -1,6 +1,6 @@
-"""Whether a text action can be what it says: its arguments, its function in PySC2, its unit types.
+"""The check of a text action: its arguments, its function in PySC2, its unit types.
 
-Pure and about one action alone; that names are unique is the business of `khala_bridge.catalogue.catalogue`, above it.
+Pure and about one action alone; `khala_bridge.catalogue.catalogue`, above it, checks that names are unique.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ _TARGETS: dict[str, frozenset[ArgKind | None]] = {
     "minimap": frozenset({"minimap"}),
     "interface": frozenset({None}),
 }
-"""What the target of an action may be, by the kind of the function that it ends in."""
+"""Possible targets of an action, by the kind of the function that it ends in."""
 _LEFT_OPEN: dict[str, frozenset[ArgKind | None]] = {
     "quick": frozenset({None, "tag"}),
     "screen": frozenset({None, "tag", "screen", "minimap"}),
     "minimap": frozenset({None, "tag", "minimap"}),
 }
-"""The same for actions with a rule, which finds the target, or which the tag tells what to do it with."""
+"""The same for actions with a rule, which finds the target or takes the tag as a unit to work with."""
 
 
 def fault(action: Action) -> str | None:
-    """What is wrong with an action, in a sentence; None if nothing is."""
+    """Return what is wrong with an action, in a sentence; None if nothing is."""
     return _of_subject(action) or _of_types(action) or _of_function(action)
 
 

@@ -1,10 +1,9 @@
 """PySC2's functions as a table: every entry of its `FUNCTIONS`, and the forms that `RAW_FUNCTIONS` has of an ability.
 
-PySC2 takes seconds to import; lists of tasks and actions need only names and numbers, and read them from
-`bridge/khala_bridge/data/functions.tsv`, which `python -m khala_bridge.catalogue.functions` writes anew from the PySC2
-that is installed.
-`check_against_pysc2` makes sure, where PySC2 is loaded anyway, that both still say the same.
-Nothing here knows text actions: they are `khala_bridge.catalogue.catalogue`'s.
+PySC2 takes seconds to import. Lists of tasks and actions need only names and numbers, and read them from
+`bridge/khala_bridge/data/functions.tsv`, which `python -m khala_bridge.catalogue.functions` writes from the installed
+PySC2. `check_against_pysc2` checks, where PySC2 is loaded anyway, that both still agree.
+Nothing here knows text actions: these are in `khala_bridge.catalogue.catalogue`.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ FILE = "functions.tsv"
 Kind: TypeAlias = Literal["quick", "screen", "minimap", "autocast", "interface"]
 RawForm: TypeAlias = Literal["quick", "pt", "unit", "autocast"]
 _RAW = "raw"
-"""What stands in the column of ids for the raw forms of an ability."""
+"""Mark in the column of ids for the raw forms of an ability."""
 
 
 class Function(NamedTuple):
@@ -36,40 +35,40 @@ class Function(NamedTuple):
     ability_id: int
     """Ability that it stands for; 0 for those of the interface."""
     general_id: int
-    """Ability of which this one is a special case, as `Effect_Stim` is of `Effect_Stim_Marine`; 0 for none."""
+    """General ability of which this one is a special case, as `Effect_Stim` is of `Effect_Stim_Marine`; 0 for none."""
     kind: Kind
-    """What it takes as its target; `interface` for camera, selection and the like."""
+    """Kind of its target; `interface` for camera, selection and the like."""
 
     @property
     def stem(self) -> str:
-        """Its name without the ending that says what it takes: `Effect_Blink`."""
+        """Its name without the ending for its arguments: `Effect_Blink`."""
         return self.name if self.kind == "interface" else self.name.removesuffix(f"_{self.kind}")
 
 
 @functools.cache
 def functions() -> dict[str, Function]:
-    """Every function by its name, in the order of their ids."""
+    """Return every function by its name, in the order of their ids."""
     return {row.name: row for row in _rows() if isinstance(row, Function)}
 
 
 @functools.cache
 def functions_of(ability: int) -> tuple[Function, ...]:
-    """The functions that stand for an ability, in the order of their ids."""
+    """Return the functions that stand for an ability, in the order of their ids."""
     return tuple(function for function in functions().values() if ability and function.ability_id == ability)
 
 
 def general(ability: int) -> int:
-    """The general ability that a special one belongs to; itself if there is none."""
+    """Return the general ability that a special one belongs to; itself if there is none."""
     return _generals().get(ability, ability)
 
 
 def raw_forms(ability: int) -> frozenset[RawForm]:
-    """How PySC2's raw interface takes the target of an ability; empty for one that it does not have."""
+    """Return the kinds of target that PySC2's raw interface has for an ability; empty if it lacks the ability."""
     return _raw_forms().get(ability, frozenset())
 
 
 def check_against_pysc2() -> None:
-    """Compares the table with the PySC2 that is installed.
+    """Compare the table with the installed PySC2.
 
     Raises:
         CatalogueError: they differ; the text names the first difference.
@@ -88,7 +87,7 @@ def check_against_pysc2() -> None:
 
 
 def write() -> None:
-    """Writes the table from the PySC2 that is installed."""
+    """Write the table from the installed PySC2."""
     with data.path(FILE).open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, delimiter="\t", lineterminator="\n").writerows(map(_written, _from_pysc2()))
 

@@ -1,14 +1,13 @@
-"""Text actions that follow from PySC2's functions, so that every function can be reached in words.
+"""Text actions generated from PySC2's functions, so that words reach every function.
 
-Two rules. A function that no written action stands for gets one of its own, named as PySC2 names it and ended by what
-it takes: `Effect_Stim()`, `Effect_Blink_Stalker_Screen([x, y])`, `Rally_Building_Minimap([x, y])`,
-`Effect_Charge_Unit(tag)`, `Effect_Heal_Autocast()`. And whatever a whole team can be told, and whatever the host finds
-a producer for, can be told to one unit: `Select_Unit_<name>(tag, ...)`.
+Two rules. A function without a written action gets one of its own, with PySC2's name and an ending for its arguments:
+`Effect_Stim()`, `Effect_Blink_Stalker_Screen([x, y])`, `Rally_Building_Minimap([x, y])`, `Effect_Charge_Unit(tag)`,
+`Effect_Heal_Autocast()`. And every action for a whole team, and every action for which the host finds a producer, has
+a form for one unit: `Select_Unit_<name>(tag, ...)`.
 
-Functions without words, those of the interface and of what the game no longer has, are listed with their reasons in a
-file that `khala_bridge.catalogue.coverage` shows. Below this module: the table of functions and what is known of
-abilities. Above it:
-`khala_bridge.catalogue.catalogue`, which checks what it makes.
+A file lists the functions without words, with their reasons: those of the interface and of what the game no longer
+has; `khala_bridge.catalogue.coverage` shows them. Below this module: the table of functions and the facts about
+abilities. Above it: `khala_bridge.catalogue.catalogue`, which checks its results.
 """
 
 from __future__ import annotations
@@ -32,16 +31,16 @@ if TYPE_CHECKING:
 GROUP: Final = "generated"
 WITHOUT_WORDS: Final = "functions_without_words.yaml"
 UNFINISHED: Final = "cancel_building"
-"""Rule for what is still in the making, which belongs to no team that could be told."""
+"""Rule for structures under construction, which belong to no team."""
 _AT_ONCE: Final = ("Cancel", "Halt", "Stop")
-"""Beginnings of functions that end orders, and so never wait for them."""
+"""First parts of the names of functions that end orders, and so never wait for them."""
 _LEVEL: Final = re.compile(r"(\w+)Level(\d)")
 _PRODUCING: Final = frozenset({"train", "research"})
-"""Rules that choose a producer, which the agent can name instead."""
+"""Rules that choose a producer; the agent can name one instead."""
 
 
 class Form(NamedTuple):
-    """One way to tell a function to units: what is added to its name, and what stands in the parentheses."""
+    """One text form of a function: the ending of its name, and its arguments in parentheses."""
 
     ending: str
     args: tuple[ArgKind, ...]
@@ -59,13 +58,13 @@ _FORMS: Final = {
 
 @functools.cache
 def without_words() -> dict[str, str]:
-    """Functions of PySC2 that no text action ends in, with the reason."""
+    """Return the functions of PySC2 that no text action ends in, with the reason."""
     reasons: dict[str, str] = data.document(WITHOUT_WORDS)
     return reasons
 
 
 def generated(curated: Mapping[str, Action]) -> Iterator[Action]:
-    """The actions that the written ones leave out: of whole teams and of the side first, of single units after them."""
+    """Yield the actions that are not written by hand: first for teams and the side, then for single units."""
     taken = {name.casefold() for action in curated.values() for name in (action.name, *action.aliases)}
     made = [action for action in _of_functions(curated) if action.name.casefold() not in taken]
     yield from made
@@ -78,7 +77,7 @@ def generated(curated: Mapping[str, Action]) -> Iterator[Action]:
 
 
 def forms(function: Function) -> tuple[Form, ...]:
-    """The ways in which a function can be told, by what its ability may be aimed at."""
+    """Return the text forms of a function, by the possible targets of its ability."""
     if function.kind == "interface":
         return ()
     if function.kind != "screen":
@@ -98,7 +97,7 @@ def _of_functions(curated: Mapping[str, Action]) -> Iterator[Action]:
 
 
 def _of_function(function: Function, form: Form, like: Action | None) -> Action:
-    """The action of one form of a function; `like` is that of the general function which this is a case of."""
+    """Return the action for one form of a function; `like` is the action of its general function."""
     facts = abilities()[function.ability_id]
     research = facts.does == "research"
     units = _users(facts)
@@ -123,13 +122,13 @@ def _kind(form: Form) -> ArgKind | None:
 
 
 def _general(function: Function) -> str:
-    """The function for the general case of a special one; itself if there is none."""
+    """Return the function for the general case of a special one; itself if there is none."""
     cases = functions_of(function.general_id) if function.general_id else ()
     return next((case.name for case in cases if case.kind == function.kind), function.name)
 
 
 def _for_one_unit(action: Action) -> Action | None:
-    """The same told to one unit that is named; None where there is nothing that one unit could do by itself."""
+    """Return the form of an action for one named unit; None if one unit alone cannot do it."""
     producing = action.subject == "side" and action.rule in _PRODUCING
     if action.function is None or not (action.subject == "team" or producing):
         return None
@@ -148,12 +147,12 @@ def _for_one_unit(action: Action) -> Action | None:
 
 
 def _sense(action: Action) -> tuple[str | None, ArgKind | None, str]:
-    """What an action comes to, whatever it is called."""
+    """Return what an action does, apart from its name."""
     return action.function, action.target_kind, action.aim
 
 
 def _target(ability: int) -> frozenset[Literal["point", "unit"]]:
-    """What an ability, or any of the special cases of a general one, may be aimed at."""
+    """Return the possible targets of an ability, or of any special case of a general one."""
     facts = abilities()[ability]
     cases = [abilities()[case] for case in facts.special] or [facts]
     found = {kind for case in cases for kind in ("point", "unit") if kind in case.target.split("_")}
@@ -162,14 +161,14 @@ def _target(ability: int) -> frozenset[Literal["point", "unit"]]:
 
 
 def _whose(facts: AbilityFacts) -> Literal["enemy", "own"] | None:
-    """Whose unit a target may be, by what it may not be."""
+    """Return the owner that a target must have, by its filters."""
     if "enemy" in facts.must_not:
         return "own"
     return "enemy" if {"self", "ally"} & set(facts.must_not) and "player" in facts.must_not else None
 
 
 def _users(facts: AbilityFacts) -> tuple[str, ...]:
-    """The types that have an ability, without critters and without what no player of the version can have."""
+    """Return the types that have an ability, without critters and types that no player of the version can have."""
     users = [user for user in facts.users if knowledge()[user].race != "neutral"]
     return tuple(user for user in users if knowledge()[user].melee) or tuple(users)
 
@@ -181,7 +180,7 @@ def _race(users: tuple[str, ...]) -> Literal["protoss", "terran", "zerg"] | None
 
 
 def _words(function: Function, facts: AbilityFacts) -> str:
-    """What is known of the ability in words, or what its name says."""
+    """Return the description of an ability, or one made from its name."""
     if facts.about:
         return facts.about
     kind, _, rest = function.stem.partition("_")

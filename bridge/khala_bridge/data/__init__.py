@@ -1,8 +1,8 @@
 """Data files of the bridge and the one way to read them.
 
 `actions/` (text actions), `functions.tsv` (PySC2's functions), `maps.yaml`, `knowledge/` (unit types); SOURCES.md
-says where the facts come from. They are part of the program: a fault in them is a bug, found by the tests, not an error
-to explain to a user.
+names the sources of the facts. They are part of the program: a fault in them is a bug for the tests to find, not an
+error to explain to a user.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ _HERE = Path(__file__).parent
 
 
 def path(name: str | Path) -> Path:
-    """Where a data file is; an absolute path is left as it is."""
+    """Return the path of a data file; an absolute path stays as it is."""
     return _HERE / name
 
 
 def document(name: str | Path) -> Any:
-    """What stands in a YAML file, here or somewhere else."""
+    """Return the content of a YAML file, here or somewhere else."""
     return yaml.load(path(name).read_bytes(), Loader=_LOADER)  # noqa: S506  # a safe loader in both cases
 
 
 def table(name: str, model: type[M]) -> dict[str, M]:
-    """The entries of a data file by their name, in the order of the file."""
+    """Return the entries of a data file by name, in the order of the file."""
     return TypeAdapter(dict[str, model]).validate_python(document(name))  # type: ignore[valid-type]  # a type known at run time

@@ -1,11 +1,11 @@
-"""The game as the rest of Khala knows it: a thing that is reset, played with plans, and closed.
+"""The interface of a game: reset it, play plans, close it.
 
 `Game` is blocking, and one thread may use it. `GameThread` runs one in a thread of its own, so that a match can await
-it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`; no code above this module
-knows whether it talks to StarCraft II or to Khala's simulator, which is only a matter of the directory in `GameConfig`.
+it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`. No code above this module
+knows whether it uses StarCraft II or Khala's simulator: they differ only in the directory in `GameConfig`.
 
-Players are the ones that Khala plays, in the order of the configuration: one now, two later; so a game has a tuple of
-snapshots and not one. `OneSide` is the game as a match with one side has it: commands in, one snapshot out.
+Players are those that Khala plays, in the order of the configuration: one now, two later; so a game returns a tuple of
+snapshots and not one. `OneSide` is the game of a match with one side: commands in, one snapshot out.
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ T = TypeVar("T")
 
 
 class GameConfig(Frozen):
-    """Which game is started, and how."""
+    """Which game to start, and how."""
 
     sc2path: Path
-    """Directory of the install, laid out as StarCraft II is; SC2PATH points to it while PySC2 looks for it."""
+    """Directory of the install, in the layout of StarCraft II; SC2PATH points to it while PySC2 looks for it."""
     map: MapSpec
     seed: int | None = None
-    """Of the first episode; the next ones count up from it. None leaves it to the game."""
+    """Of the first episode; the next ones count up from it. None: the game chooses."""
     screen_px: int = 128
     """Resolution of the feature layers of the screen, which shows 24 world units."""
     minimap_px: int = 64
     render_px: int | None = None
-    """Resolution of the real pictures of the screen and the minimap, for a game that can draw; None for none."""
+    """Resolution of the rendered pictures of the screen and the minimap, for a game that can draw; None for none."""
     limit_loops: int | None = None
-    """Game loops after which an episode ends without a result; None leaves it to the map."""
+    """Game loops after which an episode ends without a result; None: the map decides."""
     abilities: bool = True
     """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
     start_timeout_s: int = 120
-    """How long the game may take until it listens."""
+    """Time limit until the game listens."""
 
     @property
     def camera_width(self) -> float:
@@ -63,7 +63,7 @@ class GameConfig(Frozen):
 
 @dataclass(frozen=True, slots=True)
 class GameIdentity:
-    """What plays, for the run card."""
+    """Identity of the game, for the run card."""
 
     version: str
     """As the game says it, `4.10.0.75689`."""
@@ -74,7 +74,7 @@ class GameIdentity:
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What became of one player's plan."""
+    """The result of one player's plan."""
 
     snapshot: Snapshot
     played: Played
@@ -90,16 +90,16 @@ class Game(Protocol):
         """What plays."""
 
     def reset(self) -> tuple[Snapshot, ...]:
-        """Begins an episode; a snapshot for each player."""
+        """Begin an episode; return a snapshot for each player."""
 
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
-        """Plays one plan of each player to its end, or to the end of the episode, which must not be over yet."""
+        """Play one plan of each player to its end, or to the end of the episode, which must not be over yet."""
 
     def kill(self) -> None:
-        """Ends the game at once; the only method that another thread may call."""
+        """End the game at once; the only method that another thread may call."""
 
     def close(self) -> None:
-        """Ends the game in good order; may be called twice."""
+        """End the game in good order; may be called twice."""
 
 
 class GameThread:
@@ -109,7 +109,7 @@ class GameThread:
     """
 
     def __init__(self, start: Callable[[], Game], *, hang_s: float | None = 120.0) -> None:
-        """Prepares a game.
+        """Prepare a game without starting it.
 
         Args:
             start: makes the game; runs in the thread.
@@ -121,7 +121,7 @@ class GameThread:
         self._game: Game | None = None
 
     async def __aenter__(self) -> Self:
-        """Starts the game."""
+        """Start the game."""
         try:
             self._game = await asyncio.get_running_loop().run_in_executor(self._threads, self._start)
         except BaseException:
@@ -132,9 +132,9 @@ class GameThread:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Closes the game, or kills it if it does not let itself be closed."""
+        """Close the game, or kill it if it does not close."""
         try:
-            with contextlib.suppress(GameHangs):  # it is gone, which was wanted
+            with contextlib.suppress(GameHangs):  # it is gone, as wanted
                 await self._run(self._playing.close)
         finally:
             self._threads.shutdown(wait=False)
@@ -145,11 +145,11 @@ class GameThread:
         return self._playing.info
 
     async def reset(self) -> tuple[Snapshot, ...]:
-        """Begins an episode; a snapshot for each player."""
+        """Begin an episode; return a snapshot for each player."""
         return await self._run(self._playing.reset)
 
     async def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
-        """Plays one plan of each player to its end, or to the end of the episode."""
+        """Play one plan of each player to its end, or to the end of the episode."""
         return await self._run(functools.partial(self._playing.act, plans))
 
     @property
@@ -175,21 +175,21 @@ class OneSide:
     """A game in which Khala plays one side; an async context manager around its thread."""
 
     def __init__(self, thread: GameThread, executor: Executor, *, step_loops: int) -> None:
-        """Takes a game that is not entered yet, how to play commands, and how many loops pass between two decisions."""
+        """Take a game that is not entered yet, an executor, and the number of loops between two decisions."""
         self._thread = thread
         self._executor = executor
         self._step_loops = step_loops
         self._now: Snapshot | None = None
 
     async def __aenter__(self) -> Self:
-        """Starts the game."""
+        """Start the game."""
         await self._thread.__aenter__()
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Closes the game."""
+        """Close the game."""
         await self._thread.__aexit__(kind, error, trace)
 
     @property
@@ -198,13 +198,13 @@ class OneSide:
         return self._thread.info
 
     async def reset(self) -> Snapshot:
-        """Begins an episode."""
+        """Begin an episode; return its first snapshot."""
         self._executor.begin()
         (self._now,) = await self._thread.reset()
         return self._now
 
     async def act(self, commands: Sequence[Command]) -> StepResult:
-        """Plays the commands of a joint action, and lets the game loops of a step pass."""
+        """Play the commands of a joint action for the game loops of one step."""
         assert self._now is not None, "the game is reset before it is played"
         (result,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
         self._now = result.snapshot
@@ -212,12 +212,12 @@ class OneSide:
 
 
 def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str, str] = os.environ) -> Path:
-    """The directory of the game that a configuration asks for.
+    """Return the directory of the configured game.
 
     Args:
-        source: `simulator`, `starcraft2` (found by SC2PATH, else where its installer puts it), or a directory.
-        simulator: where the simulator is installed; callers that may know it pass it here.
-        environ: where SC2PATH is looked up.
+        source: `simulator`, `starcraft2` (by SC2PATH, else at the installer's default place), or a directory.
+        simulator: where the simulator is installed; callers that may know it pass it.
+        environ: the environment with SC2PATH.
 
     Raises:
         GameMissing: there is no game; the text says what to do.
@@ -234,10 +234,10 @@ def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str
 
 
 def check_install(directory: Path, *, told_by: str = "") -> Path:
-    """Returns `directory` if a game is installed in it.
+    """Return `directory` if a game is installed in it.
 
     Raises:
-        GameMissing: it is not.
+        GameMissing: there is no game in it.
     """
     where = f"{directory} ({told_by})" if told_by else str(directory)
     if not directory.is_dir():

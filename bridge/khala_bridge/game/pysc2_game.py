@@ -1,8 +1,8 @@
-"""A game on PySC2: the unmodified `SC2Env`, told what to do by plans.
+"""A game on PySC2: plans drive the unmodified `SC2Env`.
 
-PySC2 starts the game that SC2PATH names, speaks its API and checks what goes in and out; here its observations become
-snapshots, and what it raises becomes a `GameError` that says what to do. The proto of an observation is kept, since
-positions in world units are only there. It knows no agent, no team and no text.
+PySC2 starts the game that SC2PATH names, speaks its API and checks inputs and outputs. Here its observations become
+snapshots, and its exceptions become a `GameError` that says what to do. The proto of an observation is kept, since
+only it has positions in world units. This module knows no agent, no team and no text.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from khala_bridge.task.maps import MapSpec
 
 _PLACING_LOOPS = 16
-"""Loops that a map's script may take until the first unit stands; the battles need none or one."""
+"""Loops that a map's script may take until it places the first unit; the battles need none or one."""
 _environment = threading.Lock()
 
 
@@ -44,12 +44,12 @@ class PySC2Game:
     """One player against the computer, on `SC2Env`."""
 
     def __init__(self, config: GameConfig) -> None:
-        """Starts the game.
+        """Start the game.
 
         Raises:
             GameMissing: there is no game or no such map in the install.
             GameError: it could not be started.
-            CatalogueError: this PySC2 has other functions than the text actions were made for.
+            CatalogueError: the functions of this PySC2 are not those of the text actions.
         """
         self._config = config
         self._asks = config.abilities
@@ -75,10 +75,10 @@ class PySC2Game:
         return self._info
 
     def reset(self) -> tuple[Snapshot, ...]:
-        """Begins an episode, and waits for the map's script to place its units."""
+        """Begin an episode, and waits for the map's script to place its units."""
         with _explained("a new episode could not be begun"):
             if self._config.seed is not None:
-                # `SC2Env` would begin every episode with the same seed, and has no other way to be told
+                # `SC2Env` would begin every episode with the same seed, and has no parameter for another one
                 self._env._random_seed = self._config.seed + self._episode  # noqa: SLF001
             steps = self._env.reset()
             self._episode += 1
@@ -91,7 +91,7 @@ class PySC2Game:
             return self._with_abilities(snapshots)
 
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
-        """Plays one plan of each player, step by step, all players in the same steps."""
+        """Play one plan of each player, step by step, all players in the same steps."""
         if self._ended:
             raise GameError("the episode is over: the game has to be reset before it is played on")
         players = [_Player(plan) for plan in plans]
@@ -111,14 +111,14 @@ class PySC2Game:
         return tuple(StepResult(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
 
     def kill(self) -> None:
-        """Kills the game's processes; a call that waits for them fails then."""
+        """Kill the game's processes; a call that waits for them fails then."""
         for process in self._env._sc2_procs or ():  # noqa: SLF001  # the only way to a process that hangs
             if process.running:
                 process._proc.kill()  # noqa: SLF001
 
     def close(self) -> None:
-        """Ends the game in good order; may be called twice."""
-        with contextlib.suppress(Exception):  # it may be dead already, and nothing is left to be done about it
+        """End the game in good order; may be called twice."""
+        with contextlib.suppress(Exception):  # it may be dead already, and then there is nothing to do
             self._env.close()
 
     def _snapshots(self, steps: Iterable[Any], before: Sequence[Snapshot] = ()) -> tuple[Snapshot, ...]:
@@ -140,7 +140,7 @@ class PySC2Game:
         return tuple(made)
 
     def _with_abilities(self, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
-        """Asks once for each player what its units can do; a game that is over takes no questions."""
+        """Ask once for each player what its units can do; a finished game takes no questions."""
         if self._ended or not self._asks:
             return tuple(snapshots)
         controllers = self._env._controllers  # noqa: SLF001  # `SC2Env` has no query of its own
@@ -166,7 +166,7 @@ class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
 
 
 class _Player:
-    """One plan while it is played: the step that it wants next, and how much of it has passed."""
+    """One plan while it is played: its next step, and how much of that step has passed."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
@@ -176,12 +176,12 @@ class _Player:
         self._advance(None)
 
     def actions(self) -> list[GameAction]:
-        """What enters the game now: the step's actions, once."""
+        """Return the actions of the step, once."""
         fresh, self._fresh = self._fresh, False
         return list(self.step.actions) if self.step and fresh else []
 
     def pass_loops(self, loops: int, snapshot: Snapshot) -> None:
-        """Lets game loops pass; a step that is over gives way to the next one."""
+        """Count game loops that have passed; when the step is over, go on to the next one."""
         if self.step is None:
             return
         if self.step.loops > loops and not snapshot.ended:
@@ -190,7 +190,7 @@ class _Player:
             self._advance(snapshot)
 
     def close(self) -> None:
-        """Ends a plan that the end of the episode cut short."""
+        """End a plan that the end of the episode cut short."""
         self._plan.close()
 
     def _advance(self, snapshot: Snapshot | None) -> None:
@@ -223,14 +223,14 @@ def _start(config: GameConfig) -> Any:
         use_feature_units=True,
         use_raw_units=True,
         send_observation_proto=True,
-        hide_specific_actions=False,  # a general action would do what the unit can, not what was said
+        hide_specific_actions=False,  # a general action would do what the unit can, not what the call says
     )
     players: list[Any] = [sc2_env.Agent(sc2_env.Race[config.map.race], "Khala")]
     if config.map.opponent is not None:
-        # the build `random` would be drawn from Python's own generator
+        # PySC2 would draw the build `random` from Python's own generator
         difficulty, build = sc2_env.Difficulty[config.map.difficulty], sc2_env.BotBuild.macro
         players.append(sc2_env.Bot(sc2_env.Race[config.map.opponent], difficulty, build))
-    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; their defaults are wanted, not our command line
+    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
         flags.FLAGS.mark_as_parsed()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
     env = object.__new__(sc2_env.SC2Env)  # kept while it starts, so that a start that fails leaves no process
@@ -252,7 +252,7 @@ def _start(config: GameConfig) -> Any:
 
 @contextlib.contextmanager
 def _sc2path(directory: Path) -> Iterator[None]:
-    """Lets PySC2 find this install; it reads SC2PATH once, while it starts."""
+    """Point SC2PATH to this install; PySC2 reads it once, while it starts."""
     with _environment:
         before = os.environ.get("SC2PATH")
         os.environ["SC2PATH"] = str(directory)
@@ -267,7 +267,7 @@ def _sc2path(directory: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _explained(what: str) -> Iterator[None]:
-    """Turns whatever PySC2 raises into an error for the user; it has no common base."""
+    """Turn any exception of PySC2 into an error for the user; they have no common base class."""
     try:
         yield
     except GameError:

@@ -1,4 +1,4 @@
-"""What is known of the game: unit types, abilities, upgrades of every race, with facts and words.
+"""Knowledge of the game: unit types, abilities and upgrades of every race, as facts and as words.
 
     knowledge()  unit types by name    abilities()  by id    upgrades(), buffs()  by name
 
@@ -6,8 +6,8 @@
     facts   reads what was generated, by version       load    facts and words together, once
     prompt  the lines of a prompt                      lookup  everything, for people
 
-What happens in a running game is no knowledge but an observation: health, energy and the like of a unit come from
-there; here is what the game does not say of an enemy, and what an order would cost and need.
+The state of a running game is not knowledge but observation: a unit's health and energy come from there. Here is what
+the game does not say of an enemy, and what an order costs and needs.
 """
 
 from khala_bridge.knowledge.facts import VERSION, VERSIONS

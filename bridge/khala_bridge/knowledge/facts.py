@@ -1,7 +1,7 @@
-"""The facts of a version of the game, as they were generated: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
+"""The generated facts of a version of the game: `bridge/khala_bridge/data/knowledge/<version>/*.json`.
 
-`khala knowledge write` makes the files out of the simulator's tables. There are no words in them yet: `load` adds
-these. Each file is read when it is first asked for.
+`khala knowledge write` makes the files from the simulator's tables. They hold no words: `load` adds these. Each file
+is read on its first use.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from khala_protocol.messages import Frozen
 M = TypeVar("M", bound=Frozen)
 
 VERSION: Final = "4.10"
-"""Version whose facts are told: the one that PySC2's ids belong to."""
+"""Version of the facts: the one that PySC2's ids belong to."""
 VERSIONS: Final = (VERSION, "5.0.13")
 
 
 @functools.cache
 def unit_facts(version: str) -> dict[str, UnitFacts]:
-    """Unit types by name."""
+    """Return unit types by name."""
     return _records(UnitFacts, {name: {"name": name, **raw} for name, raw in _entries(version, "units").items()})
 
 
 @functools.cache
 def ability_facts(version: str) -> dict[int, AbilityFacts]:
-    """Abilities by id."""
+    """Return abilities by id."""
     raw = {number: _ability(int(number), own) for number, own in _entries(version, "abilities").items()}
     return {int(number): record for number, record in _records(AbilityFacts, raw).items()}
 
 
 @functools.cache
 def upgrade_facts(version: str) -> dict[str, UpgradeFacts]:
-    """Upgrades by name."""
+    """Return upgrades by name."""
     return _records(UpgradeFacts, {name: {"name": name, **raw} for name, raw in _entries(version, "upgrades").items()})
 
 
 @functools.cache
 def buff_facts(version: str) -> dict[str, BuffFacts]:
-    """Buffs by name."""
+    """Return buffs by name."""
     return _records(BuffFacts, {name: {"name": name, **raw} for name, raw in _entries(version, "buffs").items()})
 
 

@@ -1,8 +1,7 @@
 """Forms: unit types that a unit of another type turns into and back, or grows into: sieged, burrowed, flying, a Lair.
 
-Where a task speaks of a type, it means its forms as well: they stay in their teams (`khala_bridge.state.teams`) and may
-be told what the type may (`khala_bridge.task.config`). Names only; how a form differs is told by
-`khala_bridge.knowledge`.
+A task that names a type means its forms as well: they stay in their teams (`khala_bridge.state.teams`) and have the
+type's actions (`khala_bridge.task.config`). Names only; `khala_bridge.knowledge` says how a form differs.
 """
 
 from __future__ import annotations
@@ -36,13 +35,13 @@ FORMS = {
     "WarpGate": "Gateway",
     "WarpPrismPhasing": "WarpPrism",
 }
-"""By the name of a form: the type as which it counts where no team lists the form."""
+"""By the name of a form: the type that it counts as if no team lists the form."""
 FORM_SUFFIXES = ("Burrowed", "Flying", "Uprooted")
-"""Ends of the names of forms that are made of the type's own name."""
+"""Endings that make the name of a form from the type's own name."""
 
 
 def form_of(name: str) -> str | None:
-    """The type that a unit type is another form of; None if it is no form.
+    """Return the type that a unit type is a form of; None if it is not a form.
 
     >>> form_of("RoachBurrowed"), form_of("SiegeTankSieged"), form_of("Roach")
     ('Roach', 'SiegeTank', None)
@@ -57,7 +56,7 @@ def form_of(name: str) -> str | None:
 
 @functools.cache
 def forms_of(name: str) -> tuple[str, ...]:
-    """All forms of a unit type, forms of its forms among them, without itself.
+    """Return all forms of a unit type, including forms of its forms, without itself.
 
     >>> forms_of("SiegeTank")
     ('SiegeTankSieged',)

@@ -1,7 +1,7 @@
-"""What is known of the game: the facts of a version, merged with the words about them, read once when asked for.
+"""Load the knowledge of the game: the facts of a version, merged with the words about them, once on the first use.
 
-Words are written by hand in `bridge/khala_bridge/data/knowledge/words/*.yaml`; their numbers are filled in here.
-Above: everything that speaks of the game. Below: `facts`, which reads what was generated, and `words`, which fills in.
+People write the words in `bridge/khala_bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above: every module
+that describes the game. Below: `facts`, which reads the generated files, and `words`, which fills in numbers.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ RACES: Final = ("protoss", "terran", "zerg")
 
 
 def knowledge(version: str = VERSION) -> dict[str, UnitFacts]:
-    """Every known unit type by the name that PySC2 gives it, resources and obstacles too, in alphabetical order."""
+    """Return every known unit type by PySC2's name, resources and obstacles too, in alphabetical order."""
     return _units(version)
 
 
 def abilities(version: str = VERSION) -> dict[int, AbilityFacts]:
-    """Every known ability by its id, special and general ones, in the order of their ids."""
+    """Return every known ability by its id, special and general ones, in the order of ids."""
     return _abilities(version)
 
 
 def upgrades(version: str = VERSION) -> dict[str, UpgradeFacts]:
-    """Every known upgrade by the name that PySC2 gives it, in alphabetical order."""
+    """Return every known upgrade by PySC2's name, in alphabetical order."""
     return _upgrades(version)
 
 
 def buffs(version: str = VERSION) -> dict[str, BuffFacts]:
-    """Every buff that changes anything or that observations tell of, by name, in alphabetical order."""
+    """Return every buff that has an effect or that observations show, by name, in alphabetical order."""
     return buff_facts(version)
 
 
 def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFacts | None:
-    """What an ability, special or general, is for units of one type; None if they do not have it.
+    """Return the facts of an ability, special or general, for units of one type; None if they do not have it.
 
-    `ability_of(EFFECT_STIM, "Marine")` is what Stim is to a Marine, and so is the special ability's own number.
+    `ability_of(EFFECT_STIM, "Marine")` returns the Marine's Stim, and so does the special ability's own number.
     """
     facts = abilities(version).get(number)
     if facts is None:
@@ -59,12 +59,12 @@ def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFa
 
 @functools.cache
 def stand_ins(name: str, version: str = VERSION) -> frozenset[str]:
-    """Types with which a requirement of this structure is met: itself, and what counts as it (a Hive as a Lair)."""
+    """Return the types that meet a requirement of this structure: itself, and its stand-ins (a Hive for a Lair)."""
     return frozenset({name, *(kind.name for kind in unit_facts(version).values() if name in kind.counts_as)})
 
 
 def is_armed(unit_type: str) -> bool:
-    """Whether a type has a weapon; a type that is not known is taken to have one."""
+    """Return True if a type has a weapon or is unknown."""
     known = unit_facts(VERSION).get(unit_type)
     return known is None or bool(known.weapons)
 
@@ -73,29 +73,29 @@ def is_armed(unit_type: str) -> bool:
 
 
 class UnitWords(Frozen):
-    """What is written about one unit type, or about several that are alike."""
+    """The words about one unit type, or about several similar ones."""
 
     types: tuple[str, ...] = ()
-    """Types that it is written about; () for the one that it stands under."""
+    """Types that the words are about; () for the type of the entry's name."""
     about: str
     uses: str = ""
     beats: tuple[str, ...] = ()
-    """Types that it counters; the other direction follows."""
+    """Types that it counters; the other direction is derived."""
     traits: dict[str, str] = Field(default_factory=dict)
-    """What it can do without being told, a title and a sentence each."""
+    """What it does without orders, a title and a sentence each."""
 
 
 class AbilityWords(Frozen):
-    """What is written about one ability."""
+    """The words about one ability."""
 
     title: str = ""
-    """Short name under which a unit's own abilities list it; '' for what is no ability in the eyes of a player."""
+    """Short name in the list of a unit's own abilities; '' for what players do not see as an ability."""
     about: str
 
 
 @functools.cache
 def unit_words() -> dict[str, UnitWords]:
-    """What is written about unit types, by name."""
+    """Return the words about unit types, by name."""
     files = [f"knowledge/words/{race}.yaml" for race in (*RACES, "neutral")]
     entries = [entry for file in files for entry in data.table(file, UnitWords).items()]
     return {name: words for heading, words in entries for name in words.types or (heading,)}
@@ -103,19 +103,19 @@ def unit_words() -> dict[str, UnitWords]:
 
 @functools.cache
 def ability_words() -> dict[str, AbilityWords]:
-    """What is written about abilities: by name, or by kind in angle brackets."""
+    """Return the words about abilities: by name, or by kind in angle brackets."""
     return data.table("knowledge/words/abilities.yaml", AbilityWords)
 
 
 @functools.cache
 def upgrade_words() -> dict[str, str]:
-    """What is written about upgrades, by name; a star stands for any end of it."""
+    """Return the words about upgrades, by name; a star stands for any ending."""
     written: dict[str, str] = data.document("knowledge/words/upgrades.yaml")
     return written
 
 
 def words_of(ability: AbilityFacts) -> AbilityWords | None:
-    """What is written about an ability under its name, or else about its kind."""
+    """Return the words about an ability by its name, or else about its kind."""
     return ability_words().get(ability.name) or ability_words().get(f"<{ability.does}>")
 
 
@@ -134,7 +134,7 @@ def _units(version: str) -> dict[str, UnitFacts]:
 
 
 def _beaten_by() -> dict[str, tuple[str, ...]]:
-    """What counters a type, by name: first those that name it first among what they counter."""
+    """Return the types that counter each type, by name; first those that name it first among the types they counter."""
     found: dict[str, list[tuple[int, str]]] = {}
     for name, words in unit_words().items():
         for rank, other in enumerate(words.beats):
@@ -158,7 +158,7 @@ def _described(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> Uni
 
 @functools.cache
 def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
-    """Types and upgrades of melee games that require a structure, by its name."""
+    """Return the types and upgrades of melee games that require a structure, by its name."""
     kinds, better = unit_facts(version).values(), upgrade_facts(version).values()
     required = [(kind.name, kind.requires) for kind in kinds if kind.melee]
     required += [(upgrade.name, upgrade.requires) for upgrade in better if upgrade.melee]
@@ -170,7 +170,7 @@ def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
 
 
 def _titled(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
-    """The abilities of a type that have a title, with what is said about them."""
+    """Yield the abilities of a type that have a title, with the words about them."""
     for number in kind.ability_ids:
         if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:
             yield words.title, ability.about

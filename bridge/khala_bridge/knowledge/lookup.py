@@ -1,6 +1,6 @@
-"""All that is known of a unit type, an upgrade or an ability, as text for people who look it up.
+"""Everything known about a unit type, an upgrade or an ability, as text for people.
 
-`khala knowledge show` prints it. For prompts there are the few lines of `khala_bridge.knowledge.prompt`.
+`khala knowledge show` prints it. `khala_bridge.knowledge.prompt` makes the few lines for prompts.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Known: TypeAlias = UnitFacts | UpgradeFacts | AbilityFacts
 
 
 class NotKnown(KhalaError):
-    """Nothing that is known has this name."""
+    """Nothing known has this name."""
 
 
 def find(name: str, version: str = VERSION) -> list[Known]:
-    """Every unit type, upgrade and ability with this name, or the ability with this number.
+    """Return every unit type, upgrade and ability with this name, or the ability with this number.
 
     Upper case, blanks and underscores do not matter: `siege tank` is a SiegeTank.
 
@@ -52,7 +52,7 @@ def find(name: str, version: str = VERSION) -> list[Known]:
 
 
 def long(known: Known, version: str = VERSION) -> str:
-    """All that is known of one thing."""
+    """Return everything known about one thing."""
     if isinstance(known, UnitFacts):
         lines = _unit(known, version)
     elif isinstance(known, UpgradeFacts):
@@ -81,7 +81,7 @@ def _unit(kind: UnitFacts, version: str) -> list[str]:
 
 
 def _upgrades(kind: UnitFacts, version: str) -> Iterator[str]:
-    """What makes a type better; levels that say the same share a line."""
+    """Yield the upgrades that make a type better; levels with the same text share a line."""
     said: dict[str, list[str]] = {}
     for upgrade in upgrades(version).values():
         if upgrade.melee and kind.name in upgrade.affects:
@@ -141,7 +141,7 @@ def _ability(ability: AbilityFacts) -> list[str]:
 
 
 def _terms(ability: AbilityFacts) -> Iterator[tuple[str, str]]:
-    """What it costs, asks for and gives, as a heading and a text each; an empty text is nothing to say."""
+    """Yield its costs, requirements and products, as a heading and a text each; an empty text is left out."""
     reach = "anywhere" if ability.range is None else n(ability.range)
     cost = price(ability.minerals, ability.vespene, ability.supply)
     yield "Users", ", ".join(ability.users)

@@ -1,7 +1,7 @@
-"""What is known of unit types, abilities and upgrades: the shapes of the records, and nothing else.
+"""The records about unit types, abilities, upgrades and buffs; only their shapes.
 
 Facts of one version of the game, without upgrades, in seconds of the speed "faster" and in world units; names are
-PySC2's. Above: `khala_bridge.knowledge.load`, which makes the records out of the data files.
+PySC2's. Above: `khala_bridge.knowledge.load`, which makes the records from the data files.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class WeaponFacts(Frozen):
     range: float
     """World units between the edges of the two units."""
     min_range: float = 0
-    """Nearer than this it does not fire."""
+    """Least distance at which it fires."""
     damage: float
     """Of one hit, before armor."""
     attacks: int = 1
@@ -31,9 +31,9 @@ class WeaponFacts(Frozen):
     period_s: float
     """Seconds between two shots."""
     bonus: dict[str, float] = Field(default_factory=dict)
-    """Damage that is added against an attribute."""
+    """Extra damage against an attribute."""
     splash: float = 0
-    """Radius around the place of a hit in which others are hurt too; 0 for none."""
+    """Radius around a hit in which other units are hurt too; 0 for none."""
 
     @property
     def per_second(self) -> float:
@@ -41,12 +41,12 @@ class WeaponFacts(Frozen):
         return self.damage * self.attacks / self.period_s
 
     def per_second_against(self, attribute: str) -> float:
-        """Damage per second against a target without armor and with this attribute."""
+        """Return the damage per second against a target without armor and with this attribute."""
         return (self.damage + self.bonus.get(attribute, 0)) * self.attacks / self.period_s
 
 
 class UnitFacts(Frozen):
-    """What is known of one type."""
+    """The facts and words about one type."""
 
     name: str = ""
     id: int
@@ -60,17 +60,17 @@ class UnitFacts(Frozen):
     countered_by: tuple[str, ...] = ()
     """Types that beat it; the other direction of `counters`."""
     abilities: dict[str, str] = Field(default_factory=dict)
-    """What it can do besides moving, attacking and producing: a title and a sentence each."""
+    """What it can do apart from moving, attacking and producing: a title and a sentence each."""
     ability_ids: tuple[int, ...] = ()
-    """Every specific ability that it can be told to use, also to move, attack and produce."""
+    """Every specific ability that it can be ordered to use, also to move, attack and produce."""
     melee: bool = False
-    """Whether it occurs in melee games of the version; the others are left in the game's data."""
+    """Whether it occurs in melee games of the version; other types are leftovers in the game's data."""
     structure: bool = False
     worker: bool = False
     attributes: tuple[str, ...] = ()
     flying: bool = False
     planes: tuple[str, ...] = ()
-    """Where weapons find it: `ground`, `air`, both (Colossus), or nowhere."""
+    """Where weapons hit it: `ground`, `air`, both (Colossus), or nowhere."""
     cloaked: bool = False
     burrowed: bool = False
     health: float = 0
@@ -83,31 +83,31 @@ class UnitFacts(Frozen):
     """World units per second."""
     sight: float = 0
     detects: float = 0
-    """Radius in which it sees what is cloaked or burrowed; 0 for none."""
+    """Radius in which it sees cloaked and burrowed units; 0 for none."""
     radius: float = 0
     supply: float = 0
     provides: float = 0
     """Supply that it adds to the cap."""
     minerals: float = 0
     vespene: float = 0
-    """As the API counts: with what it was morphed from. What an order costs is told by its ability."""
+    """As the API counts: with the cost of the type that it was morphed from. Its ability has the cost of an order."""
     cargo_size: int = 0
     """Places that it takes in a transport; 0 if it can't be carried."""
     cargo_space: int = 0
     resource: str = ""
-    """What workers gather from it: `minerals` or `vespene`."""
+    """The resource that workers gather from it: `minerals` or `vespene`."""
     producers: tuple[str, ...] = ()
     """Types that make it or become it."""
     made_by: tuple[int, ...] = ()
-    """Ids of the abilities by which they do."""
+    """Ids of the abilities with which they do so."""
     build_s: float = 0
     """Seconds until it is finished, by the first of these ways."""
     requires: tuple[str, ...] = ()
-    """Structures that have to stand; all of them. What may stand in for one is told by `stand_ins`."""
+    """Structures that must stand; all of them. `stand_ins` returns what may stand in for one."""
     addon: str = ""
-    """What has to be attached to the producer: `TechLab`."""
+    """Add-on that the producer must have: `TechLab`."""
     allows: tuple[str, ...] = ()
-    """Types and upgrades that require it: what a structure opens."""
+    """Types and upgrades that require it."""
     footprint: tuple[int, int] | None = None
     """Width and height of the cells that it blocks."""
     power_radius: float = 0
@@ -115,7 +115,7 @@ class UnitFacts(Frozen):
     needs_creep: bool = False
     makes_creep: bool = False
     counts_as: tuple[str, ...] = ()
-    """Types that it stands in for where something requires them: a Hive for a Lair."""
+    """Types that it stands in for as a requirement: a Hive for a Lair."""
     weapons: tuple[WeaponFacts, ...] = ()
 
     @property
@@ -124,67 +124,67 @@ class UnitFacts(Frozen):
         return self.minerals + self.vespene
 
     def hits(self, other: UnitFacts) -> bool:
-        """Whether any of its weapons can be aimed at the other type."""
+        """Return True if any of its weapons can hit the other type."""
         return any(weapon.targets == "any" or weapon.targets in other.planes for weapon in self.weapons)
 
 
 class AbilityFacts(Frozen):
-    """What is known of one ability.
+    """The facts and words about one ability.
 
-    A general one (`Effect_Stim`) stands for the special ones in `special`; it has the users of all of them, and those
-    of their facts in which all agree. What one type of unit pays is known by `ability_of`.
+    A general one (`Effect_Stim`) stands for the special ones in `special`; it has the users of all of them, and the
+    facts that all of them share. `ability_of` returns the ability with the costs for one type of unit.
     """
 
     id: int
     name: str
-    """As in PySC2's functions, without what it takes: `Effect_Blink_Stalker`."""
+    """As in PySC2's functions, without the ending for its arguments: `Effect_Blink_Stalker`."""
     about: str = ""
-    """What it does, in a sentence with its numbers; empty for what no player of a melee game uses."""
+    """What it does, in a sentence with its numbers; empty if no player of a melee game uses it."""
     does: str = ""
-    """The kind of thing that it does: `train`, `build`, `research`, `morph`, `cancel`, `blink`, …; `general` for a
-    general one, empty for what does nothing in this version."""
+    """Its kind: `train`, `build`, `research`, `morph`, `cancel`, `blink`, …; `general` for a general one, empty if it
+    does nothing in this version."""
     general: int | None = None
-    """The general ability that it is a case of."""
+    """The general ability of which it is a case."""
     special: tuple[int, ...] = ()
     melee: bool = False
     """Whether a player can use it in a melee game of the version."""
     users: tuple[str, ...] = ()
-    """Types that can be told to use it; () for every type."""
+    """Types that can be ordered to use it; () for every type."""
     target: Target = "none"
     range: float | None = 0
-    """World units from edge to edge; None where the whole map is in reach, 0 if it has no target or is at touch."""
+    """World units from edge to edge; None if the whole map is in reach, 0 if it has no target or works at touch."""
     energy: float = 0
     life: float = 0
     minerals: float = 0
     vespene: float = 0
-    """What is charged, without what it is made of."""
+    """The price of the order, without the price of the unit that it is made of."""
     supply: float = 0
-    """Supply that a use adds: of what a unit becomes, only what is above its own."""
+    """Supply that a use adds; for a morph, only the difference."""
     cooldown_s: float = 0
     charges: int = 0
     requires: tuple[str, ...] = ()
-    """Structures and upgrades, all of them. What may stand in for a structure is told by `stand_ins`."""
+    """Structures and upgrades, all of them. `stand_ins` returns what may stand in for a structure."""
     addon: str = ""
-    """What has to be attached to the unit itself: `TechLab`."""
+    """Add-on that the unit itself must have: `TechLab`."""
     produces: str | None = None
     """The unit type that it makes or that the unit becomes."""
     count: int = 1
-    """How many of them."""
+    """Number of these units."""
     researches: str | None = None
     time_s: float = 0
-    """Seconds until what it makes, becomes or researches is there."""
+    """Seconds until its product or its research is finished."""
     autocast: Literal["on", "off"] | None = None
-    """How it is set at first; None for what units never do by themselves."""
+    """Its first setting; None for what units never do by themselves."""
     must: tuple[str, ...] = ()
-    """What a target has to be, all of it: `visible`, `structure`, `biological`, …"""
+    """What a target must be, all of it: `visible`, `structure`, `biological`, …"""
     must_not: tuple[str, ...] = ()
-    """What a target may not be: `self`, `enemy`, `massive`, `structure`, …"""
+    """What a target must not be: `self`, `enemy`, `massive`, `structure`, …"""
     figures: dict[str, float] = Field(default_factory=dict)
     """Numbers of its effect: `damage`, `radius`, `duration_s`, …"""
 
 
 class UpgradeFacts(Frozen):
-    """What is known of one upgrade."""
+    """The facts and words about one upgrade."""
 
     name: str = ""
     id: int
@@ -200,32 +200,32 @@ class UpgradeFacts(Frozen):
     ability: int = 0
     requires: tuple[str, ...] = ()
     affects: tuple[str, ...] = ()
-    """Unit types that are better off with it."""
+    """Unit types that it improves."""
     enables: tuple[int, ...] = ()
     """Ids of the abilities that need it."""
     changes: dict[str, dict[str, float]] = Field(default_factory=dict)
-    """By unit type, what is added: `speed`, `armor`, `health`, `range`, `damage`, `damage_against_light`, …;
+    """By unit type, what it adds: `speed`, `armor`, `health`, `range`, `damage`, `damage_against_light`, …;
     `attack_speed` is a share of what it was."""
 
 
 class BuffFacts(Frozen):
-    """What is known of one buff: what lies on a unit for a time, and what it changes there."""
+    """The facts about one buff: an effect on a unit for a time, and what it changes there."""
 
     name: str = ""
-    """As observations call it; where they do not tell of it, as the game's data does."""
+    """As in observations; as in the game's data if they do not show it."""
     id: int = 0
-    """0 for one that clients are not told of."""
+    """0 for one that the game does not show to clients."""
     duration_s: float = 0
     """0 for one without an end of its own."""
     speed: float = 1
     attack_rate: float = 1
     work_rate: float = 1
-    """Factors of what its bearer has; the last one is of training, research and the like."""
+    """Factors of its bearer's values; the last one is for training, research and the like."""
     stops_work: bool = False
     armor: float = 0
     damage_taken: float = 0
-    """What is added to each hit, of the kinds that it is about."""
+    """Damage added to each hit on its bearer, of the kinds that it is about."""
     absorbs: float = 0
-    """Damage that it takes in all."""
+    """Damage that it absorbs in all."""
     flags: tuple[str, ...] = ()
-    """What its bearer is meanwhile: `stunned`, `disarmed`, `rooted`, `invulnerable`, `cloak`, …"""
+    """State of its bearer meanwhile: `stunned`, `disarmed`, `rooted`, `invulnerable`, `cloak`, …"""

@@ -1,7 +1,7 @@
-"""What is known of a type in a few lines, for prompts: what it is, its body, its weapons, and what beats what.
+"""A type in a few lines, for prompts: what it is, its body, its weapons, and its counters.
 
 Pure functions of names, cached: a page asks for the same types at every step. The lines are not indented; the first
-one is the heading of the others. In full, for people who look something up: `khala_bridge.knowledge.lookup`.
+one is the heading of the others. `khala_bridge.knowledge.lookup` has the full text for people.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from khala_bridge.knowledge.model import UnitFacts, WeaponFacts
 
 MOST: Final = 6
-"""Types that are named as countering another one where it is not said which ones matter."""
+"""Number of types that are named as counters if the caller does not say which ones matter."""
 HITS: Final = {"any": "ground and air", "ground": "ground", "air": "air"}
 
 
 @functools.lru_cache(4096)
 def short(name: str, among: frozenset[str] | None = None) -> tuple[str, ...]:
-    """What is known of a type, as lines: `Stalker: Mobile ranged walker …`, its body, its weapons, its counters.
+    """Return a type as lines: `Stalker: Mobile ranged walker …`, its body, its weapons, its counters.
 
     `among` are the types that matter now, those in sight: only these are named as counters, in an order of their own.
-    Without it some units of each race are. There are no lines about a type that is not known.
+    Without it some units of each race are named. There are no lines about an unknown type.
     """
     kind = knowledge().get(name)
     if kind is None:
@@ -39,7 +39,7 @@ def short(name: str, among: frozenset[str] | None = None) -> tuple[str, ...]:
 
 @functools.cache
 def advice(name: str) -> tuple[str, ...]:
-    """How to use a type of one's own, and what it can do besides moving and attacking, as lines: `Blink: …`."""
+    """Return lines about the use of an own type, and its abilities apart from moving and attacking: `Blink: …`."""
     kind = knowledge().get(name)
     if kind is None:
         return ()
@@ -48,7 +48,7 @@ def advice(name: str) -> tuple[str, ...]:
 
 
 def body(kind: UnitFacts) -> str:
-    """`armored, mechanical, on the ground; health 80, shield 80, armor 1, speed 4.13`."""
+    """Return the body in words: `armored, mechanical, on the ground; health 80, shield 80, armor 1, speed 4.13`."""
     plane = "flying" if kind.flying else "on the ground"
     parts = [f"{', '.join((*kind.attributes, plane))}; health {n(kind.health)}"]
     numbers = (("shield", kind.shield), ("armor", kind.armor), ("energy up to", kind.energy))
@@ -61,7 +61,7 @@ def body(kind: UnitFacts) -> str:
 
 
 def weapon(own: WeaponFacts) -> str:
-    """`hits ground, range 6, damage 13 (+5 against armored) every 1.34 s, …`."""
+    """Return a weapon in words: `hits ground, range 6, damage 13 (+5 against armored) every 1.34 s, …`."""
     times = f" x {own.attacks}" if own.attacks > 1 else ""
     bonus = "".join(f" (+{n(more)} against {what})" for what, more in own.bonus.items())
     nearest = f" but not nearer than {n(own.min_range)}" if own.min_range else ""
@@ -78,7 +78,7 @@ def _tenths(value: float) -> str:
 
 
 def _matchups(kind: UnitFacts, among: frozenset[str] | None) -> Iterator[str]:
-    """`good against Reaper, VoidRay; beaten by Immortal, Marauder`; nothing where nothing is known."""
+    """Yield its counters: `good against Reaper, VoidRay; beaten by Immortal, Marauder`; nothing if none is known."""
     sides = (("good against", kind.counters), ("beaten by", kind.countered_by))
     chosen = ((what, _chosen(names, among)) for what, names in sides)
     said = [f"{what} {', '.join(names)}" for what, names in chosen if names]

@@ -1,6 +1,6 @@
-"""Sentences with numbers in them: the words about a type, an ability or an upgrade, filled in from its facts.
+"""Fill numbers into sentences: the words about a type, an ability or an upgrade get theirs from its facts.
 
-Nobody types a number twice. What stands in braces is looked up when the words are read:
+No number is typed twice. Names in braces are looked up when the words are read:
 
     {range}  {damage}  {duration_s}      a fact or a figure of the record itself
     {AutoTurret.health}                  a fact of a unit type
@@ -11,7 +11,7 @@ Nobody types a number twice. What stands in braces is looked up when the words a
     {move_speed_multiplier%}             as a percentage
     {cost} {needs} {makes} {research}    in words, see `_IN_WORDS`
 
-It reads no file, and knows nothing of what a sentence is for.
+It reads no file, and does not know what a sentence is for.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ class Filler:
         self._buffs = buffs
 
     def fill(self, text: str, record: UnitFacts | AbilityFacts | UpgradeFacts) -> str:
-        """The text with every placeholder replaced.
+        """Return the text with every placeholder replaced.
 
         Raises:
-            CatalogueError: a placeholder names a fact that there is not; the text names both.
+            CatalogueError: a placeholder names a missing fact; the text names both.
         """
 
         def found(match: re.Match[str]) -> str:
@@ -78,22 +78,22 @@ class Filler:
 
 
 def number(value: float) -> str:
-    """A number without needless digits: 12, 12.5."""
+    """Return a number without needless digits: 12, 12.5."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
 def rounded(value: float) -> str:
-    """A number as one says it, with three digits: 10.7 for 10.71, and 1440."""
+    """Return a number with three digits, as people say it: 10.7 for 10.71, and 1440."""
     return number(value) if value == int(value) else number(float(f"{value:.3g}"))
 
 
 def listed(names: tuple[str, ...]) -> str:
-    """Names as one says them: `A`, `A and B`, `A, B and C`."""
+    """Return names as a list in words: `A`, `A and B`, `A, B and C`."""
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
 def price(minerals: float, vespene: float, supply: float = 0) -> str:
-    """What something costs: `125 minerals, 50 vespene, 2 supply`, or `nothing`."""
+    """Return a price in words: `125 minerals, 50 vespene, 2 supply`, or `nothing`."""
     parts = ((minerals, "minerals"), (vespene, "vespene"), (supply, "supply"))
     return ", ".join(f"{number(amount)} {what}" for amount, what in parts if amount) or "nothing"
 

@@ -1,7 +1,7 @@
-"""A unit as every team of a side sees it: the part of its view that does not depend on who looks.
+"""A unit as every team of a side sees it: the part of its view that is the same for all teams.
 
-Numbers of the game become names and rounded values here, once per unit and snapshot. Where a unit stands on whose
-screen is the business of `khala_bridge.observe.scene`, which is above; below are frames and the unit of the state.
+Numbers of the game become names and rounded values here, once per unit and snapshot. `khala_bridge.observe.scene`,
+above, finds a unit's position on each screen; below are frames and the unit of the state.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BLANK = UnitView(
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A unit, and its view from nowhere: `screen`, `distance` and `alliance` are left to those who look."""
+    """A unit, and its view without an observer: `screen`, `distance` and `alliance` depend on the team."""
 
     tag: int
     x: float
@@ -36,12 +36,12 @@ class Body:
 
     @property
     def is_own(self) -> bool:
-        """Whether it belongs to the player."""
+        """True if it belongs to the player."""
         return self.alliance is Alliance.OWN
 
 
 def body(unit: Unit, world: MapFrame) -> Body:
-    """The body of a unit; orders, passengers and weapons are told of the player's own ones only."""
+    """Return the body of a unit; only the player's own units have orders, passengers and weapons."""
     name, (x, y) = unit.name, unit.pos
     more = _own(unit, world) if unit.is_own else {}
     view = _BLANK.but(
@@ -66,14 +66,14 @@ def body(unit: Unit, world: MapFrame) -> Body:
 
 
 def _own(unit: Unit, world: MapFrame) -> dict[str, object]:
-    """What is told of a player's own units besides."""
+    """Return the fields that only the player's own units have."""
     orders = tuple([_order(order, world) for order in unit.orders])
     cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed(unit.name) else None
     return {"orders": orders, "order": orders[0].name if orders else None, "weapon_cooldown_s": cooldown_s}
 
 
 def _details(unit: Unit) -> UnitDetails | None:
-    """What only some units have."""
+    """Return the fields that only some units have."""
     found: dict[str, Any] = {}
     if unit.is_burrowed:
         found["burrowed"] = True
@@ -105,7 +105,7 @@ def _order(order: UnitOrder, world: MapFrame) -> OrderView:
 
 
 def rounded(point: tuple[float, float], size: float) -> Point:
-    """To a tenth of a cell; a position within a frame stays within it, whose end is open."""
+    """Return a value rounded to a tenth of a cell; a position stays within its frame, whose end is open."""
     return _tenth(point[0], size), _tenth(point[1], size)
 
 

@@ -1,8 +1,8 @@
-"""What a side remembers of an episode: the enemies that it has seen, and what it had at the last observation.
+"""A side's memory of an episode: the enemies that it has seen, and its units at the last observation.
 
-The game tells a player what is in sight and what has died; that an enemy was there, and how many of its kind, is
-remembered here. An enemy that dies out of sight is thought to be alive, as a player would. `khala_bridge.observe.side`
-makes views of it; below are bodies.
+The game reports what is in sight and what has died. This module remembers which enemies were there, and how many of
+each type. An enemy that dies out of sight counts as alive, as a player would assume. `khala_bridge.observe.side` makes
+views of it; below are bodies.
 """
 
 from __future__ import annotations
@@ -47,19 +47,19 @@ PASSING = frozenset(
         "ChangelingZerglingWings",
     }
 )
-"""Types that come and go by themselves: nobody is told when one of them appears or is gone."""
+"""Types that come and go by themselves: no event reports them."""
 COUNTED_ANYWAY = frozenset({"Larva", "Egg", "Cocoon"})
-"""Of these, the ones whose number matters to who produces."""
+"""Of these, the ones whose number matters to producers."""
 
 
 @dataclass(slots=True)
 class _Known:
-    """An enemy unit as it was seen last."""
+    """An enemy unit as it was last seen."""
 
     name: str
     minimap: Point
     seen: int
-    """Number of the observation in which it was seen last."""
+    """Number of the last observation that showed it."""
     dead: bool = False
 
 
@@ -69,15 +69,15 @@ class Chronicle:
 
     _enemies: dict[int, _Known] = field(default_factory=dict)
     _finished: dict[int, UnitView] = field(default_factory=dict)
-    """Own units that stood at the last observation, by tag."""
+    """Own units at the last observation, by tag."""
     _upgrades: frozenset[str] = frozenset()
     _count: int = 0
-    """Observations so far."""
+    """Number of observations so far."""
     events: tuple[Event, ...] = ()
-    """What happened to the side since the observation before the last one."""
+    """Events of the side between the last two observations."""
 
     def note(self, bodies: Mapping[int, Body], upgrades: Sequence[str], dead: Iterable[int]) -> None:
-        """Takes in an observation."""
+        """Take in an observation."""
         gone = frozenset(dead)
         own = {tag: body.view for tag, body in bodies.items() if body.is_own and body.name not in PASSING}
         finished = {tag: view for tag, view in own.items() if view.build_progress >= 1}
@@ -93,7 +93,7 @@ class Chronicle:
         self._count += 1
 
     def _new_enemies(self, bodies: Mapping[int, Body]) -> list[Event]:
-        """Events for the enemies that were never seen before; all that are in sight are remembered."""
+        """Return events for new enemies, and remember all that are in sight."""
         new = []
         for tag, body in bodies.items():
             if body.alliance is not Alliance.ENEMY or body.name in PASSING or body.view.hallucination:
@@ -113,7 +113,7 @@ class Chronicle:
         return killed
 
     def enemies(self) -> tuple[EnemyCount, ...]:
-        """What was seen of each type of enemy; units before structures, each in alphabetical order."""
+        """Return the known number of each type of enemy; units before structures, each in alphabetical order."""
         by_type: dict[str, list[_Known]] = {}
         for known in self._enemies.values():
             by_type.setdefault(known.name, []).append(known)
@@ -136,13 +136,13 @@ def _units_first(name: str) -> tuple[bool, str]:
 
 @functools.cache
 def is_worker(name: str) -> bool:
-    """Whether a type of unit gathers; a type that is not known does not."""
+    """Return True if a type of unit gathers; unknown types do not."""
     known = knowledge().get(name)
     return known is not None and known.worker
 
 
 @functools.cache
 def is_structure(name: str) -> bool:
-    """Whether a type of unit is a structure; a type that is not known is none."""
+    """Return True if a type is a structure; unknown types are not."""
     known = knowledge().get(name)
     return known is not None and known.structure

@@ -1,7 +1,7 @@
-"""What happened between two observations: to the units of a team's screen, and to the whole side.
+"""Events between two observations: of the units on a team's screen, and of the whole side.
 
-Compares two views of the same team; a view does not say who died, so the game's list of the dead is asked. An
-enemy that is neither in sight nor among the dead has walked out of sight, which is another event.
+Compares two views of the same team, with the game's list of dead units, which no view has. An enemy that is neither in
+sight nor among the dead has walked out of sight, which is another event.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 EventKind: TypeAlias = Literal["hurt", "healed", "died", "joined", "appeared", "disappeared", "finished", "researched"]
 
 MIN_CHANGE = 1.0
-"""Health and shield that make an event; Protoss shields regain less than that between two quick observations."""
+"""Change of health and shield that makes an event; Protoss shields regain less between two quick observations."""
 
 
 _NOTHING = Event(what="appeared", tag="", type="", alliance="neutral", amount=None)
@@ -34,10 +34,10 @@ class Witnessed(NamedTuple):
 
 
 class Events:
-    """The events of one moment; one that several teams witness is made once."""
+    """The events of one moment; an event that several teams witness is made once."""
 
     def __init__(self, before: Mapping[str, float], now: Mapping[str, UnitView], dead: frozenset[str]) -> None:
-        """Takes health and shield by tag at the observation before, every unit now, and the tags of who died since."""
+        """Take health and shield by tag at the observation before, every unit now, and the tags of the dead since."""
         self.dead = dead
         self._now = now
         totals = ((tag, unit.health + unit.shield - before[tag]) for tag, unit in now.items() if tag in before)
@@ -47,7 +47,7 @@ class Events:
         self._changed: dict[Alliance, dict[str, Event]] = {}
 
     def of_team(self, before: TeamView, saw: Witnessed, now: Witnessed) -> tuple[Event, ...]:
-        """Events of a team in the order of its units.
+        """Return the events of a team in the order of its units.
 
         Args:
             before: the team's view at the observation before.
@@ -64,7 +64,7 @@ class Events:
         return tuple(found)
 
     def _of(self, tags: Iterable[str], old: Container[str], arrival: EventKind, alliance: Alliance) -> list[Event]:
-        """Who came, and who was hurt or healed, of some units."""
+        """Return the events of some units that came, were hurt or were healed."""
         changed = self._changed_as(alliance)
         found = []
         for tag in tags:
@@ -75,7 +75,7 @@ class Events:
         return found
 
     def _changed_as(self, alliance: Alliance) -> dict[str, Event]:
-        """The changes of health as they are told of units of one alliance: made once, for all who witness them."""
+        """Return the changes of health as events of one alliance; made once, for all teams that witness them."""
         if alliance not in self._changed:
             made = {}
             for tag, change in self.changes.items():
@@ -86,5 +86,5 @@ class Events:
 
 
 def event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
-    """What happened to a unit; unchecked, since a battle has hundreds in each step."""
+    """Return an event of a unit; unchecked, since a battle has hundreds in each step."""
     return _NOTHING.having({"what": what, "tag": unit.tag, "type": unit.type, "alliance": alliance, "amount": amount})

@@ -1,7 +1,7 @@
 """Things on the map whose tags an action takes: power fields, free places for a base, free geysers, own structures.
 
-Functions of a scene. Where a base could stand is known by `khala_bridge.state.ground`; here a place gets the tag that
-an agent can name it by, which is that of the resource nearest to its middle.
+Functions of a scene. `khala_bridge.state.ground` knows the places for a base; here each gets the tag by which an agent
+can name it, the one of the resource nearest to its middle.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     What: TypeAlias = Literal["base place", "geyser", "power field", "structure"]
 
 MAX_PLACES = 5
-"""Free places for a base that are told, the nearest ones."""
+"""Number of free places for a base that a page shows, the nearest ones."""
 BASE_TAKEN = 6.0
 """World units from the middle of a base's place within which a town hall takes it."""
 POWERS = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing"})
-"""What structures and units can be warped in at; a Nexus or a Gateway only makes it faster."""
+"""Sources of power at which units can be warped in; a Nexus or a Gateway only makes it faster."""
 GAS_OF_BASE = 10.0
-"""World units from a town hall within which a geyser is its own; as workers are counted."""
+"""World units from a town hall within which a geyser is its own, as for the count of workers."""
 ON_TOP = 1.0
 """World units between the middles of a geyser and of the structure on it."""
 
 
 def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
-    """What one can warp in at and build by, in the order of tags; with its place on the screen of a camera."""
+    """Yield the power fields, in the order of tags, with their positions on a camera's screen."""
     sources = scene.snapshot.power_sources
     radius = {source.tag: source.radius for source in sources}
     for field in scene.power:
@@ -53,7 +53,7 @@ def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
 
 
 def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
-    """Free places for a base, the nearest to the own bases first, then the geysers of own bases that nobody uses."""
+    """Yield free places for a base, the nearest to the own bases first, then the free geysers of own bases."""
     land = land_of(scene.snapshot)
     halls = [unit.pos for unit in land.halls]
     own = [unit.pos for unit in land.own_halls]
@@ -90,14 +90,14 @@ GAS_STRUCTURES = frozenset({"Assimilator", "Extractor", "Refinery"})
 
 
 def structures(scene: Scene) -> Iterator[Landmark]:
-    """The own structures with what they do, by type and tag."""
+    """Yield the own structures with their orders, by type and tag."""
     own = [b for b in scene.bodies.values() if b.is_own and is_structure(b.name) and b.name not in PASSING]
     for body in sorted(own, key=lambda body: (body.name, body.tag)):
         yield _landmark("structure", body, None, _busy(body))
 
 
 def _queue(orders: Sequence[OrderView]) -> str:
-    """What a structure makes, and what waits behind it by name."""
+    """Return the order at work of a structure, and the queued orders by name."""
     first, *waiting = orders
     begun = f"{first.name} {100 * first.progress:.0f}%" if first.progress else first.name
     return " then ".join([begun, *(f"{count} {name}" for name, count in Counter(o.name for o in waiting).items())])

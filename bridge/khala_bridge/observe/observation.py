@@ -1,6 +1,6 @@
-"""What a side sees at one moment: the views of its agents, and what the host needs to carry out their answers.
+"""The observation of a side at one moment: the views of its agents, and what the host needs to carry out replies.
 
-Cameras, tags and the snapshot stay on the host; no world coordinate is in a view. `khala_bridge.observe.observer` makes
+Cameras, tags and the snapshot stay on the host; a view has no world coordinates. `khala_bridge.observe.observer` makes
 observations; they are values.
 """
 
@@ -30,7 +30,7 @@ class TeamObservation:
 
     team: Team
     camera: Camera | None
-    """None for a team without units, which orders those of the whole side."""
+    """None for a team without units, which orders units of the whole side."""
     view: TeamView
     tags: Witnessed = field(default_factory=Witnessed)
     """Tags of the units in the view."""
@@ -38,7 +38,7 @@ class TeamObservation:
 
 @dataclass(frozen=True, slots=True)
 class AgentObservation:
-    """What one agent sees; `text` is empty until it is written."""
+    """The observation of one agent; `text` is empty until it is written."""
 
     agent: AgentConfig
     view: View
@@ -47,12 +47,12 @@ class AgentObservation:
     """Teams that have no unit now."""
     text: str = ""
     pictures: tuple[Picture, ...] = ()
-    """What it is shown besides the words."""
+    """Its pictures."""
 
 
 @dataclass(frozen=True, slots=True)
 class SideObservation:
-    """What a side sees at one moment: the snapshot and what its agents make of it."""
+    """The observation of a side: the snapshot, and the observations of its agents."""
 
     snapshot: Snapshot
     map: MapFrame

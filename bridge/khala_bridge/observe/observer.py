@@ -1,11 +1,11 @@
-"""What each agent of a side sees, observation after observation: the outward half of a turn.
+"""The observations of each agent of a side, one after the other: the first half of a turn.
 
     observer.begin()                                     a new episode
     seen = observer.observe(snapshot, feedback)          seen.agents["Zealots"].text, .view
 
-An observer remembers who has which unit, its last observation, which enemies were seen and which stages of the task
-were reached, and nothing else; what it says is a function of the snapshots and feedbacks that it was given since
-`begin`. No clock, no bus.
+An observer remembers the units of each team, its last observation, the enemies that were seen and the stages of the
+task that were reached, and nothing else: its result is a function of the snapshots and feedbacks since `begin`. No
+clock, no bus.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Observer:
     """The eyes of one side."""
 
     def __init__(self, task: TaskConfig, roster: Callable[[Sequence[AgentConfig]], TeamRoster] = TeamRoster) -> None:
-        """Take a task, and what says which unit answers to which of its agents.
+        """Take a task, and the grouping of units into the teams of its agents.
 
         Raises:
             ConfigError: an agent's configuration names a section that does not exist.
@@ -54,14 +54,14 @@ class Observer:
         self._episode = _Episode(self._new_roster(self._task.agents))
 
     def observe(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> SideObservation:
-        """Return what the side sees now, with what each agent hears about its last reply.
+        """Return what the side sees now, with the feedback on each agent's last reply.
 
-        What an agent sees is made when `agents` is first asked for it, so that one agent can think while the host
-        still looks for the others. What nobody asked for is made when the next observation begins.
+        An agent's observation is made on the first access through `agents`, so that one agent can think while the
+        host still observes for the others. Unused ones are made when the next observation begins.
 
         Args:
-            snapshot: what the game says.
-            feedback: by agent; an agent that is not in it hears nothing.
+            snapshot: the state of the game.
+            feedback: by agent; an agent that is not in it gets none.
         """
         episode = self._episode
         earlier = episode.complete()
@@ -74,7 +74,7 @@ class Observer:
         return episode.last
 
     def _album(self, snapshot: Snapshot, world: MapFrame) -> Album | None:
-        """Who draws pictures; None if no agent is shown any, so that OpenCV is loaded only for those who are."""
+        """Return the album of the moment; None if no agent has pictures, so that OpenCV is loaded only when needed."""
         if not any(agent.images for agent in self._task.agents):
             return None
         from khala_bridge.observe.image.album import Album  # noqa: PLC0415  # see above
@@ -82,7 +82,7 @@ class Observer:
         return Album(snapshot, world)
 
     def _agent(self, moment: _Moment, agent: AgentConfig) -> AgentObservation:
-        """What one agent sees, in words and pictures."""
+        """Return the observation of one agent, in words and pictures."""
         seen = self._seen(moment, agent)
         page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), moment.conditions)
         text = render(page, self._sections[agent.name], agent.text_tokens)
@@ -102,7 +102,7 @@ class Observer:
         return AgentObservation(agent, view, tuple(teams), episode.roster.idle_teams(agent.name))
 
     def _view(self, moment: _Moment, agent: AgentConfig, teams: Sequence[TeamView], camera: Camera | None) -> View:
-        """The view of an agent: that of all, its teams, and the parts that its page shows."""
+        """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
         scene, parts, chronicle = moment.scene, self._parts[agent.name], moment.episode.chronicle
         view = scene.view.but(teams=tuple(teams))
         more: dict[str, object] = {}
@@ -123,7 +123,7 @@ class Observer:
 
 @dataclass(slots=True)
 class _Episode:
-    """What is remembered during one episode."""
+    """The memory of one episode."""
 
     roster: TeamRoster
     chronicle: Chronicle = field(default_factory=Chronicle)
@@ -132,7 +132,7 @@ class _Episode:
     last: SideObservation | None = None
 
     def complete(self) -> SideObservation | None:
-        """Return the last observation, with everything made that it could still be asked for."""
+        """Return the last observation, with all its lazy parts made."""
         if self.last is not None:
             tuple(self.last.agents.values())
         return self.last
@@ -140,7 +140,7 @@ class _Episode:
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What the agents' parts of one observation are made of."""
+    """The common input of all agents' observations at one moment."""
 
     episode: _Episode
     scene: Scene
@@ -148,11 +148,11 @@ class _Moment:
     feedback: Mapping[str, Feedback]
     album: Album | None
     conditions: dict[str, str] = field(default_factory=dict)
-    """By tag, what was written of a unit's condition."""
+    """By tag, the written condition of a unit."""
 
 
 class _WhenAsked(Mapping[str, AgentObservation]):
-    """What each agent sees, in the order of the task; made when it is first asked for."""
+    """The observation of each agent, in the order of the task; made on first access."""
 
     def __init__(self, agents: Sequence[AgentConfig], make: Callable[[AgentConfig], AgentObservation]) -> None:
         self._agents = {agent.name: agent for agent in agents}
@@ -165,7 +165,7 @@ class _WhenAsked(Mapping[str, AgentObservation]):
             assert self._make is not None
             self._made[name] = self._make(agent)
             if len(self._made) == len(self._agents):
-                self._make = None  # it holds the observation before, and that one the one before it
+                self._make = None  # it holds the observation before, which holds the one before that
         return self._made[name]
 
     def __iter__(self) -> Iterator[str]:

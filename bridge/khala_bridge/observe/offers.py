@@ -1,9 +1,8 @@
-"""What a team may be told now, what that costs, and why the rest is not possible.
+"""The actions that a team can use now, their costs, and why the others are not possible.
 
-`khala_bridge.rules` judges each action: for the units of a team, or for a team without units for those of the whole
-side that would carry it out; which of them it will be, and where, is left to the rules of `khala_bridge.auto`. Here the
-answers become a part of the team's view. Whether a call is carried out is decided by `khala_bridge.act`, by the state
-it meets.
+`khala_bridge.rules` judges each action for the units of a team, or, for a team without units, for those of the whole
+side that would carry it out; the rules of `khala_bridge.auto` later choose the unit and the place. Here the answers
+become a part of the team's view. `khala_bridge.act` decides whether to carry out a call, by the state at that time.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class Choice(NamedTuple):
-    """What a team may be told: a part of its view."""
+    """The possible and impossible actions of a team: a part of its view."""
 
     actions: tuple[ActionSpec, ...]
     offers: tuple[ActionCost, ...]
@@ -37,10 +36,10 @@ class Choice(NamedTuple):
 
 
 class Possible:
-    """The means of a side at one moment, and what they allow."""
+    """The means of a side at one moment, and the actions that they allow."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        """Takes the side and its accounts."""
+        """Take the side and its accounts."""
         self._abilities = snapshot.abilities
         self._side = side_of(snapshot)
         self._ledger = ledger_of(snapshot)
@@ -49,7 +48,7 @@ class Possible:
         """Minerals and vespene that are set aside for what workers are on their way to build."""
 
     def for_team(self, agent: AgentConfig, members: Sequence[Body]) -> Choice:
-        """The actions of a team's types of units, in the order in which they are listed for them."""
+        """Return the choice of the actions of a team's types of units, in the order of the task's lists."""
         by_type: dict[str, list[UnitState]] = {}
         for body in members:
             by_type.setdefault(body.name, []).append(self._side.units[body.tag])
@@ -70,7 +69,7 @@ class Possible:
         return self._choice(judged, doers)
 
     def skills(self, agent: AgentConfig, body: Body) -> tuple[str, ...]:
-        """Skills that the agent may use and this very unit could use now; none if the game was not asked."""
+        """Return the skills that the agent has and this very unit can use now; none if the game was not asked."""
         skills = _skills(agent.actions.get(body.name, ()))
         if self._abilities is None or not skills:
             return ()
@@ -78,7 +77,7 @@ class Possible:
         return tuple([name for name, ability in skills.items() if ability in able])
 
     def for_side(self, names: Iterable[str]) -> Choice:
-        """Those of the actions of a side team that some unit of the side can carry out."""
+        """Return the choice of a side team's actions; possible are those that some unit of the side can carry out."""
         judged: dict[str, Unavailable | None] = {}
         doers: dict[str, str] = {}
         for name in names:
@@ -93,7 +92,7 @@ class Possible:
         return Choice(tuple([a.spec for a in valid]), tuple([offer for offer in offers if offer is not None]), barred)
 
     def _offer(self, action: Action, unit_type: str) -> ActionCost | None:
-        """What an action costs that a type of unit can do; None if it is free."""
+        """Return the cost of an action for a type of unit that can do it; None if it is free."""
         if not _is_paid(action.name, unit_type) or action.pysc2 is None:
             return None
         facts = facts_for(action.pysc2.ability_id, unit_type, self._side.upgrades)
@@ -114,7 +113,7 @@ class Possible:
     # --- why not ----------------------------------------------------------------------------------------------
 
     def _why_nobody(self, action: Action) -> Unavailable | None:
-        """Why nobody of the side can do an action now; None if somebody can."""
+        """Return why no unit of the side can do an action now; None if one can."""
         use = asked_by(action, of_side=True)
         if use is None:
             return None
@@ -125,33 +124,33 @@ class Possible:
         return None if able is None or use.ability in able else nobody(())
 
     def _of_types(self, types: tuple[str, ...]) -> list[UnitState]:
-        """Units of some types, those that differ; remembered, since many actions ask about them."""
+        """Return the units of some types, without duplicates; cached, since many actions ask for them."""
         if types not in self._distinct:
             self._distinct[types] = distinct(self._side.of_types(types))
         return self._distinct[types]
 
 
 def _of_team(reasons: Sequence[Unavailable]) -> Unavailable:
-    """The nearest of the reasons of a team's types, as of one unit."""
+    """Return the nearest of the reasons of a team's types, as if of one unit."""
     return nearest(reasons)._replace(among=())
 
 
 @functools.lru_cache(1024)
 def _uses(names: tuple[str, ...]) -> tuple[tuple[str, Use | None], ...]:
-    """What actions of a team ask about, by their names."""
+    """Return the uses that a team's actions ask about, by the actions' names."""
     return tuple((name, asked_by(catalogue()[name], of_side=False)) for name in names)
 
 
 @functools.cache
 def _is_paid(action: str, unit_type: str) -> bool:
-    """Whether an action costs anything."""
+    """Return True if an action costs anything."""
     function = catalogue()[action].pysc2
     return function is not None and any(any(price_of(facts)) for facts in cases(function.ability_id, unit_type))
 
 
 @functools.lru_cache(1024)
 def _skills(names: tuple[str, ...]) -> dict[str, int]:
-    """Abilities of those actions that are skills, by the names of their functions without what they begin with."""
+    """Return the abilities of the actions that are skills, by the names of their functions without the prefix."""
     actions = (catalogue()[name] for name in names)
     functions = (action.pysc2 for action in actions if action.group == "skill")
     return {f.stem.partition("_")[2] or f.stem: f.ability_id for f in functions if f is not None}

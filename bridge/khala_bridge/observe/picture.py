@@ -1,4 +1,4 @@
-"""A finished picture: bytes of a file, and what is to be said of them."""
+"""A finished picture: the bytes of a file, with its name and title."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MediaType: TypeAlias = Literal["image/jpeg", "image/png", "image/webp"]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What goes over the bus: bytes, and what is to be said of them."""
+    """A picture as it goes over the bus: bytes, with its name and title."""
 
     name: str
     title: str
@@ -24,7 +24,7 @@ class Picture:
 
     @property
     def ref(self) -> ImageRef:
-        """How an observation names it."""
+        """Its reference in an observation."""
         return ImageRef(
             name=self.name,
             media_type=self.media_type,

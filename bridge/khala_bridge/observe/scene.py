@@ -1,14 +1,14 @@
-"""One snapshot while views are made of it: what stands on which team's screen.
+"""One snapshot while views are made of it: the units on each team's screen.
 
-A team sees what its camera shows: a square of 24 world units around its head unit. The camera is virtual, it needs
+A team sees what its camera shows: a square of 24 world units around its head unit. The camera is virtual: it needs
 no move in the game and does not stop at the border of the map. The team's own units are listed wherever they are,
 with a position outside of the frame if the camera does not reach them; everything else only within it. Neutral units
-(resources, rocks) and larvae are left out; builders are shown resources apart. A team without units of its own, which
-orders those of the whole side, has no camera and sees nothing.
+(resources, rocks) and larvae are left out; builders get resources apart. A team without units of its own, which
+orders units of the whole side, has no camera and sees nothing.
 
-What all teams see alike is made once per scene, and who is on a screen is found with arrays, since a dozen teams look
-at a hundred units in each step. Views of the whole side are made by `khala_bridge.observe.side`, words by
-`khala_bridge.observe.text`; `khala_bridge.observe.observer` is above.
+The common part of all teams is made once per scene, and arrays find the units on a screen, since a dozen teams look
+at a hundred units in each step. `khala_bridge.observe.side` makes views of the whole side, `khala_bridge.observe.text`
+the words; `khala_bridge.observe.observer` is above.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ _NO_DETAILS = UnitDetails()
 
 
 class Scene:
-    """A snapshot, and what every team sees alike."""
+    """A snapshot, and the common part of all teams' views."""
 
     def __init__(self, snapshot: Snapshot, frames: Frames, before: Scene | None = None) -> None:
-        """Takes a snapshot, the frames that its views are given in, and the scene before, which it does not keep."""
+        """Take a snapshot, the frames of its views, and the scene before, which it does not keep."""
         self.snapshot = snapshot
         self.world = snapshot.info.frame(frames)
         self._screen_size = frames.screen
@@ -72,7 +72,7 @@ class Scene:
         self._arrange()
 
     def _arrange(self) -> None:
-        """Puts the bodies in order as arrays: one row a body, in ascending order of tags."""
+        """Put the bodies in order as arrays: one row a body, in ascending order of tags."""
         order = self._order = tuple(self.bodies.values())
         self._index = {b.tag: index for index, b in enumerate(order)}
         self._tags = [b.view.tag for b in order]
@@ -85,7 +85,7 @@ class Scene:
 
     @functools.cached_property
     def resources(self) -> tuple[Body, ...]:
-        """Minerals and geysers as they are now or were seen last, in ascending order of tags."""
+        """Minerals and geysers as they are now or were last seen, in ascending order of tags."""
         neutral = (unit for unit in self.snapshot.known.values() if unit.is_neutral)
         return tuple(body(unit, self.world) for unit in neutral if unit.facts is not None and unit.facts.resource)
 
@@ -103,7 +103,7 @@ class Scene:
 
     @functools.cached_property
     def view(self) -> View:
-        """What every agent is told alike."""
+        """The common part of all agents' views."""
         player = self.snapshot.player
         return View(
             time_s=round(self.snapshot.game_loop / LOOPS_PER_S, 3),
@@ -120,13 +120,13 @@ class Scene:
     def team(
         self, agent: AgentConfig, team: Team, before: TeamObservation | None, *, resources: bool = False
     ) -> TeamObservation:
-        """What one team sees.
+        """Return the observation of one team.
 
         Args:
             agent: whose team it is.
             team: its units; they are in the snapshot.
-            before: what the team saw before, for events; None if it saw nothing.
-            resources: whether it is told of minerals and geysers.
+            before: the team's observation before, for events; None if there is none.
+            resources: whether it gets minerals and geysers.
         """
         if not team.tags:
             names = team.config.actions
@@ -166,7 +166,7 @@ class Scene:
         return tuple(units)
 
     def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
-        """The units of a team with the skills that they could use: what one of them could, the others could not."""
+        """Return the units of a team, each with the skills that it can use now and those that only others of them can."""
         skills = [self.possible.skills(agent, body) for body in bodies]
         ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
         if not ready_somewhere:
@@ -174,7 +174,7 @@ class Scene:
         return tuple([_with_skills(view, ready, ready_somewhere) for view, ready in zip(views, skills, strict=True)])
 
     def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
-        """The resources on a camera's screen, by type and tag."""
+        """Return the resources on a camera's screen, by type and tag."""
         seen = [b for b in self.resources if on_screen(camera, b)]
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
@@ -183,7 +183,7 @@ class _Look:
     """Where all bodies are for one team's camera; one row a body in each array."""
 
     def __init__(self, camera: Camera, places: Floats, members: NDArray[np.intp]) -> None:
-        """Takes a camera, (n, 2) places in the world, and the rows of those who are of the team."""
+        """Take a camera, (n, 2) world positions, and the rows of the team's units."""
         self.others: NDArray[np.bool_] = camera.sees(places)
         """Who is on the screen and not of the team."""
         self.others[members] = False
@@ -197,7 +197,7 @@ class _Look:
 
 
 def _tenths(values: Floats, size: float) -> Floats:
-    """To a tenth of a cell; a position within the frame stays within it, whose end is open."""
+    """Return positions rounded to a tenth of a cell; they stay within the frame, whose end is open."""
     near = np.round(values, 1) + 0.0  # no negative zero
     near[(values < size) & (near >= size)] = round(size - 0.1, 1)
     return near
@@ -213,13 +213,13 @@ def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:
 
 
 def on_screen(camera: Camera, seen: Body) -> bool:
-    """Whether a camera shows a body."""
+    """Return True if a camera shows a body."""
     right, down = seen.x - camera.x, camera.y - seen.y
     return -_HALF <= right < _HALF and -_HALF <= down < _HALF
 
 
 def screen_of(camera: Camera, seen: Body) -> Point:
-    """Where a camera shows a body, to a tenth of a cell."""
+    """Return the screen position of a body, to a tenth of a cell."""
     return rounded(camera.screen(seen.x, seen.y), camera.size)
 
 

@@ -1,8 +1,7 @@
-"""Views of a whole side, for those who lead or build it: what it has, makes and knows of, and where it is in trouble.
+"""Views of a whole side, for agents that lead or build it: its units, production, knowledge of the enemy, and alerts.
 
-Functions of a scene, and of what is remembered of the episode; each makes one part of a `View`. What they see is made
-by `khala_bridge.observe.scene`, what is remembered by `khala_bridge.observe.chronicle`; which agent is told which part
-is decided by the sections of its text.
+Functions of a scene (`khala_bridge.observe.scene`) and of the memory of the episode (`khala_bridge.observe.chronicle`);
+each makes one part of a `View`. The sections of an agent's text decide which parts the agent gets.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ if TYPE_CHECKING:
 SAME_PLACE = 10.0
 """World units within which losses are one alert; about half a screen."""
 WARNINGS = frozenset({"NuclearLaunchDetected", "NydusWormDetected", "MineralsExhausted", "VespeneExhausted"})
-"""What the game's own alerts say that is to be seen nowhere else."""
+"""Texts of those alerts of the game that no other part shows."""
 
 
 def counts(scene: Scene, chronicle: Chronicle) -> Counts:
-    """What the side has, makes, and has seen of the enemy."""
+    """Return the numbers of the side's units, of its production, and of the enemies that it has seen."""
     left_out = PASSING - COUNTED_ANYWAY
     own = [body.view for body in scene.bodies.values() if body.is_own and body.name not in left_out]
     by_type: dict[str, list[UnitView]] = {}
@@ -57,7 +56,7 @@ def _type_count(name: str, views: Sequence[UnitView]) -> TypeCount:
 
 
 def works(name: str) -> bool:
-    """Whether units of a type are meant to be busy: they gather, or they produce or research as structures."""
+    """Return True if units of a type should be busy: workers, and structures that produce or research."""
     known = knowledge().get(name)
     if known is None:
         return False
@@ -70,7 +69,7 @@ def _makes(does: str) -> bool:
 
 
 def _production(own: Iterable[UnitView]) -> Iterator[Production]:
-    """What orders train, research and morph, by their names."""
+    """Yield the products of training, research and morphs, by the names of the orders."""
     begun: dict[str, list[float]] = {}
     queued: Counter[str] = Counter()
     for view in own:
@@ -87,7 +86,7 @@ def _production(own: Iterable[UnitView]) -> Iterator[Production]:
 
 
 def alerts(scene: Scene) -> tuple[Alert, ...]:
-    """Where own units lost health or died since the observation before, in the order of their tags."""
+    """Return alerts where own units lost health or died since the observation before, in the order of their tags."""
     changes, dead = scene.events.changes, scene.events.dead
     hurt = [body for body in scene.bodies.values() if body.is_own and changes.get(body.view.tag, 0) < 0]
     fallen = [body for tag, body in sorted(scene.fallen.items()) if body.is_own and hex(tag) in dead]
@@ -113,12 +112,12 @@ def _alert(scene: Scene, bodies: Sequence[Body]) -> Alert:
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
-    """What the game itself warns of, each once."""
+    """Return the game's own warnings, each once."""
     return tuple(dict.fromkeys(alert for alert in scene.snapshot.alerts if alert in WARNINGS))
 
 
 def others(scene: Scene, roster: TeamRoster, task: TaskConfig, agent: str) -> tuple[TeamReport, ...]:
-    """The teams of all other agents, in the order of the task."""
+    """Return the teams of all other agents, in the order of the task."""
     teams = (team for other in task.agents if other.name != agent for team in roster.teams(other.name))
     return tuple(_report(t.agent, t.name, [scene.bodies[tag] for tag in t.tags]) for t in teams if t.tags)
 
@@ -136,7 +135,7 @@ def _report(agent: str, name: str, bodies: Sequence[Body]) -> TeamReport:
 
 
 def warp_gates(scene: Scene) -> WarpGates | None:
-    """How many WarpGates there are, and how many of them could warp in now; None without any."""
+    """Return the number of WarpGates, and of those that can warp in now; None without WarpGates."""
     gates = [b for b in scene.bodies.values() if b.is_own and b.name == "WarpGate" and b.view.build_progress >= 1]
     if not gates:
         return None

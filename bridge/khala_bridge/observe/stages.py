@@ -1,7 +1,7 @@
-"""Which stage of its task each team is at: the line of time of a task, per episode.
+"""The present stage of each team's task, per episode.
 
-A stage ends when the middle of the team's screen is at its place, or when the clock shows its time. A team that is
-shown one text all the time has no stages, and is none of this module's business.
+A stage ends when the middle of the team's screen is at its place, or when the clock shows its time. A team with one
+text for all the time has no stages, and does not appear here.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 
 class Stages:
-    """The stages that the teams of a side have reached in an episode."""
+    """The stages that a side's teams have reached in an episode."""
 
     def __init__(self) -> None:
         self._reached: dict[tuple[str, str], int] = {}
 
     def task(self, team: Team, minimap: Point | None, time_s: float) -> str:
-        """What a team has to do now; it moves on to the stage that it has reached.
+        """Return the present task of a team, after moving on to the stage that it has reached.
 
         Args:
-            team: the team; units of a team of the kind `select` are at a stage each.
+            team: the team; each unit of a team of the kind `select` has a stage of its own.
             minimap: the middle of its screen; None if it has none.
             time_s: seconds on the game's clock.
         """

@@ -1,4 +1,4 @@
-"""Is it possible now, what is missing, and what does it cost: one answer for everybody who asks.
+"""Is it possible now, what is missing, and what does it cost: one answer for all callers.
 
     why_not(use, unit, side, ledger)    None, or an `Unavailable`: the kind of reason and its figures
     brief(why)                          in the list of what is not possible: `needs 50 energy, there is 8`
@@ -6,8 +6,8 @@
     ledger.pay(price_of(facts))         what a use costs, taken from the accounts of a turn
 
 Functions of plain values (`Side`, `UnitState`, `Ledger`) that `khala_bridge.state.means` reads from a snapshot; nothing
-here knows the SC2 API. Above are `khala_bridge.observe` (what is offered), `khala_bridge.act` (what is refused) and
-`khala_bridge.auto` (what the host finds and orders); below is `khala_bridge.knowledge`. Places and targets are not
+here knows the SC2 API. Above are `khala_bridge.observe`, which offers actions, `khala_bridge.act`, which refuses them,
+and `khala_bridge.auto`, which finds the host's orders; below is `khala_bridge.knowledge`. Places and targets are not
 judged here: they need the ground.
 """
 

@@ -1,4 +1,4 @@
-"""What the use of an ability costs, and which case of a general ability is meant."""
+"""The cost of an ability, and the meant case of a general ability."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Cost(NamedTuple):
-    """What a use takes from the accounts."""
+    """The cost of one use."""
 
     minerals: float
     vespene: float
@@ -28,19 +28,19 @@ class Shortfall(NamedTuple):
     """`minerals`, `vespene` or `supply`."""
     needs: float
     has: float
-    """What is left for it; less than 0 for supply above the cap."""
+    """The amount that is left; less than 0 for supply above the cap."""
     aside: float = 0.0
-    """What is set aside for what workers are on their way to build, and no part of what is left."""
+    """The amount set aside for structures that workers are on their way to build; not part of what is left."""
 
 
 def price_of(facts: AbilityFacts) -> Cost:
-    """Return the price of an ability; its supply is net, what a unit becomes counts above what it was."""
+    """Return the price of an ability; its supply is net: for a morph, only the difference counts."""
     return Cost(facts.minerals, facts.vespene, facts.supply)
 
 
 @functools.cache
 def cases(ability: int, unit_type: str) -> tuple[AbilityFacts, ...]:
-    """Return what an ability is for a type of unit: one case, the levels of a research in their order, or none."""
+    """Return the cases of an ability for a type of unit: one, the levels of a research in order, or none."""
     facts = ability_of(ability, unit_type)
     if facts is None:
         return ()
@@ -55,7 +55,7 @@ def is_free(ability: int, unit_type: str) -> bool:
 
 
 def facts_for(ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:
-    """Return what is known of an ability for a type of unit: of several levels of research, the next one."""
+    """Return the facts of an ability for a type of unit; of several levels of research, the next one."""
     found = cases(ability, unit_type)
     if len(found) <= 1:
         return found[0] if found else None

@@ -1,16 +1,16 @@
-"""Why not now: the reasons, the order in which they are tried, and which of them count when.
+"""Why an action is not possible now: the reasons, their order, and when each of them counts.
 
-The judge is the game, which is asked once an observation what each unit can do. Why it says no is worked out here from
-the state and from what is known of the ability:
+The judge is the game, which says once an observation what each unit can do. This module works out why it says no, from
+the state and the facts of the ability:
 
-| the game              | what counts for a team              | besides, where the host chooses the unit          |
+| the game              | reasons for a team                  | more of them if the host chooses the unit         |
 |-----------------------|-------------------------------------|---------------------------------------------------|
 | says yes              | weapon, research, energy, price     | unfinished, add-on, orders, queue, power          |
 | says no               | everything; at last "the game"      |                                                   |
 | was not asked         | a weapon or an upgrade is missing   | everything but the cooldown and "the game"        |
 
-Even after a yes the price, the energy and the research are judged, since earlier calls of the turn spend and begin.
-The host picks one of many, and looks at what each has to do by itself. Range is no reason: units walk.
+Even after a yes, price, energy and research are judged, since earlier calls of the turn spend resources and begin
+research. The host picks one of many units, and looks at the orders of each. Range is not a reason: units walk.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from khala_bridge.rules.values import Side, UnitState
 
 QUEUE, REACTOR_QUEUE = 5, 8
-"""Orders that a structure holds, the one at work among them; with a Reactor more."""
+"""Orders that a structure holds, with the one at work; with a Reactor more."""
 QUEUED = frozenset({"train", "research"})
 """Kinds of abilities that a structure puts into its queue."""
 AT_ONCE = frozenset({"build_addon", "grow", "morph", "structure_morph"})
@@ -41,28 +41,28 @@ AT_ONCE = frozenset({"build_addon", "grow", "morph", "structure_morph"})
 
 
 class Use(NamedTuple):
-    """What is asked about. `use_of` and `asked_by` make it."""
+    """The question to the judge. `use_of` and `asked_by` make it."""
 
     ability: int
     switch: bool
-    """Whether it sets an autocast, about which the game is not asked."""
+    """Whether it sets an autocast, which the game's query leaves out."""
     attack: bool
     by_host: bool
-    """Whether the host chooses the unit, so that it looks at what each of them has to do."""
+    """Whether the host chooses the unit, so that it looks at the orders of each."""
     at_unit: bool
-    """Whether it is aimed at a unit: what has no weapon may attack a place, and just goes there."""
+    """Whether it is aimed at a unit: a unit without a weapon may attack a place, and just goes there."""
     of_side: bool
-    """Whether any unit of the side may do it: no worker is taken then from other work than gathering."""
+    """Whether any unit of the side may do it; then only workers that gather are taken."""
 
 
 @functools.lru_cache(4096)
 def use_of(function: Function, *, by_host: bool = False, at_unit: bool = False, of_side: bool = False) -> Use:
-    """Return what a function of PySC2 asks about."""
+    """Return the question of a function of PySC2."""
     return Use(function.ability_id, function.kind == "autocast", is_attack(function), by_host, at_unit, of_side)
 
 
 def asked_by(action: Action, *, of_side: bool) -> Use | None:
-    """Return what an action asks about; None for one that orders nothing."""
+    """Return the question of an action; None for one that orders nothing."""
     function, by_host = action.pysc2, action.rule is not None
     if function is None:
         return None
@@ -70,7 +70,7 @@ def asked_by(action: Action, *, of_side: bool) -> Use | None:
 
 
 class _Case(NamedTuple):
-    """One unit and one ability: what the reasons look at."""
+    """One unit and one ability: the input of the reasons."""
 
     use: Use
     facts: AbilityFacts
@@ -101,9 +101,9 @@ def why_not(use: Use, unit: UnitState, side: Side, ledger: Ledger) -> Unavailabl
 
 
 def why_no_one(use: Use, units: Sequence[UnitState], side: Side, ledger: Ledger) -> Unavailable | None:
-    """Return why none of some units can do something now, as of the nearest to it; None if one can.
+    """Return why none of some units can do something now, by the unit that is nearest to it; None if one can.
 
-    There has to be a unit.
+    There must be at least one unit.
     """
     found: list[Unavailable] = []
     for unit in units:
@@ -115,17 +115,17 @@ def why_no_one(use: Use, units: Sequence[UnitState], side: Side, ledger: Ledger)
 
 
 def nobody(types: Sequence[str]) -> Unavailable:
-    """Return the reason where there is no unit of some types."""
+    """Return the reason if there is no unit of some types."""
     return Unavailable("nobody", " or ".join(types[:3]))
 
 
 def nearest(reasons: Sequence[Unavailable]) -> Unavailable:
-    """Return the one of some reasons that is the least in the way."""
+    """Return the reason that is easiest to overcome."""
     return reasons[0] if len(reasons) == 1 else max(reasons, key=rank)
 
 
 def sure(function: Function | None, unit_type: str, researched: Collection[str]) -> Unavailable | None:
-    """Return why units of a type surely cannot do something, whatever their state; None if the game has to be asked."""
+    """Return why units of a type cannot do something in any state; None if the game must be asked."""
     if function is None:
         return None
     if is_attack(function) and not is_armed(unit_type):
@@ -137,7 +137,7 @@ def sure(function: Function | None, unit_type: str, researched: Collection[str])
 
 @functools.cache
 def _reasons(says_yes: bool | None, *, by_host: bool) -> tuple[Reason, ...]:  # a key of the cache
-    """The reasons that count, in their order."""
+    """Return the reasons that count, in their order."""
     last: tuple[Reason, ...] = (_cooldown, _otherwise)
     if by_host:
         tech = () if says_yes else (_requirement,)
@@ -164,13 +164,13 @@ def _lacks(need: str, researched: Collection[str]) -> bool:
 
 
 def _unfinished(case: _Case) -> Unavailable | None:
-    """It is not there yet."""
+    """Return a reason if it is unfinished."""
     unit = case.unit
     return None if unit.finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
 
 
 def _research(case: _Case) -> Unavailable | None:
-    """It is researched, or somebody is at it."""
+    """Return a reason if it is researched, or under research."""
     facts, unit = case.facts, case.unit
     if not facts.researches:
         return None
@@ -182,7 +182,7 @@ def _research(case: _Case) -> Unavailable | None:
 
 
 def _requirement(case: _Case) -> Unavailable | None:
-    """A structure or an upgrade is missing."""
+    """Return a reason if a structure or an upgrade is missing."""
     missing = tuple(sorted((need for need in case.facts.requires if not case.side.has(need)), key=_is_upgrade))
     if not missing:
         return None
@@ -191,18 +191,18 @@ def _requirement(case: _Case) -> Unavailable | None:
 
 
 def _is_upgrade(need: str) -> bool:
-    """Structures are named before upgrades, which are researched in them."""
+    """Return True for an upgrade; as a sort key, it puts structures before the upgrades that they research."""
     return need not in knowledge()
 
 
 def _upgrade(case: _Case) -> Unavailable | None:
-    """An upgrade is missing; of structures nothing is sure where the game was not asked."""
+    """Return a reason if an upgrade is missing; missing structures are uncertain if the game was not asked."""
     missing = tuple(need for need in case.facts.requires if _lacks(need, case.side.upgrades))
     return Unavailable("requirement", case.unit.type, case.unit.tag, names=missing) if missing else None
 
 
 def _addon(case: _Case) -> Unavailable | None:
-    """An add-on is missing."""
+    """Return a reason if an add-on is missing."""
     addon, unit = case.facts.addon, case.unit
     if not addon or unit.addon in stand_ins(addon):
         return None
@@ -210,20 +210,20 @@ def _addon(case: _Case) -> Unavailable | None:
 
 
 def _energy(case: _Case) -> Unavailable | None:
-    """It has too little energy, after what earlier calls of the turn took."""
+    """Return a reason if it has too little energy after earlier calls of the turn."""
     unit, needs = case.unit, case.facts.energy
     left = unit.energy - case.ledger.energy[unit.tag] if needs else 0.0
     return None if needs <= left else Unavailable("energy", unit.type, unit.tag, needs=needs, has=left)
 
 
 def _price(case: _Case) -> Unavailable | None:
-    """Minerals, vespene or supply do not suffice, after what earlier calls of the turn took."""
+    """Return a reason if minerals, vespene or supply do not suffice after earlier calls of the turn."""
     missing = case.ledger.short_of(price_of(case.facts))
     return Unavailable("price", case.unit.type, case.unit.tag, missing=missing) if missing else None
 
 
 def _taken(case: _Case) -> Unavailable | None:
-    """An earlier call of the turn uses it; structures go on with their other work."""
+    """Return a reason if an earlier call of the turn uses it; structures can do several things."""
     unit, does = case.unit, case.facts.does
     goes_on = does == "build" or (does != "warp_in" and _is_structure(unit.type))
     if goes_on or unit.tag not in case.ledger.busy:
@@ -232,7 +232,7 @@ def _taken(case: _Case) -> Unavailable | None:
 
 
 def _occupied(case: _Case) -> Unavailable | None:
-    """It is a worker that has more to do than to gather; the worker of a team builds one thing after the other."""
+    """Return a reason if it is a worker with other work than gathering; a team's worker queues its buildings."""
     unit = case.unit
     if case.facts.does != "build" or not case.use.of_side or (unit.gathers and unit.tag not in case.ledger.busy):
         return None
@@ -240,7 +240,7 @@ def _occupied(case: _Case) -> Unavailable | None:
 
 
 def _queue(case: _Case) -> Unavailable | None:
-    """Its queue of production is full."""
+    """Return a reason if its production queue is full."""
     unit, ledger = case.unit, case.ledger
     if case.facts.does not in QUEUED or not _is_structure(unit.type):
         return None
@@ -250,13 +250,13 @@ def _queue(case: _Case) -> Unavailable | None:
 
 
 def _attached(case: _Case) -> Unavailable | None:
-    """It has an add-on already, finished or not."""
+    """Return a reason if it has an add-on already, finished or not."""
     has_one = case.facts.does == "build_addon" and case.unit.attached
     return Unavailable("attached", case.unit.type, case.unit.tag) if has_one else None
 
 
 def _work(case: _Case) -> Unavailable | None:
-    """It has something to do, and would have to do this at once."""
+    """Return a reason if it has orders, and this one must be done at once."""
     unit, ledger = case.unit, case.ledger
     if case.facts.does not in AT_ONCE or not _is_structure(unit.type):
         return None
@@ -265,18 +265,18 @@ def _work(case: _Case) -> Unavailable | None:
 
 
 def _power(case: _Case) -> Unavailable | None:
-    """No Pylon powers it."""
+    """Return a reason if no Pylon powers it."""
     return None if case.unit.powered else Unavailable("power", case.unit.type, case.unit.tag)
 
 
 def _cooldown(case: _Case) -> Unavailable | None:
-    """It was used a short while ago; the game does not show it, but nothing else is left."""
+    """Return the cooldown as the reason, if there is one; the game does not show it, but nothing else is left."""
     pause = case.facts.cooldown_s
     return Unavailable("cooldown", case.unit.type, case.unit.tag, needs=pause) if pause else None
 
 
 def _otherwise(case: _Case) -> Unavailable:
-    """Nothing that is known speaks against it, but the game does."""
+    """Return the game itself as the reason: nothing known speaks against it."""
     return Unavailable("game", case.unit.type, case.unit.tag, has=case.unit.orders)
 
 

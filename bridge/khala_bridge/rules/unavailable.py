@@ -1,4 +1,4 @@
-"""The answer of a judgement: why something is not possible now, as data."""
+"""The result of a judgement: why something is not possible now, as data."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ class Unavailable(NamedTuple):
 
     kind: Kind
     who: str = ""
-    """Type of the unit that is spoken of; of nobody, the types that could."""
+    """Type of the unit; if there is no unit, the types that could do it."""
     tag: int = 0
     """Its tag."""
     among: tuple[str, ...] = ()
-    """Types of all units that were asked, where there are several."""
+    """Types of all judged units, if there are several."""
     names: tuple[str, ...] = ()
-    """What is missing: structures and upgrades, an add-on, or what is researched."""
+    """Names of what is missing: structures and upgrades, or an add-on; or the upgrade that is researched."""
     begun: tuple[str, ...] = ()
     """Those of the missing structures that are being built."""
     missing: tuple[Shortfall, ...] = ()
     """The accounts that do not suffice."""
     needs: float = 0.0
-    """Energy that it takes, or seconds between two uses."""
+    """Energy that a use takes, or seconds between two uses."""
     has: float = 0.0
-    """Energy that is there, how much of the unit is built, or how many orders it has."""
+    """Present energy, share of the unit that is built, or number of its orders."""
 
 
 def rank(why: Unavailable) -> tuple[int, float, int]:
-    """Return how near a unit is to being able; the nearest of several is spoken of, with more energy before less."""
+    """Return how near a unit is to being able, with more energy before less; texts name the nearest of several."""
     return RANKS[why.kind], why.has, -why.tag

@@ -1,4 +1,4 @@
-"""What is judged: a side and its units at one moment, as plain values.
+"""The input of a judgement: a side and its units at one moment, as plain values.
 
 `khala_bridge.state.means` makes them from a snapshot.
 """
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 FINISHED = 1.0
-"""Build progress of what is finished."""
+"""Build progress of a finished unit."""
 
 
 class UnitState(NamedTuple):
-    """What matters of an own unit."""
+    """The values of an own unit that matter here."""
 
     tag: int
     type: str
@@ -35,16 +35,16 @@ class UnitState(NamedTuple):
     """Whether it has the power that it needs."""
     orders: int = 0
     gathers: bool = True
-    """Whether it does nothing but gather, if it does anything."""
+    """Whether it has no orders except to gather."""
 
     @property
     def finished(self) -> bool:
-        """True if it is there completely."""
+        """True if its construction is finished."""
         return self.progress >= FINISHED
 
 
 def distinct(units: Iterable[UnitState]) -> list[UnitState]:
-    """Return the first of all units that differ in nothing but the tag: at the start of a turn one speaks for all."""
+    """Return the units without duplicates that differ only in the tag: at the start of a turn, one stands for all."""
     found: dict[tuple[object, ...], UnitState] = {}
     for unit in units:
         found.setdefault(unit[1:], unit)
@@ -53,13 +53,13 @@ def distinct(units: Iterable[UnitState]) -> list[UnitState]:
 
 @dataclass(frozen=True)
 class Side:
-    """What a player has, besides the accounts."""
+    """The units and upgrades of a player; the accounts are in `Ledger`."""
 
     units: dict[int, UnitState]
     """Own units by their tags, in ascending order."""
     upgrades: frozenset[str]
     ordered: frozenset[int]
-    """Abilities for which own units have orders."""
+    """Abilities that own units are ordered to use."""
 
     @functools.cached_property
     def by_type(self) -> dict[str, list[UnitState]]:
@@ -91,5 +91,5 @@ class Side:
         return requirement in self.upgrades
 
     def builds(self, structure: str) -> bool:
-        """Return True if a structure, or what may stand in for it, is there at least in part."""
+        """Return True if a structure, or what may stand in for it, is finished or under construction."""
         return not self.by_type.keys().isdisjoint(stand_ins(structure))

@@ -1,4 +1,4 @@
-"""Who can shoot: units without a weapon go where others attack, and some types shoot without one of their own."""
+"""Which units can shoot: units without a weapon go where others attack, and some shoot without one of their own."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ if TYPE_CHECKING:
 ATTACK: Final = 3674
 """The general ability to attack."""
 SCAN_MOVE: Final = 19
-"""What units without a weapon do on an order to attack: they walk there."""
+"""The ability of units without a weapon on an order to attack: they walk there."""
 
 
 def is_attack(function: Function) -> bool:
-    """Return True if a function attacks; scanning has the same general ability, and is for what has no weapon."""
+    """Return True if a function attacks; scanning has the same general ability, and is for units without a weapon."""
     return ATTACK in (function.ability_id, function.general_id) and function.stem != "Scan_Move"
 
 
 def can_shoot(unit_type: str, able: frozenset[int]) -> bool:
-    """Return True if a unit that the game lets attack has a weapon now.
+    """Return True if a unit that can attack, by the game's answer, has a weapon now.
 
-    What has none scans on the same order. Bunkers, and Oracles with their beam, shoot though their type has no weapon.
+    A unit without one scans on the same order. Bunkers, and Oracles with their beam, shoot though their type has no
+    weapon.
     """
     return is_armed(unit_type) or not able.isdisjoint(_shots())
 

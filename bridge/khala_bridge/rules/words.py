@@ -1,7 +1,7 @@
 """`Unavailable` in words: briefly for a list of what is not possible, as a sentence for a call that is refused.
 
-All forms are written from the same value. A team's sentence is about its units and ends a sentence; a side's is about
-any of its units, and says what to do about it, since the host would have chosen the unit.
+All forms come from the same value. A team's text is about its units and ends a sentence; a side's is about any of its
+units, and says what to do, since the host would have chosen the unit.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HOW_TO_GET: Final = {"Larva": "wait for the next one", "WarpGate": "research War
 
 
 def brief(why: Unavailable) -> str:
-    """Return the reason as short as it can be said, without repeating the action: `needs 50 energy, there is 8`."""
+    """Return the reason in the shortest form, without repeating the action: `needs 50 energy, there is 8`."""
     return _BRIEF[why.kind](why)
 
 
@@ -44,7 +44,7 @@ def _lack(why: Unavailable, name: str) -> str:
 
 
 def _needed_first(why: Unavailable) -> str:
-    """Structures before upgrades: without the former the latter cannot be researched."""
+    """Return the missing structures, or else the upgrades: these cannot be researched without the structures."""
     if structures := [name for name in why.names if name in knowledge()]:
         return f"a finished {' and a '.join(structures)} is needed first"
     return f"{' and '.join(why.names)} {'is' if len(why.names) == 1 else 'are'} not researched"
@@ -74,7 +74,7 @@ def _too_few(why: Unavailable) -> str:
 
 
 def _every(why: Unavailable, of_all: str, of_one: str) -> str:
-    """Of several units that were asked, or of the one that is spoken of."""
+    """Return the text for all judged types, or for the only unit."""
     return of_all.format(" or ".join(why.among)) if why.among else of_one.format(why.who)
 
 

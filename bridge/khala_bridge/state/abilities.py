@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def question(snapshot: Snapshot) -> query_pb2.RequestQuery:
-    """Asks about every own unit, those in the making too: they can be called off.
+    """Ask about every own unit, those in the making too: they can be called off.
 
     Costs count: what the player cannot pay is not available.
     """
@@ -31,7 +31,7 @@ def question(snapshot: Snapshot) -> query_pb2.RequestQuery:
 
 
 def available(answer: query_pb2.ResponseQuery) -> Mapping[int, frozenset[int]]:
-    """By tag of a unit, the ids of its abilities, each as itself and in its general form."""
+    """Return by tag of a unit, the ids of its abilities, each as itself and in its general form."""
     return {one.unit_tag: _both(tuple([a.ability_id for a in one.abilities])) for one in answer.abilities}
 
 

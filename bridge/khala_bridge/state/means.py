@@ -76,7 +76,7 @@ def _gathers(ability: int) -> bool:
 
 
 def _planned(snapshot: Snapshot) -> tuple[float, float]:
-    """Minerals and vespene that structures will cost which workers are on their way to build."""
+    """Return minerals and vespene that structures will cost which workers are on their way to build."""
     if not any(_builds(ability) for ability in side_of(snapshot).ordered):
         return 0.0, 0.0
     plans = [knowledge()[structure] for structure, _ in land_of(snapshot).plans]

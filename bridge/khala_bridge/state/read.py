@@ -120,7 +120,7 @@ def read_snapshot(
 
 
 def _units(messages: Iterable[raw_pb2.Unit]) -> dict[int, Unit]:
-    """The units by tag, in ascending order; the last one of those with the same tag."""
+    """Return the units by tag, in ascending order; the last one of those with the same tag."""
     found = [unit for unit in map(read_unit, messages) if unit is not None]
     found.sort(key=_tag)
     return {unit.tag: unit for unit in found}
@@ -166,7 +166,7 @@ def read_unit(unit: raw_pb2.Unit) -> Unit | None:
 
 
 def _only_own(unit: raw_pb2.Unit) -> tuple[Any, ...]:
-    """What the API tells of the player's own units, in the order of the fields of `Unit`."""
+    """Return what the API tells of the player's own units, in the order of the fields of `Unit`."""
     passengers, orders = unit.passengers, unit.orders
     inside = tuple([unit_name(passenger.unit_type) for passenger in passengers]) if passengers else ()
     return (*_of_own(unit), inside, tuple([_order(order) for order in orders]) if orders else ())

@@ -28,7 +28,7 @@ UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "Rav
 
 
 def kind(unit: Unit) -> UnitFacts | None:
-    """What is known of the type of a unit."""
+    """Return what is known of the type of a unit."""
     return _kind(unit.unit_type)
 
 
@@ -38,45 +38,45 @@ def _kind(unit_type: int) -> UnitFacts | None:
 
 
 def name(unit: Unit) -> str:
-    """Name of the type of a unit."""
+    """Return name of the type of a unit."""
     return unit.name
 
 
 def place(unit: Unit) -> WorldPoint:
-    """Where a unit is."""
+    """Return where a unit is."""
     return WorldPoint(unit.pos.x, unit.pos.y)
 
 
 def is_structure(unit: Unit) -> bool:
-    """Whether a unit is a structure."""
+    """Return whether a unit is a structure."""
     known = kind(unit)
     return known is not None and known.structure
 
 
 def is_worker(unit: Unit) -> bool:
-    """Whether a unit gathers and builds."""
+    """Return whether a unit gathers and builds."""
     known = kind(unit)
     return known is not None and known.worker and name(unit) != "MULE"
 
 
 def finished(units: Iterable[Unit]) -> list[Unit]:
-    """Those that are there completely."""
+    """Return those that are there completely."""
     return [unit for unit in units if unit.build_progress >= 1]
 
 
 def of_types(snapshot: Snapshot, types: Iterable[str]) -> list[Unit]:
-    """Own units of some types, finished or not, by ascending tags."""
+    """Return own units of some types, finished or not, by ascending tags."""
     wanted = frozenset(types)
     return [unit for unit in snapshot.own if name(unit) in wanted]
 
 
 def workers(snapshot: Snapshot) -> list[Unit]:
-    """Own workers, by ascending tags."""
+    """Return own workers, by ascending tags."""
     return [unit for unit in finished(snapshot.own) if is_worker(unit)]
 
 
 def army(snapshot: Snapshot, *, home: bool = False) -> list[Unit]:
-    """Own units that fight or help to fight and can move, by ascending tags.
+    """Return own units that fight or help to fight and can move, by ascending tags.
 
     No workers, structures, larvae and Overlords; neither what stands rooted (a sieged tank, a burrowed Lurker) nor what
     acts and vanishes by itself (Interceptors, Broodlings). Queens only at `home`.
@@ -89,7 +89,7 @@ def _fights(known: UnitFacts | None) -> bool:
 
 
 def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
-    """Enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
+    """Return enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
 
     A Zealot hits no Overlord: what flies over an army on the ground is no aim. Neither are Larvae and eggs.
     """
@@ -100,7 +100,7 @@ def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
 
 @functools.lru_cache(4096)
 def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
-    """Whether a unit of any of some types hits one of another; unknown types are taken to, and to be hit."""
+    """Return whether a unit of any of some types hits one of another; unknown types are taken to, and to be hit."""
     known = [kind for kind in map(_kind, ours) if kind is not None]
     target = _kind(other)
     if target is None or len(known) < len(ours) or not any(kind.weapons for kind in known):
@@ -110,29 +110,29 @@ def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
 
 
 def is_armed(unit: Unit) -> bool:
-    """Whether a unit fights, workers aside."""
+    """Return whether a unit fights, workers aside."""
     known = kind(unit)
     return known is None or (bool(known.weapons) and not known.worker)
 
 
 def enemy_structures(snapshot: Snapshot) -> list[Unit]:
-    """Enemy structures that are known, those remembered under the fog too, by ascending tags."""
+    """Return enemy structures that are known, those remembered under the fog too, by ascending tags."""
     found = (u for u in snapshot.known.values() if u.is_enemy and is_structure(u))
     return sorted(found, key=lambda unit: unit.tag)
 
 
 def own_structures(snapshot: Snapshot) -> list[Unit]:
-    """Own structures, finished or not, by ascending tags."""
+    """Return own structures, finished or not, by ascending tags."""
     return [unit for unit in snapshot.own if is_structure(unit)]
 
 
 def bears_resources(unit: Unit) -> bool:
-    """Whether a worker carries something home."""
+    """Return whether a worker carries something home."""
     return any(buff_name(buff).startswith("Carry") for buff in unit.buff_ids)
 
 
 def is_doing(unit: Unit, *abilities: int) -> bool:
-    """Whether a unit's present order is one of these abilities, special or general."""
+    """Return whether a unit's present order is one of these abilities, special or general."""
     return bool(unit.orders) and _among(unit.orders[0].ability_id, abilities)
 
 
@@ -142,5 +142,5 @@ def _among(ability: int, wanted: tuple[int, ...]) -> bool:
 
 
 def ability(function: str) -> int:
-    """The ability that a function of PySC2 stands for."""
+    """Return the ability that a function of PySC2 stands for."""
     return functions()[function].ability_id

@@ -81,7 +81,7 @@ class TeamRoster:
         self._takers: dict[int, list[list[_Group]]] = {}  # by unit type; [] for a type that no team lists
 
     def update(self, own: Sequence[Unit], player: PlayerState) -> None:
-        """Drops the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
+        """Drop the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
         units = {unit.tag: unit for unit in own}
         self._keep(units)
         transports: list[Unit] | None = None
@@ -93,11 +93,11 @@ class TeamRoster:
             self._place(_Arrival(unit, units, transports, player))
 
     def teams(self, agent: str) -> tuple[Team, ...]:
-        """The agent's teams that have units, and its `side` teams, in the order of its configuration."""
+        """Return the agent's teams that have units, and its `side` teams, in the order of its configuration."""
         return tuple(team for group in self._all_groups() if group.agent.name == agent for team in group.teams())
 
     def idle_teams(self, agent: str) -> tuple[str, ...]:
-        """Names of the agent's teams that have no unit now, though they could."""
+        """Return names of the agent's teams that have no unit now, though they could."""
         groups = (group for group in self._all_groups() if group.agent.name == agent and group.config.kind != "side")
         return tuple(group.config.name for group in groups if not group.tags)
 
@@ -105,7 +105,7 @@ class TeamRoster:
         return (group for groups in self._groups for group in groups)
 
     def _keep(self, units: Mapping[int, Unit]) -> None:
-        """Leaves in the teams those who are still there, as what they were; moves out those who became another."""
+        """Leave in the teams those who are still there, as what they were; moves out those who became another."""
         for tag in self._grouped & units.keys():
             home, unit_type = self._homes[tag], units[tag].unit_type
             if home.unit_type != unit_type:
@@ -130,7 +130,7 @@ class TeamRoster:
             group.add(tag)
 
     def _taken_by(self, unit_type: int) -> list[list[_Group]]:
-        """The groups that list a unit type, agent by agent."""
+        """Return the groups that list a unit type, agent by agent."""
         if unit_type not in self._takers:
             name: str | None = unit_name(unit_type)
             takers: list[list[_Group]] = []
@@ -190,7 +190,7 @@ def _lists(takers: Iterable[Sequence[_Group]], group: _Group) -> bool:
 
 
 def _find(takers: Sequence[Sequence[_Group]], arrival: _Arrival) -> _Group | None:
-    """The group that takes a unit: agents of airborne units are asked first, then all others, in their order."""
+    """Return the group that takes a unit: agents of airborne units are asked first, then all others, in their order."""
     for airborne in (True, False):
         for groups in takers:
             if (groups[0].agent.admits == "airborne") == airborne and _admits(groups, arrival):

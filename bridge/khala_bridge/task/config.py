@@ -50,7 +50,7 @@ def _known(name: str, known: Iterable[str], what: str) -> str:
 
 
 def _known_action(name: str) -> str:
-    """An action as the catalogue spells it; a group is left to those who know whom it is for."""
+    """Return an action as the catalogue spells it; a group is left to those who know whom it is for."""
     if name.startswith(GROUP_SELECTOR):
         return name
     action = alias_of(name)
@@ -58,7 +58,7 @@ def _known_action(name: str) -> str:
 
 
 def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """What the forms of some types may be told: of what is listed for a type all that the form has as well."""
+    """Return what the forms of some types may be told: of what is listed for a type all that the form has as well."""
     return {
         form: tuple(name for name in chosen(names, form) if catalogue()[name].fits(form))
         for unit_type, names in actions.items()
@@ -67,7 +67,7 @@ def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]
 
 
 def _some(values: tuple[T, ...]) -> tuple[T, ...]:
-    """At least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
+    """Return at least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
     if not values:
         raise ValueError("at least one is needed")
     return values
@@ -194,13 +194,13 @@ class AgentConfig(Frozen):
         return self
 
     def catalogue(self) -> tuple[Action, ...]:
-        """Every action that any of its units may be told, in the order in which they are first listed."""
+        """Return every action that any of its units may be told, in the order in which they are first listed."""
         lists = (*(team.actions for team in self.teams), *self.actions.values())
         names = dict.fromkeys(name for listed in lists for name in listed)
         return tuple(catalogue()[name] for name in names)
 
     def team_specs(self) -> tuple[TeamSpec, ...]:
-        """Its teams as its briefing tells them."""
+        """Return its teams as its briefing tells them."""
         return tuple(TeamSpec(name=t.name, unit_types=t.unit_types, task=t.task) for t in self.teams)
 
 
@@ -284,22 +284,22 @@ class TaskConfig(Frozen):
         return max(sizes, default=None)
 
     def agent(self, name: str) -> AgentConfig:
-        """The agent of this name."""
+        """Return the agent of this name."""
         return next(agent for agent in self.agents if agent.name == name)
 
     def max_actions_of(self, agent: AgentConfig) -> int:
-        """Actions that one team of an agent may have in one reply."""
+        """Return actions that one team of an agent may have in one reply."""
         return self.max_actions if agent.max_actions is None else agent.max_actions
 
     def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:
-        """The agents that this one may write to, in the order of the task."""
+        """Return the agents that this one may write to, in the order of the task."""
         if not self.communication:
             return ()
         names = agent.talks_to
         return tuple(a for a in self.agents if a.name != agent.name and (names is None or a.name in names))
 
     def cards(self) -> tuple[AgentCard, ...]:
-        """The agents as the run card lists them."""
+        """Return the agents as the run card lists them."""
         return tuple(
             AgentCard(name=a.name, side=self.side, teams=tuple(t.name for t in a.teams), required=a.required)
             for a in self.agents

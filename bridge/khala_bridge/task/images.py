@@ -142,7 +142,7 @@ class ImageSpec(Frozen):
 
 
 def images_for(words: str, kind: str) -> tuple[ImageSpec, ...]:
-    """The pictures that a few words ask for.
+    """Return the pictures that a few words ask for.
 
     Args:
         words: `paper` for those of the agent's kind, `none`, or what each picture shows, with commas between.

@@ -50,5 +50,5 @@ class MapSpec(Frozen):
 
 @functools.cache
 def known_maps() -> dict[str, MapSpec]:
-    """Every map by name, in the order of the file."""
+    """Return every map by name, in the order of the file."""
     return {name: spec.model_copy(update={"name": name}) for name, spec in data.table("maps.yaml", MapSpec).items()}

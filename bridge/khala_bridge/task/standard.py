@@ -29,7 +29,7 @@ STEP_LOOPS = 11
 
 
 def standard_task(spec: MapSpec) -> TaskConfig:
-    """The task that is made for a map."""
+    """Return the task that is made for a map."""
     return TaskConfig(
         name=spec.name,
         description=spec.goal,
@@ -51,7 +51,7 @@ def _commander(spec: MapSpec) -> AgentConfig:
 
 
 def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
-    """Where there are workers, the team of no units that trains and builds."""
+    """Return where there are workers, the team of no units that trains and builds."""
     if not _has_workers(spec):
         return ()
     known = {action.group for action in catalogue().values() if action.race in (spec.race, None)}
@@ -60,12 +60,12 @@ def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
 
 
 def _has_workers(spec: MapSpec) -> bool:
-    """Whether there is an economy, so that what is not there yet can be built and researched."""
+    """Return whether there is an economy, so that what is not there yet can be built and researched."""
     return any(knowledge()[unit].worker for unit in spec.units)
 
 
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
-    """Whether units of a type are told the action on this map."""
+    """Return whether units of a type are told the action on this map."""
     return (
         action.group in GROUPS
         and action.subject != "side"

@@ -68,14 +68,14 @@ class Case(NamedTuple):
 
 @functools.cache
 def cases() -> dict[str, Case]:
-    """By name of the action, those of one stage side by side."""
+    """Return by name of the action, those of one stage side by side."""
     found = [case_of(action) for action in catalogue().values()]
     found.sort(key=lambda case: (case.caster, case.race, case.place or (), getattr(case.prepare, "__qualname__", "")))
     return {case.action.name: case for case in found}
 
 
 def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> list[ParameterSet]:
-    """Cases in lists by who is told, for tests with subtests: the first of each kind now, all others in the long tests.
+    """Return cases in lists by who is told, for tests with subtests: the first of each kind now, all others in the long tests.
 
     Args:
         chosen: whether the action of this name may stand for others.
@@ -95,7 +95,7 @@ def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> 
 
 
 def case_of(action: Action) -> Case:
-    """Who is told it: the first of its types that has the ability on the simulator."""
+    """Return who is told it: the first of its types that has the ability on the simulator."""
     race = action.race or "protoss"
     place = BASE_PLACE if action.rule in {"build_near", "lock_base"} and action.produces in TOWN_HALLS else None
     place = BASE_PLACE if action.rule == "lock_base" else place
@@ -111,7 +111,7 @@ def case_of(action: Action) -> Case:
 
 
 def _ability(action: Action, unit: str) -> Ability | None:
-    """The ability of a type of unit that an action ends in, if the simulator has a rule for it."""
+    """Return the ability of a type of unit that an action ends in, if the simulator has a rule for it."""
     catalog = load_catalog()
     known = knowledge()[unit].id
     if action.pysc2 is None or known not in catalog.row_of_id:
@@ -122,7 +122,7 @@ def _ability(action: Action, unit: str) -> Ability | None:
 
 
 def task_of(case: Case) -> TaskConfig:
-    """A task of one agent whose units may be told this one thing."""
+    """Return a task of one agent whose units may be told this one thing."""
     name = case.action.name
     if case.action.subject == "side":
         teams = (TeamConfig(name="Side", kind="side", actions=(name,)),)
@@ -138,7 +138,7 @@ def task_of(case: Case) -> TaskConfig:
 
 
 def replies(case: Case, stage: Stage, sight: SideObservation) -> Iterator[str]:
-    """What a model could say so that the action is done, the most promising first."""
+    """Yield what a model could say so that the action is done, the most promising first."""
     teams = (t for t in sight.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
     team = next(teams, None)
     if team is None:
@@ -170,7 +170,7 @@ def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObs
 
 
 def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
-    """Units around the one that is told: first those at which the simulator lets it aim, then the others."""
+    """Return units around the one that is told: first those at which the simulator lets it aim, then the others."""
     here = snapshot.units[stage.caster].pos
     whose = {"enemy": (Alliance.ENEMY,), "own": (Alliance.OWN,)}.get(action.target or "", tuple(Alliance))
     near = [
@@ -185,7 +185,7 @@ def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
 
 
 def _points(action: Action, stage: Stage) -> Iterator[WorldPoint]:
-    """Places around the one that is told at which the simulator lets it aim, in steps of half a unit."""
+    """Yield places around the one that is told at which the simulator lets it aim, in steps of half a unit."""
     x, y = stage.world.pos[stage.world.slot_of(stage.caster)].tolist()
     steps = range(-22, 23)
     points = [WorldPoint(math.floor(x) + dx / 2, math.floor(y) + dy / 2) for dx in steps for dy in steps]
@@ -215,7 +215,7 @@ def _may(action: Action, stage: Stage, *, target: int = 0, point: WorldPoint | N
 
 
 def its_own(words: frozenset[str], action: Action) -> frozenset[str]:
-    """The words that speak of this action: its order and what came of it, not where somebody walks meanwhile."""
+    """Return the words that speak of this action: its order and what came of it, not where somebody walks meanwhile."""
     own = order_name(action.pysc2.ability_id) if action.pysc2 else ""
     if own == "Smart":  # becomes whatever a right click would
         return words

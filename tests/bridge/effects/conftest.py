@@ -20,7 +20,7 @@ KEPT = 8
 
 @pytest.fixture(scope="session")
 def stage_of() -> Callable[..., Stage]:
-    """The stage of a case, with a screen or without."""
+    """Return the stage of a case, with a screen or without."""
 
     @functools.lru_cache(KEPT)
     def kept(*of: object, layers: bool) -> Stage:

@@ -60,7 +60,7 @@ class Seen(NamedTuple):
 
 
 def changes(idle: Seen, told: Seen) -> frozenset[str]:
-    """What is another in a game in which an order was given than in the same game without it."""
+    """Return what is another in a game in which an order was given than in the same game without it."""
     before, after = _units(idle), _units(told)
     both = sorted(before.keys() & after.keys())
     found = {word for tag in both for word in _of_unit(before[tag], after[tag])}
@@ -71,7 +71,7 @@ def changes(idle: Seen, told: Seen) -> frozenset[str]:
 
 
 def kinds(words: frozenset[str]) -> frozenset[str]:
-    """The words that do not depend on the very moment: orders, types, buffs, traits, who comes and who goes."""
+    """Return the words that do not depend on the very moment: orders, types, buffs, traits, who comes and who goes."""
     return frozenset(word for word in words if not (word in _PURSE or any(g in word for g in _OF_THE_MOMENT)))
 
 
@@ -86,7 +86,7 @@ def _name(unit: raw_pb2.Unit) -> str:
 
 
 def _more(some: Mapping[int, raw_pb2.Unit], others: Mapping[int, raw_pb2.Unit]) -> Iterable[str]:
-    """Names of units of which there are more."""
+    """Return names of units of which there are more."""
     return Counter(map(_name, some.values())) - Counter(map(_name, others.values()))
 
 
@@ -117,7 +117,7 @@ def _rounded(point: common_pb2.Point) -> tuple[int, int]:
 
 
 def _of_card(name: str, tag: int, idle: Seen, told: Seen) -> Iterator[str]:
-    """What it does without being told, and what it can be told, where nothing else shows a change."""
+    """Yield what it does without being told, and what it can be told, where nothing else shows a change."""
     for ability in idle.autocast.get(tag, frozenset()) ^ told.autocast.get(tag, frozenset()):
         yield f"{name} autocast {order_name(ability)}"
     can = (seen.snapshot.abilities or {} for seen in (idle, told))

@@ -39,7 +39,7 @@ class Performance(NamedTuple):
 
 
 def perform(case: Case, stage: Stage, executor: Executor, said: str | None = None) -> Performance:
-    """Says it in the ways that the stage offers, until one of them has an effect; or only as it was `said` before."""
+    """Say it in the ways that the stage offers, until one of them has an effect; or only as it was `said` before."""
     task, seen = task_of(case), stage.again()
     sight = Observer(task).observe(seen.snapshot)
     refusals: list[str] = []
@@ -63,7 +63,7 @@ def perform(case: Case, stage: Stage, executor: Executor, said: str | None = Non
 
 
 def _play(case: Case, stage: Stage, plan: Plan) -> tuple[frozenset[str], list[str]]:
-    """What a plan changed, if something of it is the action's own doing, and what was refused."""
+    """Return what a plan changed, if something of it is the action's own doing, and what was refused."""
     played, loops = stage.play(plan)
     for more in (LOOPS, LONGER):
         seen, loops = stage.look(stage.client.step(more)), loops + more

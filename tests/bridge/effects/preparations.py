@@ -31,7 +31,7 @@ LONG = 1.0e6
 
 
 def prepare_for(caster: str, ability: Ability) -> Preparation | None:
-    """What has to happen before a unit of this type can use an ability; None for nothing."""
+    """Return what has to happen before a unit of this type can use an ability; None for nothing."""
     if ability.effect in {"cancel", "cancel_growth", "cancel_morph"}:
         return _begin(ability.link, ability.effect)
     if (caster, ability.effect) in OF_UNIT:
@@ -50,12 +50,12 @@ def _walk(world: World, slot: int) -> None:
 
 
 def _bear(*names: str) -> Preparation:
-    """Under the first of these buffs that the version has."""
+    """Return under the first of these buffs that the version has."""
     return lambda world, slot: buffs.apply(world, slot, next(n for n in names if n in world.catalog.buff_of_name))
 
 
 def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
-    """Just after another ability, at an enemy or beside itself."""
+    """Return just after another ability, at an enemy or beside itself."""
 
     def prepare(world: World, slot: int) -> None:
         ability = world.catalog.ability(number)
@@ -70,7 +70,7 @@ def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
 
 @functools.cache
 def _begin(link: str, does: str) -> Preparation:
-    """In the middle of the morph or add-on that an ability calls off, or else in the making itself."""
+    """Return in the middle of the morph or add-on that an ability calls off, or else in the making itself."""
 
     def prepare(world: World, slot: int) -> None:
         name = world.unit_type(slot).name
@@ -203,12 +203,12 @@ def _with_tech_lab(world: World, slot: int) -> None:
 
 
 def _know(upgrade: str) -> Preparation:
-    """A player who has an upgrade."""
+    """Return a player who has an upgrade."""
     return lambda world, _: commands.grant_upgrade(world, 1, world.catalog.upgrade(upgrade).id)
 
 
 def _at_it(producer: str, ability: int, makes: str) -> Preparation:
-    """A structure of another type that makes something."""
+    """Return a structure of another type that makes something."""
 
     def prepare(world: World, slot: int) -> None:
         x, y = world.pos[slot].tolist()

@@ -68,7 +68,7 @@ class Stage:
         *,
         layers: bool = False,
     ) -> None:
-        """Sets the stage.
+        """Set the stage.
 
         Args:
             caster: type of the unit that is told to do something, as PySC2 names it.
@@ -112,7 +112,7 @@ class Stage:
                     world.shields[slot] *= 0.5
 
     def _put(self, caster: str, place: Point | None) -> int:
-        """The unit in the middle, calm and full of energy; its tag."""
+        """Return the unit in the middle, calm and full of energy; its tag."""
         world = self.world
         unit = world.catalog.unit(knowledge()[caster].id)
         if place is None:
@@ -133,7 +133,7 @@ class Stage:
         return playing.game.world
 
     def _keep(self) -> tuple[bytes, dict[int, object]]:
-        """The game as it is now; what never changes is shared. Like a quick save, but faster to go back to."""
+        """Return the game as it is now; what never changes is shared. Like a quick save, but faster to go back to."""
         playing = self.client.session._process.playing
         assert playing is not None
         shared = {id(part): part for part in bookmark._unchanging(playing)}
@@ -146,12 +146,12 @@ class Stage:
         self.client.session._process.playing = _Opener(io.BytesIO(data), shared).load()
 
     def again(self) -> Seen:
-        """Goes back to the moment of the order."""
+        """Go back to the moment of the order."""
         self._reopen()
         return self._first
 
     def look(self, response: sc.ResponseObservation | None = None) -> Seen:
-        """What the player sees now, and what his units can do and do by themselves."""
+        """Return what the player sees now, and what his units can do and do by themselves."""
         response, world = response or self.client.observe(), self.world
         answer = self.client.ask(query=question(read_snapshot(response, self.info))).query
         functions = self._eyes.available_actions(response.observation) if self._eyes else ()
@@ -163,7 +163,7 @@ class Stage:
         )
 
     def idle(self, loops: int) -> Seen:
-        """The same game some loops later, without any order."""
+        """Return the same game some loops later, without any order."""
         if loops not in self._idle:
             process = self.client.session._process
             current = process.playing
@@ -173,7 +173,7 @@ class Stage:
         return self._idle[loops]
 
     def play(self, plan: Plan) -> tuple[Played, int]:
-        """Plays a plan from now on; what was played, and how many loops it took."""
+        """Play a plan from now on; what was played, and how many loops it took."""
         step, loops = next(plan), 0
         while True:
             self._enter(step.actions)
@@ -185,7 +185,7 @@ class Stage:
                 return done.value, loops
 
     def _enter(self, actions: Sequence[Any]) -> None:
-        """Lets actions enter the game; calls of functions are translated by PySC2, which refuses what it should."""
+        """Let actions enter the game; calls of functions are translated by PySC2, which refuses what it should."""
         seen = self.client.observe().observation if self._eyes else None
         for action in actions:
             if isinstance(action, sc.Action):
@@ -218,7 +218,7 @@ class _Opener(pickle.Unpickler):
 
 
 def _grant_all(world: World) -> None:
-    """Gives the player every upgrade at once, which is much faster than one after the other."""
+    """Give the player every upgrade at once, which is much faster than one after the other."""
     names = (ability.upgrade for ability in world.catalog.abilities if ability.effect == "research")
     world.players[1].upgrades = sorted({world.catalog.upgrade(name).id for name in names})
     world.stats.apply(1, world.players[1].upgrades)
@@ -227,7 +227,7 @@ def _grant_all(world: World) -> None:
 
 
 def _usual_place(unit: UnitType) -> Point:
-    """In the middle; what needs creep stands on it."""
+    """Return in the middle; what needs creep stands on it."""
     if unit.name.endswith("CrawlerUprooted"):
         return 26.5, 30.0
     if unit.structure and unit.needs_creep:
@@ -236,7 +236,7 @@ def _usual_place(unit: UnitType) -> Point:
 
 
 def _eyes() -> Any:
-    """The part of PySC2 that reads observations and translates functions, as the game of the bridge asks for it."""
+    """Return the part of PySC2 that reads observations and translates functions, as the game of the bridge asks for it."""
     interface_format = features.AgentInterfaceFormat(
         feature_dimensions=features.Dimensions(screen=128, minimap=64),
         camera_width_world_units=24,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """One of each kind of function and of subject, with a rule and without, stands for the others."""
+    """Return one of each kind of function and of subject, with a rule and without, stands for the others."""
     action = cases()[name].action
     return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind
 

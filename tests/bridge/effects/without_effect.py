@@ -41,5 +41,5 @@ BY_SCREEN: dict[str, str] = BY_RAW | dict.fromkeys(
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:
-    """Why an action has no effect; None if it is to have one."""
+    """Return why an action has no effect; None if it is to have one."""
     return table.get(name) or table.get(name.removeprefix(SINGLE))

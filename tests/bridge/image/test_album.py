@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def show(task: Callable[..., TaskConfig], snapshot: Snap, battle: list[raw_pb2.Unit]) -> Show:
-    """The pictures of the agent of 2s3z, whose teams are Zealot-1, Zealot-2 and Stalker-1, for these specifications."""
+    """Return the pictures of the agent of 2s3z, whose teams are Zealot-1, Zealot-2 and Stalker-1, for these specifications."""
 
     def see(*specs: dict[str, Any], shown: Snapshot | None = None, name: str = "2s3z") -> tuple[Picture, ...]:
         config = task(name)
@@ -115,7 +115,7 @@ def test_without_marks_there_are_neither_letters_nor_digits(show: Show) -> None:
 
 
 def render(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
-    """Gives a snapshot pictures of the game's own, all of one colour."""
+    """Give a snapshot pictures of the game's own, all of one colour."""
     for image in (response.observation.render_data.map, response.observation.render_data.minimap):
         image.size.x = image.size.y = 64
         image.bits_per_pixel = 24

@@ -37,7 +37,7 @@ def values(layer: str, shown: Snapshot, camera: Camera) -> np.ndarray:
 
 
 def grid_of(name: str, cells: np.ndarray, bits: int = 1) -> Change:
-    """Gives a map a grid, `[y, x]` from the bottom left."""
+    """Give a map a grid, `[y, x]` from the bottom left."""
 
     def change(_: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
         image = getattr(info.start_raw, name)
@@ -117,7 +117,7 @@ def test_the_legend_is_written_into_the_picture() -> None:
 
 
 def real_layer(name: str, pixels: np.ndarray, bits: int = 8) -> Change:
-    """Gives a snapshot a feature layer of the game's own."""
+    """Give a snapshot a feature layer of the game's own."""
 
     def change(response: sc_pb.ResponseObservation, _: sc_pb.ResponseGameInfo) -> None:
         image = getattr(response.observation.feature_layer_data.renders, name)

@@ -50,7 +50,7 @@ class Game:
         self.see()
 
     def see(self) -> Snapshot:
-        """Looks at the game, and begins a new turn with a new ledger."""
+        """Look at the game, and begins a new turn with a new ledger."""
         self.response = response = self.client.observe()
         blind = read_snapshot(response, self.info)
         answer = self.client.ask(query=question(blind)).query
@@ -61,18 +61,18 @@ class Game:
         return self.snapshot
 
     def play(self, loops: int) -> Snapshot:
-        """Lets loops pass."""
+        """Let loops pass."""
         self.client.step(loops)
         return self.see()
 
     def cheat(self, *states: debug_pb2.DebugGameState.ValueType) -> Snapshot:
-        """Has the game's own cheats on: resources, tech, supply, fast building."""
+        """Have the game's own cheats on: resources, tech, supply, fast building."""
         self.client.debug(*(debug_pb2.DebugCommand(game_state=state) for state in states or FREE))
         self.fed = self.fed or debug_pb2.food in (states or FREE)
         return self.play(1)
 
     def put(self, name: str, x: float, y: float, *, owner: int = 1, count: int = 1) -> int:
-        """Puts a unit somewhere, and gives the tag of the newest of its type."""
+        """Put a unit somewhere, and gives the tag of the newest of its type."""
         create = debug_pb2.DebugCommand(create_unit=debug_pb2.DebugCreateUnit(
             unit_type=knowledge()[name].id, owner=owner, pos=common_pb2.Point2D(x=x, y=y), quantity=count
         ))  # fmt: skip
@@ -82,7 +82,7 @@ class Game:
         return max((u.tag for u in self.units(name) if u.tag not in before), default=0)
 
     def energize(self, name: str) -> Snapshot:
-        """Fills the energy of every own unit of a type."""
+        """Fill the energy of every own unit of a type."""
         for unit in self.own(name):
             value = debug_pb2.DebugSetUnitValue(
                 unit_value=debug_pb2.DebugSetUnitValue.Energy, value=unit.energy_max, unit_tag=unit.tag
@@ -91,29 +91,29 @@ class Game:
         return self.play(1)
 
     def units(self, name: str) -> list[Unit]:
-        """Units of a type that are there, everybody's."""
+        """Return units of a type that are there, everybody's."""
         return [unit for unit in self.snapshot.units.values() if unit_name(unit.unit_type) == name]
 
     def own(self, name: str) -> list[Unit]:
-        """Own units of a type."""
+        """Return own units of a type."""
         return [unit for unit in self.snapshot.own if unit_name(unit.unit_type) == name]
 
     # --- rules ------------------------------------------------------------------------------------------------
 
     def say(self, action: str, **given: Any) -> list[RuleOrder]:
-        """What the rule of an action answers; given are `units`, `tag` and `point`, as far as the words name them."""
+        """Return what the rule of an action answers; given are `units`, `tag` and `point`, as far as the words name them."""
         found = catalogue()[action]
         assert found.rule is not None
         return RULES[found.rule](RuleRequest(found, self.snapshot, self.ledger, **given))
 
     def refusal(self, action: str, **given: Any) -> NotAvailable:
-        """What the rule of an action says that finds nothing."""
+        """Return what the rule of an action says that finds nothing."""
         with pytest.raises(NotAvailable) as raised:
             self.say(action, **given)
         return raised.value
 
     def do(self, orders: Sequence[RuleOrder]) -> list[str]:
-        """Carries orders out; what the game says of each."""
+        """Carry orders out; what the game says of each."""
         actions = [
             command(
                 order.function.ability_id, order.units, queue=order.queued,
@@ -124,7 +124,7 @@ class Game:
         return [error_pb2.ActionResult.Name(result) for result in self.client.act(*actions)]
 
     def may_stand(self, function: str, point: WorldPoint) -> str:
-        """What the game says of a place for what a function builds or warps in."""
+        """Return what the game says of a place for what a function builds or warps in."""
         asked = query_pb2.RequestQueryBuildingPlacement(
             ability_id=functions()[function].ability_id, target_pos=common_pb2.Point2D(x=point.x, y=point.y)
         )

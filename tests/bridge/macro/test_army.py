@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def game(make_game: Callable[..., Game]) -> Game:
-    """A small army in the middle of the map, which has a hall in one corner."""
+    """Return a small army in the middle of the map, which has a hall in one corner."""
     game = make_game("Flat64")
     game.put("Zealot", 32, 32, count=2)
     game.put("HighTemplar", 33, 33)

@@ -31,7 +31,7 @@ ON_GROUND = [name for name, site in sites().items() if site.ground != "geyser" a
 
 
 def built(orders: list[RuleOrder]) -> WorldPoint | int:
-    """Where the structure is going to stand."""
+    """Return where the structure is going to stand."""
     (target,) = (order.target for order in orders if order.function.name.startswith("Build"))
     assert target is not None
     return target
@@ -43,7 +43,7 @@ def race_of(structure: str) -> str:
 
 @pytest.fixture(scope="module")
 def rich(make_game: Callable[..., Game]) -> Callable[[str, str], Game]:
-    """Games in which everything is allowed and paid for, one for each map and race; they are looked at only."""
+    """Return games in which everything is allowed and paid for, one for each map and race; they are looked at only."""
     games: dict[tuple[str, str], Game] = {}
 
     def get(name: str, race: str) -> Game:
@@ -110,13 +110,13 @@ def test_a_whole_base_can_be_built_and_nobody_is_walled_in(
 
 
 def standing(game: Game, structure: str) -> list[Unit]:
-    """Finished own structures of a type; a Gateway may be a WarpGate by now."""
+    """Return finished own structures of a type; a Gateway may be a WarpGate by now."""
     found = game.own(structure) + (game.own("WarpGate") if structure == "Gateway" else [])
     return [unit for unit in found if unit.build_progress >= 1]
 
 
 def walkable_pieces(game: Game) -> int:
-    """In how many pieces the ground falls on which units walk, tiny pockets aside."""
+    """Return in how many pieces the ground falls on which units walk, tiny pockets aside."""
     count, _, stats, _ = cv2.connectedComponentsWithStats(
         np.ascontiguousarray(land_of(game.snapshot).open, np.uint8), connectivity=4
     )

@@ -20,7 +20,7 @@ FREE = (*RICH, debug_pb2.tech_tree)
 
 @pytest.fixture
 def protoss(make_game: Callable[..., Game]) -> Game:
-    """Two Gateways with power, and plenty of everything."""
+    """Return two Gateways with power, and plenty of everything."""
     game = make_game("Flat64")
     game.cheat(*RICH)
     game.put("Pylon", 44, 20)

@@ -21,7 +21,7 @@ UNITS = ("Zealot", "Stalker", "Sentry", "Adept", "HighTemplar", "DarkTemplar")
 
 @pytest.fixture
 def game(make_game: Callable[..., Game]) -> Game:
-    """Four WarpGates near the Nexus, and a Pylon far away."""
+    """Return four WarpGates near the Nexus, and a Pylon far away."""
     game = make_game("Flat64")
     game.cheat(debug_pb2.all_resources, debug_pb2.food, debug_pb2.tech_tree)
     game.put("Pylon", 44, 20)

@@ -30,7 +30,7 @@ def auto(game: Game, *ordered: int, **on: bool) -> list[RuleOrder]:
 
 
 def idle(game: Game) -> list[int]:
-    """Stops every worker."""
+    """Stop every worker."""
     tags = [unit.tag for unit in game.own("Probe")]
     game.client.act(command(3665, tags))
     game.play(1)

@@ -96,12 +96,12 @@ TASK: dict[str, Any] = {
 
 @pytest.fixture
 def base_task() -> TaskConfig:
-    """Four agents, one of each kind."""
+    """Return four agents, one of each kind."""
     return TaskConfig.model_validate(TASK)
 
 
 def able(*names: str) -> frozenset[int]:
-    """The abilities of some of PySC2's functions, as a snapshot has them."""
+    """Return the abilities of some of PySC2's functions, as a snapshot has them."""
     numbers = [functions()[name].ability_id for name in names]
     return frozenset((*numbers, *map(general, numbers)))
 
@@ -122,7 +122,7 @@ ABILITIES: dict[int, frozenset[int]] = {
 
 @pytest.fixture
 def base(unit: Make) -> Callable[..., list[raw_pb2.Unit]]:
-    """The units of a base and of a fight before it."""
+    """Return the units of a base and of a fight before it."""
 
     def make(*, earlier: bool = False) -> list[raw_pb2.Unit]:
         return [*_structures(unit, earlier=earlier), *_army(unit, earlier=earlier), *_resources(unit)]
@@ -176,7 +176,7 @@ def _resources(unit: Make) -> Iterable[raw_pb2.Unit]:
 
 @pytest.fixture
 def look(snapshot: Snap) -> Callable[..., Snapshot]:
-    """A snapshot of units on plain ground, with power and abilities."""
+    """Return a snapshot of units on plain ground, with power and abilities."""
 
     def make(
         units: list[raw_pb2.Unit], *, loop: int = 4480, alerts: Sequence[sc_pb.Alert.ValueType] = (), **fields: Any
@@ -210,7 +210,7 @@ def _plain(bits: int, value: bytes) -> common_pb2.ImageData:
 
 @pytest.fixture
 def pages(base: Any, look: Any, base_task: TaskConfig) -> Callable[..., dict[str, str]]:
-    """What the agents of the base are told at its second observation, by agent."""
+    """Return what the agents of the base are told at its second observation, by agent."""
 
     def write(feedback: Mapping[str, Feedback] | None = None, **limits: int) -> dict[str, str]:
         agents = tuple(a.model_copy(update={"text_tokens": limits.get(a.name)}) for a in base_task.agents)

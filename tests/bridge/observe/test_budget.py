@@ -22,21 +22,21 @@ SMALLEST = 100
 
 @pytest.fixture
 def full(pages: Any) -> dict[str, str]:
-    """The pages without a limit."""
+    """Return the pages without a limit."""
     found: dict[str, str] = pages()
     return found
 
 
 @pytest.fixture
 def shortest(pages: Any) -> dict[str, str]:
-    """The declared minimum of each page."""
+    """Return the declared minimum of each page."""
     found: dict[str, str] = pages(**dict.fromkeys(AGENTS, SMALLEST))
     return found
 
 
 @pytest.fixture
 def within(pages: Any) -> Any:
-    """An agent's page within a budget; pages are remembered, since a property asks for many."""
+    """Return an agent's page within a budget; pages are remembered, since a property asks for many."""
     return functools.cache(lambda agent, budget: pages(**{agent: budget})[agent])
 
 

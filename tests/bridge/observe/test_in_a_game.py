@@ -28,7 +28,7 @@ LOOPS = 200
 
 
 def everybody(race: str) -> TaskConfig:
-    """An agent of each kind; the first worker builds, the next one fights."""
+    """Return an agent of each kind; the first worker builds, the next one fights."""
     worker = WORKERS[race]
     side = [{"name": "Side", "kind": "side", "actions": [f"group:train/{race}", f"group:easy-build/{race}"]}]
     own = [{"name": "Worker", "unit_types": [worker]}]
@@ -45,7 +45,7 @@ def everybody(race: str) -> TaskConfig:
 
 @pytest.fixture(scope="module", params=sorted(RACES))
 def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservation]]:
-    """What the agents see at the beginning of a game, and some seconds later, with a worker in training."""
+    """Return what the agents see at the beginning of a game, and some seconds later, with a worker in training."""
     task = everybody(request.param)
     client = Client()
     client.ask(

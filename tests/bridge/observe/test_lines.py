@@ -18,7 +18,7 @@ HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80 | tota
 
 @pytest.fixture
 def stalker_line(unit: Any, snapshot: Any, task: Any) -> Any:
-    """The line of a Stalker with some fields, in its own team's block."""
+    """Return the line of a Stalker with some fields, in its own team's block."""
 
     def line(change: Any = None, **fields: Any) -> str:
         made = unit(1, "Stalker", 16, 16, **fields)

@@ -22,7 +22,7 @@ PAIR = ["Stalkers", "Zealots"]
 
 
 def moments(unit: Make, snapshot: Snap) -> list[Snapshot]:
-    """Three moments of a fight: somebody is hurt, then somebody dies."""
+    """Return three moments of a fight: somebody is hurt, then somebody dies."""
     stalker, zealot = unit(1, "Stalker", 10, 16), unit(2, "Zealot", 14, 16)
     foe, hurt = unit(9, "Zealot", 15, 16, alliance="enemy"), unit(2, "Zealot", 14, 16, health=20)
     return [

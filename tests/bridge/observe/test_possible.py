@@ -25,7 +25,7 @@ ACTIONS = {
 
 @pytest.fixture
 def team(snapshot: Any) -> Callable[..., TeamView]:
-    """What a team of all types is told, or a team of the side that may do some things."""
+    """Return what a team of all types is told, or a team of the side that may do some things."""
 
     def see(units: list[Any], *side: str, **fields: Any) -> TeamView:
         kinds = tuple(ACTIONS)

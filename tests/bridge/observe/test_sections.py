@@ -25,7 +25,7 @@ def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def told(base: Any, look: Any, base_task: TaskConfig) -> Any:
-    """What the agent at the front is told, by sections of these names."""
+    """Return what the agent at the front is told, by sections of these names."""
 
     def write(*names: str, text_tokens: int | None = None) -> str:
         changed = {"sections": names, "text_tokens": text_tokens}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def views(base_task: Any) -> Callable[..., list[View]]:
-    """What an agent sees, snapshot after snapshot."""
+    """Return what an agent sees, snapshot after snapshot."""
 
     def see(agent: str, *snapshots: Snapshot) -> list[View]:
         observer = Observer(base_task)

@@ -82,7 +82,7 @@ def types(race: str) -> tuple[str, ...]:
 
 @functools.cache
 def busy(name: str) -> int:
-    """An ability that a unit of a type works on."""
+    """Return an ability that a unit of a type works on."""
     return knowledge()[name].ability_ids[-1]
 
 
@@ -101,7 +101,7 @@ AMOUNTS = st.sampled_from((0, 20, 24, 25, 49, 50, 75, 99, 100, 149, 150, 175, 22
 
 @st.composite
 def states(draw: st.DrawFn, race: str) -> State:
-    """Random means of a side: a few units and structures, accounts, upgrades, and what the game allows."""
+    """Return random means of a side: a few units and structures, accounts, upgrades, and what the game allows."""
     pools = (MAKERS[race], NEEDED[race], types(race))
     names = draw(st.lists(st.one_of(*map(st.sampled_from, pools)), min_size=1, max_size=7))
     known = [upgrade.id for upgrade in upgrades().values() if upgrade.race == race and upgrade.melee]
@@ -121,7 +121,7 @@ def states(draw: st.DrawFn, race: str) -> State:
 
 @st.composite
 def own(draw: st.DrawFn, name: str) -> Own:
-    """A random unit of a type."""
+    """Return a random unit of a type."""
     kind = knowledge()[name]
     return Own(
         name,
@@ -139,7 +139,7 @@ def own(draw: st.DrawFn, name: str) -> Own:
 
 @functools.cache
 def config(race: str) -> TaskConfig:
-    """A task with one agent for every unit of a race, and one for the whole side."""
+    """Return a task with one agent for every unit of a race, and one for the whole side."""
     actions = {
         name: tuple(a.name for a in catalogue().values() if a.subject != "side" and a.fits(name))
         for name in types(race)
@@ -161,7 +161,7 @@ def vocabulary(race: str) -> Vocabulary:
 
 
 def open_ground(_: Any, info: Any) -> None:
-    """Makes the whole map one plain that can be walked and built on."""
+    """Make the whole map one plain that can be walked and built on."""
     ground = info.start_raw
     for grid, bits, value in (
         (ground.placement_grid, 1, b"\xff"),
@@ -175,7 +175,7 @@ def open_ground(_: Any, info: Any) -> None:
 
 @pytest.fixture
 def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callable[[str, State], SideObservation]:
-    """What the agent of a race sees in a state."""
+    """Return what the agent of a race sees in a state."""
 
     def see(race: str, state: State) -> SideObservation:
         made: list[Any] = []
@@ -208,7 +208,7 @@ def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callabl
 
 
 def judged(names: list[str], chance: Any, most: int) -> list[Action]:
-    """Some actions of a team on which a word is passed before they are called."""
+    """Return some actions of a team on which a word is passed before they are called."""
     found = [catalogue()[name] for name in names]
     found = [a for a in found if a.rule not in ABOUT_THE_TARGET and a.subject != "two_units"]
     chosen: list[Action] = chance.sample(found, min(most, len(found)))
@@ -216,7 +216,7 @@ def judged(names: list[str], chance: Any, most: int) -> list[Action]:
 
 
 def calls(sight: SideObservation, action: Action) -> list[str]:
-    """An action as it may be written: by each unit that it may name, at each target that there is."""
+    """Return an action as it may be written: by each unit that it may name, at each target that there is."""
     tags = sight.agents["A"].teams[0].team.tags
     listed, units = sight.agents["A"].agent.actions, sight.agents["A"].teams[0].view.units
     named = [unit.tag for unit in units if action.name in listed[unit.type]] if action.named else [""]
@@ -239,7 +239,7 @@ class Answer(NamedTuple):
 
 
 def answer(race: str, sight: SideObservation, team: int, call: str) -> Answer:
-    """Says a call in a turn of its own."""
+    """Say a call in a turn of its own."""
     translator = Translator(sight, {"A": 9})
     ledger = translator.ledger
     before = ledger.minerals, ledger.vespene, ledger.supply
@@ -295,7 +295,7 @@ MEANINGS = (
 
 
 def meaning(sentence: str) -> tuple[str, ...]:
-    """The reason in a sentence, with what is missing and how much of it."""
+    """Return the reason in a sentence, with what is missing and how much of it."""
     for kind, pattern in MEANINGS:
         if found := re.search(pattern, sentence):
             said = found.groupdict()

@@ -3,8 +3,8 @@
     album = Album(snapshot, world)      once a step
     album.pictures(seen)                for each agent
 
-A specification may give no picture (the game's own pixels are wanted and its camera is elsewhere), one, or one for each
-of the first teams. What is shown is a function of moment, frames and sight alone.
+A specification may yield no picture (it wants the game's own pixels and the camera is elsewhere), one, or one for each
+of the first teams. Pictures are functions of moment, frames and observation alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
     from khala_bridge.task.images import ImageSpec
 
-cv2.setNumThreads(1)  # a picture is too small to share, and agents of other processes want the rest
+cv2.setNumThreads(1)  # a picture is too small to share, and agents of other processes need the other cores
 
 
 class Drawing(NamedTuple):
@@ -43,7 +43,7 @@ class Drawing(NamedTuple):
 
 
 class _Looker(NamedTuple):
-    """A team that has a screen."""
+    """A team with a screen."""
 
     name: str
     camera: Camera
@@ -51,15 +51,15 @@ class _Looker(NamedTuple):
 
 
 class Album:
-    """The pictures of one step; what all agents see alike is made once."""
+    """The pictures of one step; the parts that all agents share are made once."""
 
     def __init__(self, snapshot: Snapshot, world: MapFrame) -> None:
-        """Takes a snapshot, and the frame of its map."""
+        """Take a snapshot, and the frame of its map."""
         self._moment = Moment(snapshot)
         self._world = world
 
     def pictures(self, seen: AgentObservation) -> tuple[Picture, ...]:
-        """All pictures of an agent, in the order of its configuration."""
+        """Return all pictures of an agent, in the order of its configuration."""
         return tuple(
             encoded(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
             for spec in seen.agent.images
@@ -68,7 +68,7 @@ class Album:
 
 
 def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentObservation) -> Iterator[Drawing]:
-    """The pictures that one specification asks for."""
+    """Yield the drawings of one specification."""
     teams = [_Looker(t.view.name, t.camera, frozenset(t.team.tags)) for t in seen.teams if t.camera is not None]
     if spec.what == "minimap":
         yield from _minimap(spec, moment, world, teams, seen)
@@ -113,7 +113,7 @@ def _minimap(
 
 
 def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
-    """The units that are the agent's own: those of its teams, or all, if it orders the whole side."""
+    """Return the agent's own units: those of its teams, or all, if it orders the whole side."""
     if any(team.team.kind == "side" for team in seen.teams):
         return frozenset(one.tag for one in moment.subjects if one.side == "own")
     return frozenset(tag for team in teams for tag in team.tags)
@@ -152,7 +152,7 @@ def _on_canvas(spec: ImageSpec, layer: FeatureLayer, extent: float, values: Cell
 
 
 def _values(spec: ImageSpec, moment: Moment, camera: Camera, layer: FeatureLayer, size_px: int) -> Cells | None:
-    """The values of a layer, of the game or drawn; None if there are none."""
+    """Return the values of a layer, from the game or drawn; None if there are none."""
     if spec.is_taken:
         values = own.layer(moment.snapshot, layer.name, camera, size_px)
         if values is not None or not spec.is_drawn:

@@ -1,4 +1,4 @@
-"""Bodies of units: one stamp for each look, which shows side, shape, facing, size and the letters of the type.
+"""Bodies of units: one stamp for each look, with side, shape, facing, size and the letters of the type.
 
 Ground units are discs with a nose that shows where they face, flying ones arrowheads over their shadow, structures
 squares with cut corners and a dark middle; minerals are crystals, geysers rings, and other neutral things stones.
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 Shape: TypeAlias = Literal["ground", "air", "structure", "minerals", "rich", "geyser", "stone", "field"]
 
 DIRECTIONS = 32
-"""Directions in which a unit is drawn facing."""
+"""Number of directions in which a unit may face."""
 _FINER = 4
 _REACH = 1.5
-"""Half of a stamp's size in radii: the nose, the shadow of what flies."""
+"""Half of a stamp's size in radii: room for the nose, and for the shadow of flying units."""
 LETTERS_FROM_PX = 5.5
-"""Radius from which letters are readable."""
+"""Radius in pixels from which letters are readable."""
 _GHOST = 0.5
-"""Opacity of what is cloaked, burrowed, not real, or only remembered."""
+"""Opacity of units that are cloaked, burrowed, not real, or only remembered."""
 _UNFINISHED = 0.7
 _SHADOW = 0.45
 _SHIFT = 3
-"""OpenCV takes fractions of pixels as whole numbers of eighths."""
+"""OpenCV takes fractions of pixels as integers of eighths."""
 _TURNED = frozenset({"ground", "air"})
 _NEUTRAL: dict[Shape, Colour] = {
     "minerals": palette.MINERALS,
@@ -69,26 +69,26 @@ _OUTLINES: dict[Shape, Outline] = {
 
 
 class BodyLook(NamedTuple):
-    """All that a stamp depends on."""
+    """Everything that a stamp depends on."""
 
     shape: Shape
     side: Side
     radius_px: int
     direction: int
-    """Of `DIRECTIONS`, counter-clockwise from the right; 0 for what does not turn."""
+    """Of `DIRECTIONS`, counter-clockwise from the right; 0 for units that do not turn."""
     code: str
     ghost: bool
     unfinished: bool
 
 
 def direction_of(facing: float, shape: Shape) -> int:
-    """The nearest direction to an angle in radians."""
+    """Return the nearest direction to an angle in radians."""
     return round(facing / (2 * math.pi) * DIRECTIONS) % DIRECTIONS if shape in _TURNED else 0
 
 
 @functools.lru_cache(2048)
 def body(look: BodyLook) -> Stamp:
-    """The stamp of a look; the unit is in its middle."""
+    """Return the stamp of a look; the unit is in its middle."""
     half = math.ceil(look.radius_px * _REACH) + 3
     size = 2 * half + 1
     colours = np.zeros((size * _FINER, size * _FINER, 3), np.uint8)
@@ -125,14 +125,14 @@ def _draw_solid(colours: Image, opacity: Mask, look: BodyLook) -> None:
 
 
 def _draw_field(colours: Image, opacity: Mask, look: BodyLook) -> None:
-    """A force field: one sees through it."""
+    """Draw a force field, which is transparent."""
     outline = _corners(look, 1.0)
     _fill(colours, opacity, outline, (255, 214, 170), 235, grow_px=1.5)
     _fill(colours, opacity, outline, (220, 140, 60), 150)
 
 
 def _corners(look: BodyLook, scale: float) -> NDArray[np.int32]:
-    """The outline of a look in fractions of the fine image's pixels."""
+    """Return the outline of a look in fractions of the fine image's pixels."""
     angle = 2 * math.pi * look.direction / DIRECTIONS
     forward, left = np.array(_OUTLINES[look.shape]).T * look.radius_px * scale * _FINER
     middle = ((math.ceil(look.radius_px * _REACH) + 3) * 2 + 1) * _FINER / 2 - 0.5
@@ -144,7 +144,7 @@ def _corners(look: BodyLook, scale: float) -> NDArray[np.int32]:
 def _fill(
     colours: Image, opacity: Mask, outline: NDArray[np.int32], colour: Colour, alpha: int, grow_px: float = 0.0
 ) -> None:
-    """Fills an outline, wider by so many pixels of the finished stamp."""
+    """Fill an outline, wider by a number of pixels of the finished stamp."""
     for image, value in ((colours, colour), (opacity, (alpha, alpha, alpha))):
         cv2.fillPoly(image, [outline], value, cv2.LINE_8, _SHIFT)
         if grow_px:
@@ -152,13 +152,13 @@ def _fill(
 
 
 def _unfringed(colours: Image, cover: Mask) -> Image:
-    """Colours as they are inside of the outline: shrinking has mixed the black around it into its edge."""
+    """Return the colours without the black that shrinking has mixed into the edge."""
     share = np.maximum(cover, 1).astype(np.float32)[..., None] / 255
     return np.asarray(np.clip(colours / share, 0, 255), np.uint8)
 
 
 def _lettered(stamp: Stamp, look: BodyLook, half: int) -> Stamp:
-    """The same with the letters of its type, upright and as large as the body allows."""
+    """Return a stamp with the letters of its type, upright and as large as the body allows."""
     room = look.radius_px * (0.66 if look.shape == "air" else 0.86)
     if look.radius_px < LETTERS_FROM_PX:
         return stamp
@@ -175,7 +175,7 @@ def _lettered(stamp: Stamp, look: BodyLook, half: int) -> Stamp:
 
 
 def _middle(look: BodyLook) -> tuple[int, int]:
-    """Where the letters have most room: an arrowhead is wide at its back."""
+    """Return the place with most room for letters: an arrowhead is wide at its back."""
     if look.shape != "air":
         return 0, 0
     angle = 2 * math.pi * look.direction / DIRECTIONS

@@ -1,7 +1,7 @@
-"""A picture while it is drawn: a square of the world inside of margins with the labels of the axes.
+"""A picture while it is drawn: a square of the world inside margins with the labels of the axes.
 
-The frame of a canvas is that of the actions: `[x, y]` from 0 to `extent`, x to the right, y downwards; the point (0, 0)
-is where the margins end. `pixel` is the only place that turns one into the other.
+The frame of a canvas is that of the actions: `[x, y]` from 0 to `extent`, x to the right, y downwards; the margins end
+at the point (0, 0). `pixel` alone converts points to pixels.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ SMALL_PX = 320
 
 
 def margin_of(size_px: int, extent: float) -> int:
-    """Pixels on the left and at the top of a picture of this size that hold the labels of the axes."""
+    """Return the width in pixels of the margins of a picture of this size, on the left and at the top."""
     digits = len(f"{extent:g}")
     return 4 + 5 * digits if size_px < SMALL_PX else 6 + 7 * digits
 
 
 def inner_px(size_px: int, extent: float) -> int:
-    """Pixels on both axes that the frame itself has in a picture of this size."""
+    """Return the size in pixels of the frame itself in a picture of this size."""
     return size_px - margin_of(size_px, extent)
 
 
@@ -54,10 +54,10 @@ class Canvas:
 
     @classmethod
     def on(cls, ground: Image, size_px: int, extent: float) -> Canvas:
-        """A canvas with a ground of `inner_px` pixels on both axes.
+        """Return a canvas with a ground of `inner_px` pixels on both axes.
 
         Args:
-            ground: what is under everything.
+            ground: the image under everything.
             size_px: of the whole picture on both axes.
             extent: size of the frame on both axes, in its own cells.
         """
@@ -68,11 +68,11 @@ class Canvas:
         return cls(image, inner, (size_px - margin) / extent)
 
     def pixel(self, x: float, y: float) -> tuple[int, int]:
-        """Column and row, in `inner`, of a point of the frame."""
+        """Return the column and row, in `inner`, of a point of the frame."""
         return round(x * self.scale - 0.5), round(y * self.scale - 0.5)
 
     def rule(self) -> None:
-        """Draws the grid lines."""
+        """Draw the grid lines."""
         size = self.inner.shape[0]
         for k in range(1, CELLS):
             at = round(k * size / CELLS)
@@ -82,7 +82,7 @@ class Canvas:
 
 @functools.lru_cache(32)
 def _blank(size_px: int, extent: float) -> Image:
-    """An empty canvas with the labels of its axes."""
+    """Return an empty canvas with the labels of its axes."""
     image = np.full((size_px, size_px, 3), palette.VOID, np.uint8)
     margin = margin_of(size_px, extent)
     height = 7 if size_px < SMALL_PX else 9
@@ -95,7 +95,7 @@ def _blank(size_px: int, extent: float) -> Image:
 
 
 def _label(image: Image, text: str, height: int, at: int, margin: int, *, horizontal: bool) -> None:
-    """Writes a number beside an axis, with a tick; the first and the last one are pushed inside."""
+    """Write a number beside an axis, with a tick; the first and the last one are pushed inside."""
     size = image.shape[0]
     stamp = written(text, height, palette.LABEL)
     width, high = stamp.size

@@ -21,13 +21,13 @@ _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|\d+")
 
 
 def code_of(unit_type: str) -> str:
-    """The code of a unit type; `??` for one that nobody has heard of."""
+    """Return the code of a unit type; `??` for an unknown one."""
     return _codes().get(unit_type, "??")
 
 
 @functools.cache
 def _codes() -> dict[str, str]:
-    """By type: the most natural code that is not taken; those that are played, and short names, choose first."""
+    """Return the code of each type: the most natural free one; types that are played, and short names, choose first."""
     taken: dict[str, str] = {}
 
     def order(name: str) -> tuple[bool, int, str]:
@@ -42,7 +42,7 @@ def _codes() -> dict[str, str]:
 
 
 def _wishes(name: str) -> Iterator[str]:
-    """Codes that remind of a name: initials, then its first letter with a later one, then any two of its letters."""
+    """Yield codes for a name: its initials, then its first letter with a later one, then any two of its letters."""
     words = _WORDS.findall(name) or [name]
     letters = [letter for letter in name.upper() if letter.isalnum()]
     initials = words[0][0] + words[1][0] if len(words) > 1 else ""

@@ -1,4 +1,4 @@
-"""Effects on the ground, sources of power and orders: what lies under units, each at its true place and size."""
+"""Effects on the ground, sources of power and orders: drawn under units, at their true places and sizes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class _Style(NamedTuple):
-    """How an effect of a kind looks: its colour (None: that of its side), opacity, and the figure in it."""
+    """The look of a kind of effect: its colour (None: that of its side), opacity, and the figure in it."""
 
     colour: Colour | None = None
     fill: float = 0.3
@@ -53,14 +53,14 @@ _ATTACKS = frozenset({"Attack", "Attack_Attack", "Attack_Battlecruiser", "Attack
 
 
 def draw_patches(image: Image, patches: Iterable[Patch], place: Place, scale: float, *, names: bool) -> None:
-    """Draws effects at their places.
+    """Draw effects at their places.
 
     Args:
-        image: is drawn on.
-        patches: what there is.
-        place: where a point of the world is in the image.
+        image: the image to draw on.
+        patches: the effects.
+        place: returns the place of a world point in the image.
         scale: pixels of a world unit.
-        names: whether their names are written on them.
+        names: whether to write their names on them.
     """
     for patch in patches:
         stamp = _disc(patch.name, patch.side, max(2, round(patch.radius * scale)))
@@ -73,7 +73,7 @@ def draw_patches(image: Image, patches: Iterable[Patch], place: Place, scale: fl
 
 
 def draw_orders(image: Image, subjects: Iterable[Subject], place: Place) -> None:
-    """Draws where units go and whom they attack: a line with a dot at its end, red for attacks, green for the rest."""
+    """Draw the goals and targets of units: a line with a dot at its end, red for attacks, green for the rest."""
     for one in subjects:
         if one.target is None:
             continue
@@ -105,7 +105,7 @@ def _disc(name: str, side: Side, radius_px: int) -> Stamp:
 
 
 def _bolts(mask: Image, middle: tuple[int, int], radius: int) -> None:
-    """Five zigzags from the middle outwards."""
+    """Draw five zigzags from the middle outwards."""
     for k in range(5):
         points = []
         for step in range(5):
@@ -116,7 +116,7 @@ def _bolts(mask: Image, middle: tuple[int, int], radius: int) -> None:
 
 
 def _cross(mask: Image, middle: tuple[int, int], radius: int) -> None:
-    """A sight: something will come down here."""
+    """Draw a crosshair: something will come down here."""
     x, y = middle
     for right, down in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         inner, outer = 0.45 * radius, 1.0 * radius
@@ -126,7 +126,7 @@ def _cross(mask: Image, middle: tuple[int, int], radius: int) -> None:
 
 
 def _name(image: Image, label: str, at: tuple[int, int], radius_px: int) -> None:
-    """Writes the name of an effect inside its upper edge, or over it where it is narrow."""
+    """Write the name of an effect inside its upper edge, or above it if it is narrow."""
     stamp = written(label, 7, palette.LABEL, palette.INK)
     width, height = stamp.size
     top = at[1] - radius_px + 3 if 2 * radius_px > 2 * width else at[1] - radius_px - height

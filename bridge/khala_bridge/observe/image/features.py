@@ -27,12 +27,12 @@ _GAP = 2
 
 
 def tile_px(size_px: int) -> int:
-    """Pixels on both axes of one of the nine in a picture of this size."""
+    """Return the size in pixels of one of the nine tiles in a picture of this size."""
     return (size_px - _GAP * (_COLUMNS - 1)) // _COLUMNS
 
 
 def draw(values: Mapping[str, Cells], size_px: int) -> Image:
-    """The picture of these values by layer, each `tile_px` large."""
+    """Return the picture of these values by layer, each `tile_px` large."""
     tile = tile_px(size_px)
     image = np.full((size_px, size_px, 3), palette.VOID, np.uint8)
     for number, name in enumerate(SHOWN):

@@ -1,7 +1,7 @@
 """Single feature layers as pictures: `height_map`, `creep`, `power`, `buildable`, … with a legend.
 
-They are what PySC2 calls feature layers: drawn for the virtual camera of a team out of raw data, or the game's own, as
-`own` finds them. `LAYERS` says which there are and how they look.
+PySC2 calls them feature layers. They are drawn for the virtual camera of a team from raw data, or are the game's own,
+as `own` finds them. `LAYERS` lists them with their looks.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe.image.palette import Colour
 
 Cells: TypeAlias = "NDArray[np.integer[Any]]"
-"""(height, width) the values of a layer."""
+"""(height, width): the values of a layer."""
 Values: TypeAlias = Callable[[Moment, "Camera", int], Cells]
 """A moment, a camera and a size in pixels → (size, size), 0 to 255."""
 _SIDE_NUMBERS = {"own": 1, "ally": 2, "neutral": 3, "enemy": 4}
@@ -41,7 +41,7 @@ _GREY, _DARK, _WHITE = (150, 150, 150), (28, 26, 24), (235, 235, 235)
 
 @dataclass(frozen=True)
 class FeatureLayer:
-    """One layer: what its values are, and how they look."""
+    """One layer: its values and their look."""
 
     name: str
     values: Values | None
@@ -49,9 +49,9 @@ class FeatureLayer:
     kind: Literal["scalar", "categorical", "types"]
     """`scalar` from dark to light; `categorical` a colour a value; `types` a colour a unit type."""
     about: str
-    """What it shows, for the picture's title."""
+    """Its meaning, for the picture's title."""
     colours: tuple[tuple[int, str, Colour], ...] = ()
-    """Of a categorical layer: value, what it means, colour."""
+    """Of a categorical layer: value, meaning, colour."""
 
 
 # --- values -------------------------------------------------------------------------------------------------
@@ -78,7 +78,7 @@ def _sight(moment: Moment, camera: Camera, size_px: int) -> Mask:
 
 
 def _of_units(value: Callable[[Subject], int]) -> Values:
-    """The bodies of units with a value each; 0 where none is, or where a unit has none."""
+    """Return the bodies of units filled with their values; 0 elsewhere and for units without a value."""
 
     def values(moment: Moment, camera: Camera, size_px: int) -> Mask:
         image, scale = np.zeros((size_px, size_px), np.uint8), size_px / CAMERA_WIDTH
@@ -196,7 +196,7 @@ _MOST = frozenset(
 
 
 def coloured(layer: FeatureLayer, values: Cells) -> Image:
-    """The picture of a layer's values."""
+    """Return the picture of a layer's values."""
     table = np.zeros((256, 3), np.uint8)
     if layer.kind == "scalar":
         return _graded(layer, values)
@@ -209,12 +209,12 @@ def coloured(layer: FeatureLayer, values: Cells) -> Image:
 
 
 def _mapped(values: Cells, table: Image) -> Image:
-    """The colours of a table, (256, 3), in the place of its numbers."""
+    """Return an image with the numbers replaced by the colours of a table, (256, 3)."""
     return np.asarray(cv2.applyColorMap(values.astype(np.uint8), table[:, None]), np.uint8)
 
 
 def _graded(layer: FeatureLayer, values: Cells) -> Image:
-    """From dark to light; heights over the range that is there, units' values over all there could be."""
+    """Return values as shades from dark to light, over their range in the picture or in the layer."""
     low, high = 0, 255
     if layer.name in _MOST:
         high = max(int(values.max()), 1)
@@ -222,13 +222,13 @@ def _graded(layer: FeatureLayer, values: Cells) -> Image:
         low, high = int(values.min()), int(values.max())
     image = _mapped(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
     if layer.name != "height_map":
-        image[values == 0] = _DARK  # nothing is there
+        image[values == 0] = _DARK  # 0 stands for nothing
     return image
 
 
 @functools.cache
 def _hues() -> Image:
-    """(256, 3) colours that neighbours do not share; nothing is dark."""
+    """Return colours (256, 3), different for neighbouring numbers; 0 is dark."""
     hue = (np.arange(256) * 67 % 180).astype(np.uint8)
     shades = np.stack([hue, np.full(256, 150, np.uint8), np.full(256, 235, np.uint8)], axis=1)[:, None]
     table = np.asarray(cv2.cvtColor(shades, cv2.COLOR_HSV2BGR), np.uint8)[:, 0]
@@ -237,7 +237,7 @@ def _hues() -> Image:
 
 
 def explain(image: Image, layer: FeatureLayer) -> None:
-    """Writes a legend into the lower left corner of a layer's picture."""
+    """Write a legend into the lower left corner of a layer's picture."""
     entries = [(colour, name) for _, name, colour in layer.colours]
     if layer.kind == "scalar":
         ramp = _viridis()
@@ -266,6 +266,6 @@ def _ends(layer: FeatureLayer) -> tuple[str, str]:
 
 @functools.cache
 def _viridis() -> Mask:
-    """(256, 3) dark violet over green to yellow: even in lightness, also for the colour blind."""
+    """Return colours (256, 3) from dark violet over green to yellow: even in lightness, also for the colour blind."""
     ramp = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)
     return np.asarray(ramp[:, 0], np.uint8)

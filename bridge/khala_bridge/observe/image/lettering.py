@@ -1,6 +1,6 @@
-"""Letters and stamps: small images with soft edges, made once and laid over a picture as often as wanted.
+"""Letters and stamps: small images with soft edges, made once and pressed on many pictures.
 
-Nothing here knows what is written. Sizes are pixels.
+Nothing here knows the meaning of a text. Sizes are in pixels.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ Mask: TypeAlias = NDArray[np.uint8]
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FINER = 4
-"""How many times larger letters are drawn than they are shown."""
+"""Factor by which letters are drawn larger than they are shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """A small image to be laid over another one: `paint + image * keep / 255`."""
+    """A small image that is pressed on another one: `paint + image * keep / 255`."""
 
     paint: Image
     keep: Image
-    """255 where nothing is painted; three times the same, which OpenCV multiplies ten times as fast as once."""
+    """255 where nothing is painted; three equal channels, which OpenCV multiplies ten times as fast as one."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -40,7 +40,7 @@ class Stamp:
         return self.paint.shape[1], self.paint.shape[0]
 
     def press(self, image: Image, left: int, top: int) -> None:
-        """Lays it over an image, its corner at this pixel; what is outside is left away."""
+        """Press it on an image, its corner at this pixel; parts outside of the image are cut off."""
         height, width = self.paint.shape[:2]
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + width, image.shape[1]), min(top + height, image.shape[0])
@@ -56,7 +56,7 @@ class Stamp:
 
 
 def stamp_of(colours: Image, opacity: Mask) -> Stamp:
-    """A stamp of an image of which so much is seen, 0 to 255 a pixel."""
+    """Return a stamp of an image with this opacity, 0 to 255 for each pixel."""
     alpha = cv2.merge([opacity] * 3)
     paint = cv2.multiply(colours, alpha, scale=1 / 255)
     return Stamp(np.asarray(paint, np.uint8), np.asarray(255 - alpha, np.uint8))
@@ -64,7 +64,7 @@ def stamp_of(colours: Image, opacity: Mask) -> Stamp:
 
 @functools.lru_cache(4096)
 def written(text: str, height_px: int, colour: Colour, halo: Colour | None = None) -> Stamp:
-    """A text in capitals of this height, with a dark edge of one pixel if `halo` is given."""
+    """Return a text in capitals of this height, with a dark edge of one pixel if `halo` is given."""
     mask = _mask(text, height_px)
     if halo is None:
         return stamp_of(np.full((*mask.shape, 3), colour, np.uint8), mask)
@@ -75,7 +75,7 @@ def written(text: str, height_px: int, colour: Colour, halo: Colour | None = Non
 
 
 def _mask(text: str, height_px: int) -> Mask:
-    """The letters in white with a free pixel around them."""
+    """Return the letters in white with a free pixel around them."""
     scale = height_px * _FINER / _CAPITALS
     thickness = max(1, round(0.16 * height_px * _FINER))
     (width, height), _ = cv2.getTextSize(text, _FONT, scale, thickness)

@@ -1,11 +1,11 @@
-"""Marks: the digits of a unit's tag beside it, so that what is seen can be named, put where they hide least.
+"""Marks: the digits of a unit's tag beside it, so that a model can name what it sees; placed where they hide least.
 
-On large bodies they stand below the letters of the type, beside all others.
+On large bodies they stand below the letters of the type, otherwise beside the body.
 
     0x1_0014_0001    the mark is `014`
 
-A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before);
-the three digits before them tell units apart, four where two units on one picture would share three.
+A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before).
+The three digits before them are the mark, or four if two units on one picture would share three.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from khala_bridge.observe.image.palette import Side
 
 _TAIL = 4
-"""Hexadecimal digits at the end of a tag that say nothing."""
+"""Hexadecimal digits at the end of a tag that do not distinguish units."""
 _CELL = 4
-"""Pixels of a cell of the plan of what is hidden."""
+"""Pixels of a cell of the plan of taken places."""
 _WORST = 0.5
-"""A mark of which more than this share would lie over other marks is left out."""
+"""A mark is left out if more than this share of it would cover other marks."""
 _OVER_MARK, _OVER_BODY, _FAR = 4.0, 1.0, 0.15
-"""What it costs to lie over a mark or a body, as shares of the mark, and to be a ring further away."""
+"""Costs of covering a mark or a body, as shares of the mark, and of being a ring further away."""
 _ROOMY_PX = 30
 """Radius of a body that has room for its mark."""
 _RINGS_PX = (2, 13, 24)
-"""Free pixels between a body and its mark; from the second ring on a line leads to it."""
+"""Free pixels between a body and its mark; from the second ring on a line connects them."""
 
 
 class Marked(NamedTuple):
-    """A thing that wants a mark: what it is to say, in whose colours, and where the body is drawn, in pixels."""
+    """A thing with a mark: the mark's text, its colours, and the place of the body in pixels."""
 
     text: str
     side: Side
@@ -52,23 +52,23 @@ class Marked(NamedTuple):
 
 
 def marks_of(tags: Iterable[int]) -> dict[int, str]:
-    """The mark of each tag, three or four hexadecimal digits; different tags of one picture have different marks."""
+    """Return the mark of each tag, three or four hexadecimal digits; different tags have different marks."""
     digits = {tag: f"{tag:x}".zfill(_TAIL + 4)[:-_TAIL] for tag in tags}
     shared = Counter(text[-3:] for text in digits.values())
     return {tag: text[-3:] if shared[text[-3:]] == 1 else text[-4:] for tag, text in digits.items()}
 
 
 def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], height_px: int) -> list[Marked]:
-    """Draws marks beside what they are of, the first ones at the best places.
+    """Draw marks beside their bodies, the first ones at the best places.
 
     Args:
-        image: is drawn on.
-        marked: what gets a mark, most important first.
-        bodies: everything that should rather not be covered.
+        image: the image to draw on.
+        marked: the things with marks, most important first.
+        bodies: bodies that marks should not cover.
         height_px: of the letters.
 
     Returns:
-        Those for whose mark there was room.
+        The things whose marks were drawn.
     """
     height, width = image.shape[:2]
     hidden, covered = _Plan(width, height), _Plan(width, height)
@@ -98,7 +98,7 @@ class _Spot(NamedTuple):
 
 
 class _Plan:
-    """Which cells of a picture are taken: one number with a bit a cell, so that a rectangle is looked up in no time."""
+    """The taken cells of a picture: one number with a bit for each cell, for fast lookups of rectangles."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
@@ -106,15 +106,15 @@ class _Plan:
         self.taken = 0
 
     def at(self, left: int, top: int) -> int:
-        """Number of the cell of a pixel, which is how far the bits of a rectangle there are from the first one."""
+        """Return the number of the cell of a pixel: the shift of a rectangle's bits there."""
         return top // _CELL * self.stride + left // _CELL
 
     def bits(self, width: int, height: int) -> tuple[int, int]:
-        """The bits of a rectangle in the first cell, and how many there are."""
+        """Return the bits of a rectangle in the first cell, and their number."""
         return _rectangle(width // _CELL + 1, height // _CELL + 1, self.stride)
 
     def add(self, left: int, top: int, width: int, height: int) -> None:
-        """Takes a rectangle that begins in the picture."""
+        """Mark a rectangle that begins in the picture as taken."""
         self.taken |= self.bits(width, height)[0] << self.at(left, top)
 
 
@@ -129,7 +129,7 @@ _WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 def _on_body(one: Marked, stamp: Stamp, hidden: _Plan) -> _Spot | None:
-    """Below the letters of a large body, if that is free."""
+    """Return the place below the letters of a large body, if it is free."""
     width, height = stamp.size
     left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
     is_inside = 0 <= left <= hidden.width - width and 0 <= top <= hidden.height - height
@@ -145,12 +145,12 @@ class _Try(NamedTuple):
     top: int
     ring: int
     cost: float
-    """Of being there at all."""
+    """Of the place itself."""
 
 
 @functools.lru_cache(1024)
 def _tries(radius: int, width: int, height: int) -> tuple[_Try, ...]:
-    """Where a mark of this size may stand around a body of this radius, the handiest first."""
+    """Return the places for a mark of this size around a body of this radius, the best first."""
     tries = []
     for ring, gap in enumerate(_RINGS_PX):
         beside, corner = radius + gap, round(0.72 * radius) + gap
@@ -162,7 +162,7 @@ def _tries(radius: int, width: int, height: int) -> tuple[_Try, ...]:
 
 
 def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
-    """Where a mark hides least; None if every place is over other marks."""
+    """Return the place where a mark hides least; None if every place covers other marks."""
     width, height = stamp.size
     bits, count = hidden.bits(width, height)
     marks, bodies, stride = hidden.taken, covered.taken, hidden.stride
@@ -170,7 +170,7 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
     best, least = None, math.inf
     for right, down, ring, cost in _tries(one.radius, width, height):
         if cost >= least:
-            break  # all that follows is less handy than the best, whatever it hides
+            break  # all that follows costs more than the best, even if it hides nothing
         left, top = one.x + right, one.y + down
         if not (0 <= left <= right_most and 0 <= top <= lowest):
             continue
@@ -192,7 +192,7 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
 
 
 def _lead(image: Image, one: Marked, spot: _Spot) -> None:
-    """A line from a body to its mark."""
+    """Draw a line from a body to its mark."""
     colour = palette.mixed(LIVERIES[one.side].mark, palette.INK, 0.25)
     cv2.line(image, (one.x, one.y), spot.middle, palette.INK, 2)
     cv2.line(image, (one.x, one.y), spot.middle, colour, 1)

@@ -1,7 +1,7 @@
-"""The minimap as an agent sees it: the whole map, all units in sight, where its teams are, and what was hit.
+"""The minimap as an agent sees it: the whole map, all units in sight, its teams, and its losses.
 
 The ground under it is the same for all agents of a side, and made once a step (`Moment` keeps it by size). Structures
-and resources are squares, units are dots; a frame shows what the screen of a team shows, with the team's name.
+and resources are squares, units are dots; a frame with a team's name shows the extent of that team's screen.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 ALERT: Colour = (60, 236, 255)
 _CROSS_PX = 5
 _FRAMES_AT_MOST = 6
-"""Teams beyond these get no frame but a cross: more of them would be a net over the map."""
+"""Number of teams with a frame; the others get a cross, since more frames would cover the map."""
 _DOTS: dict[str, Colour] = {
     "minerals": palette.MINERALS,
     "rich": palette.RICH_MINERALS,
@@ -61,17 +61,17 @@ def draw(
     grid: bool = True,
     pixels: Image | None = None,
 ) -> tuple[Image, Legend]:
-    """The minimap of an agent.
+    """Return the minimap of an agent.
 
     Args:
-        moment: what there is.
+        moment: the things to draw.
         world: the frame of the map.
         teams: the agent's teams, for their frames and names.
         own: tags of their units.
         alerts: points of the minimap where something was lost.
         size_px: of the picture on both axes, margins included.
         others: names and points of teams of other agents, for crosses and names.
-        grid: whether grid lines are drawn.
+        grid: whether to draw grid lines.
         pixels: the game's own minimap, `inner_px` large, on which units are drawn already; None draws it.
     """
     ground = _base(moment, world, inner_px(size_px, world.minimap_size)) if pixels is None else pixels
@@ -100,7 +100,7 @@ def draw(
 
 
 def _base(moment: Moment, world: MapFrame, size_px: int) -> Image:
-    """The ground with creep and fog."""
+    """Return the ground with creep and fog."""
     scale = size_px / max(world.width, world.height)
     image = _ground(moment.painting, round(world.width * scale), round(world.height * scale)).copy()
     veil = moment.veil
@@ -117,12 +117,12 @@ def _base(moment: Moment, world: MapFrame, size_px: int) -> Image:
 
 @functools.lru_cache(16)
 def _ground(painting: Painting, width: int, height: int) -> Image:
-    """A map's ground in the size of a minimap."""
+    """Return a map's ground in the size of a minimap."""
     return np.asarray(cv2.resize(painting.image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _dot(image: Image, one: Subject, side: Side, at: tuple[int, int], scale: float) -> None:
-    """A unit: a square if it stands for good, else a disc; never so small that it is lost."""
+    """Draw a unit: a square if it cannot move, else a disc; never too small to see."""
     x, y = at
     radius = one.radius * scale
     if side == "neutral":
@@ -145,7 +145,7 @@ def _dot(image: Image, one: Subject, side: Side, at: tuple[int, int], scale: flo
 def _name_teams(
     canvas: Canvas, teams: Sequence[TeamMark], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
 ) -> None:
-    """Frames around what the teams see, crosses at their heads, and their names."""
+    """Draw frames of the teams' screens, crosses at their heads, and their names."""
     image, half = canvas.inner, round(CAMERA_WIDTH / 2 * scale)
     marked = []
     for number, team in enumerate(teams):

@@ -1,7 +1,7 @@
-"""What there is to be drawn at one moment: units, effects, power, creep and fog, taken from a snapshot once.
+"""Everything to be drawn at one moment: units, effects, power, creep and fog, read from a snapshot once.
 
-Every picture of a step is drawn from the same `Moment`. Positions are those of the world; a picture puts them into its
-frame. It draws nothing, and knows no team.
+Every picture of a step is drawn from the same `Moment`. Positions are in the world frame; a picture converts them to
+its own. It draws nothing, and knows no team.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ _SIDES: dict[Alliance, Side] = {
 }
 _EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
 _STRUCTURE_RADIUS = 1.0
-"""A type that nobody knows is taken for a structure if it is this large and does not fly."""
+"""An unknown type counts as a structure if it is this large and does not fly."""
 _LEVELS: dict[Shape, int] = {
     "field": 0, "stone": 1, "geyser": 1, "minerals": 1, "rich": 1, "structure": 2, "ground": 3, "air": 4
 }  # fmt: skip
 UNDRAWN = frozenset({"Larva", "KarakFemale", "CollapsiblePurifierTowerDiagonal"})
-"""Types without a body worth a place; larvae crawl under their hatchery in swarms."""
+"""Types that are not drawn; larvae crawl under their hatchery in swarms."""
 
 
 class Subject(NamedTuple):
-    """One unit as it is drawn."""
+    """One unit, as pictures draw it."""
 
     tag: int
     type_id: int
@@ -64,17 +64,17 @@ class Subject(NamedTuple):
     """Cloaked, burrowed, a hallucination, or remembered under the fog of war."""
     built: float
     health: float
-    """Health, shield and energy as shares of what is full, 0 to 1; negative where the unit has none."""
+    """Health, shield and energy as shares of the full value, 0 to 1; negative if the unit has none."""
     shield: float
     energy: float
     order: str
-    """Name of what it does; own units only."""
+    """Name of its order; own units only."""
     target: tuple[float, float] | None
-    """Where that leads, in the world."""
+    """Target of its order, in the world."""
 
     @property
     def level(self) -> int:
-        """Its place in the order of drawing: what is flat first, flyers last."""
+        """Its place in the order of drawing: flat things first, flyers last."""
         return _LEVELS[self.shape]
 
 
@@ -89,10 +89,10 @@ class Patch:
 
 
 class Moment:
-    """One snapshot for the eye."""
+    """The visible contents of one snapshot."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        """Takes a snapshot; what is not asked for is not made."""
+        """Take a snapshot; each part is made on first use."""
         self.snapshot = snapshot
 
     @cached_property
@@ -102,7 +102,7 @@ class Moment:
 
     @cached_property
     def land(self) -> Land:
-        """What stands and lies on the ground."""
+        """The structures and resources on the ground."""
         return land_of(self.snapshot)
 
     @cached_property
@@ -125,13 +125,13 @@ class Moment:
         return np.array([(one.x, one.y, one.radius) for one in self.subjects]).reshape(-1, 3)
 
     def around(self, x: float, y: float, reach: float) -> list[Subject]:
-        """The subjects whose bodies come within `reach` of a point on both axes, in the order of drawing."""
+        """Return the subjects whose bodies come within `reach` of a point on both axes, in the order of drawing."""
         off = np.abs(self.places[:, :2] - (x, y)).max(axis=1) - self.places[:, 2] if len(self.places) else np.empty(0)
         return [self.subjects[index] for index in np.flatnonzero(off < reach).tolist()]
 
     @cached_property
     def effects(self) -> tuple[Patch, ...]:
-        """What lies on the ground: storms, biles, clouds."""
+        """Effects on the ground: storms, biles, clouds."""
         return tuple(
             Patch(
                 _EFFECTS.get(effect.effect_id, f"Effect{effect.effect_id}"),
@@ -177,7 +177,7 @@ def _subject(unit: Unit, units: dict[int, Unit]) -> Subject:
 
 @functools.lru_cache(4096)
 def _kind(unit_type: int, side: Side, is_flying: bool, is_large: bool) -> tuple[str, str, Shape]:  # a key
-    """Name, letters and shape of a type of unit."""
+    """Return the name, letters and shape of a type of unit."""
     name = unit_name(unit_type)
     shape: Shape = "ground"
     known = knowledge().get(name)
@@ -193,7 +193,7 @@ def _kind(unit_type: int, side: Side, is_flying: bool, is_large: bool) -> tuple[
 
 
 def _thing(name: str) -> Shape:
-    """The shape of what is nobody's."""
+    """Return the shape of a neutral thing."""
     if "MineralField" in name:
         return "rich" if "Rich" in name else "minerals"
     return "geyser" if "Geyser" in name else "stone"
@@ -206,7 +206,7 @@ def _share(value: float, full: float) -> float:
 
 
 def _order(unit: Unit, units: dict[int, Unit]) -> tuple[str, WorldPoint | None]:
-    """What an own unit does, and where that leads; whom it fires at comes first."""
+    """Return the order of an own unit and its target; the unit that it fires at comes first."""
     enemy = units.get(unit.engaged_target_tag)
     if enemy is not None:
         return "Attack", enemy.pos

@@ -1,7 +1,7 @@
 """The game's own pixels: rendered images and feature layers, if the observation has them and its camera is near.
 
-What the game draws is drawn where its one camera is. A picture of a team takes it as long as that camera is at most
-`NEAR` away, moved so that positions stay true; what is beyond its edge is black.
+The game draws only what its one camera shows. A picture of a team uses it if that camera is at most `NEAR` away,
+moved so that positions stay true; everything beyond its edge is black.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
 
 NEAR = 3.0
-"""World units: an eighth of the screen would be black."""
+"""World units; at this distance an eighth of the screen is black."""
 
 
 def screen(snapshot: Snapshot, camera: Camera, size_px: int) -> Image | None:
-    """What the game renders of a camera's view, (size_px, size_px, 3); None if it does not."""
+    """Return the game's rendering of a camera's view, (size_px, size_px, 3); None if it has none."""
     pixels = snapshot.pictures.screen()
     width = snapshot.info.pictures.render_width or CAMERA_WIDTH
     if pixels is None or not is_near(snapshot, camera):
@@ -34,13 +34,13 @@ def screen(snapshot: Snapshot, camera: Camera, size_px: int) -> Image | None:
 
 
 def minimap(snapshot: Snapshot, size_px: int) -> Image | None:
-    """What the game renders of the whole map; None if it does not."""
+    """Return the game's rendering of the whole map; None if it has none."""
     pixels = snapshot.pictures.minimap()
     return None if pixels is None else np.asarray(cv2.resize(pixels, (size_px, size_px)), np.uint8)
 
 
 def layer(snapshot: Snapshot, name: str, camera: Camera, size_px: int) -> NDArray[np.int32] | None:
-    """A feature layer of the screen under a camera, values as they are; None if the game's camera is elsewhere."""
+    """Return a feature layer of a camera's screen, values unchanged; None if the game's camera is elsewhere."""
     values = snapshot.pictures.layer(name)
     if values is None or not is_near(snapshot, camera):
         return None
@@ -50,7 +50,7 @@ def layer(snapshot: Snapshot, name: str, camera: Camera, size_px: int) -> NDArra
 
 
 def minimap_layer(snapshot: Snapshot, name: str, size_px: int) -> NDArray[np.int32] | None:
-    """A feature layer of the minimap, values as they are; None if it was not sent."""
+    """Return a feature layer of the minimap, values unchanged; None if the game did not send it."""
     values = snapshot.pictures.minimap_layer(name)
     if values is None:
         return None
@@ -59,7 +59,7 @@ def minimap_layer(snapshot: Snapshot, name: str, size_px: int) -> NDArray[np.int
 
 
 def is_near(snapshot: Snapshot, camera: Camera) -> bool:
-    """Whether the game's camera shows about what this one does."""
+    """Return True if the game's camera shows about the same as this one."""
     real = snapshot.camera
     return abs(real.x - camera.x) <= NEAR and abs(real.y - camera.y) <= NEAR
 
@@ -72,7 +72,7 @@ def _moved(
     size_px: int,
     interpolation: int,
 ) -> NDArray[np.uint8] | NDArray[np.float32]:
-    """An image of the game's camera, `width` world units wide, as another camera would have it."""
+    """Return an image of the game's camera, `width` world units wide, as seen by another camera."""
     real = snapshot.camera
     per_unit = pixels.shape[1] / width
     scale = CAMERA_WIDTH * per_unit / size_px

@@ -1,10 +1,10 @@
-"""The ground of a map in colours, painted once and looked at through any camera.
+"""The ground of a map in colours, painted once and seen through any camera.
 
-    painting = Painting.of(info)                 remembered: a map is painted once
+    painting = Painting.of(info)                 cached: a map is painted once
     painting.seen(camera, size_px, veil)         the part of it under a camera, with creep and fog of the moment
 
-Arrays here are images: row 0 is the top of the map, (height, width); `upright` turns the grids of
-`khala_bridge.state.ground`, which have their first cell at the bottom left, into such. Units stand in `moment`.
+Arrays here are images: row 0 is the top of the map, (height, width). `upright` converts the grids of
+`khala_bridge.state.ground`, which have their first cell at the bottom left. Units are in `moment`.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound=np.generic)
 
 FINE = 10
-"""Pixels a world unit that the ground is painted with; a camera enlarges them."""
+"""Pixels of the painted ground for a world unit; a camera enlarges them."""
 _PAD = 1
-"""World units around a camera that are cut out with it, so that soft edges are those of the whole map."""
+"""World units around a camera that are cut out with it, so that soft edges are the same as on the whole map."""
 _CELLS = int(CAMERA_WIDTH) + 2 * _PAD + 1
 _EXPLORED, _HIDDEN = 0.6, 0.3
-"""Brightness of ground that is not seen now, and of ground that never was."""
+"""Brightness of ground that is not in sight now, and of ground that was never seen."""
 _SEEN = 2
-"""The game's number for cells that are seen now."""
+"""The game's number for cells that are in sight."""
 
 
 def upright(grid: NDArray[T]) -> NDArray[T]:
-    """A grid with `[x, y]` from the bottom left as an image, row 0 at the top."""
+    """Return a grid with `[x, y]` from the bottom left as an image, row 0 at the top."""
     return np.ascontiguousarray(grid.T[::-1])
 
 
 @dataclass(frozen=True)
 class Veil:
-    """What lies over the ground at one moment, as images with a pixel a cell; None where the game said nothing."""
+    """Creep and fog at one moment, as images with a pixel for each cell; None if the game sent none."""
 
     creep: Mask | None
     sight: Mask | None
@@ -62,15 +62,15 @@ class Painting:
     width: int
     height: int
     image: Image
-    """The whole map, `FINE` pixels a world unit."""
+    """The whole map, `FINE` pixels for a world unit."""
 
     @classmethod
     def of(cls, info: EpisodeInfo) -> Painting:
-        """The ground of the map that a game is played on."""
+        """Return the ground of the map that a game is played on."""
         return _painting(MapGround.of(info), info.playable)
 
     def seen(self, camera: Camera, size_px: int, veil: Veil) -> Image:
-        """What a camera shows of it, (size_px, size_px, 3); at most half of its own pixels beside the truth."""
+        """Return the part that a camera shows, (size_px, size_px, 3); off by at most half of the painting's pixels."""
         left, top, x, y = self._window(camera)
         part = _cut(self.image, left * FINE, top * FINE, _CELLS * FINE, palette.VOID)
         if veil.creep is not None:
@@ -82,7 +82,7 @@ class Painting:
         return np.asarray(cv2.resize(view, (size_px, size_px), interpolation=cv2.INTER_LINEAR), np.uint8)
 
     def cells(self, values: Mask, camera: Camera, size_px: int) -> Mask:
-        """What a camera shows of an image with a pixel a cell of the map, values as they are, (size_px, size_px)."""
+        """Return the part of a cell image that a camera shows, values unchanged, (size_px, size_px)."""
         left, top, x, y = self._window(camera)
         part = _cut(values, left, top, _CELLS, 0)
         place = (np.arange(size_px) + 0.5) / size_px * CAMERA_WIDTH
@@ -90,7 +90,7 @@ class Painting:
         return np.ascontiguousarray(part[rows[:, None], columns[None, :]])
 
     def _window(self, camera: Camera) -> tuple[int, int, float, float]:
-        """First column and row of the cells that are cut out, and where in them the camera's view begins."""
+        """Return the first column and row of the cells to cut out, and the start of the camera's view in them."""
         x, y = camera.x - CAMERA_WIDTH / 2, self.height - camera.y - CAMERA_WIDTH / 2
         left, top = math.floor(x) - _PAD, math.floor(y) - _PAD
         return left, top, x - left, y - top
@@ -100,7 +100,7 @@ class Painting:
 def _painting(ground: MapGround, playable: tuple[int, int, int, int]) -> Painting:
     width, height = ground.size
     walkable = upright(ground.walkable)
-    if not walkable.any():  # no grid was sent
+    if not walkable.any():  # the game sent no grid
         walkable = np.ones((height, width), np.bool_)
     x0, y0, x1, y1 = playable
     inside = np.zeros((height, width), np.bool_)
@@ -112,7 +112,7 @@ def _painting(ground: MapGround, playable: tuple[int, int, int, int]) -> Paintin
 def _painted(
     heights: NDArray[np.float32], walkable: NDArray[np.bool_], unbuildable: NDArray[np.bool_], inside: NDArray[np.bool_]
 ) -> Image:
-    """The ground in colours: light where it is high, dark where nobody walks, with the light from the upper left."""
+    """Return the ground in colours: high ground is light, unwalkable ground dark, with light from the upper left."""
     rows, columns = heights.shape
     size = (columns * FINE, rows * FINE)
     level = _smooth(_levelled(heights, inside & walkable), size)
@@ -133,7 +133,7 @@ def _painted(
 
 
 def _levelled(heights: NDArray[np.float32], used: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Heights from 0 to 1 over the part of the map that is walked on; deep chasms do not take the contrast away."""
+    """Return heights from 0 to 1 over the walkable part of the map, so that deep chasms do not reduce the contrast."""
     values = heights[used] if used.any() else heights
     low, high = (float(np.percentile(values, share)) for share in (1, 99)) if values.size else (0.0, 1.0)
     if high - low < 1:  # half a cliff level: the map is flat
@@ -142,13 +142,13 @@ def _levelled(heights: NDArray[np.float32], used: NDArray[np.bool_]) -> NDArray[
 
 
 def _smooth(values: NDArray[Any], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Enlarged without steps."""
+    """Return an image enlarged without steps."""
     large = cv2.resize(values.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     return np.asarray(large, np.float32)
 
 
 def _edge(share: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A soft border of about two pixels where a smooth mask passes one half."""
+    """Return a mask with a soft border of about two pixels where a smooth mask passes one half."""
     return np.asarray(np.clip((share - 0.5) * 4 + 0.5, 0, 1), np.float32)
 
 
@@ -161,7 +161,7 @@ def _lerp(one: NDArray[np.float32], other: NDArray[np.float32], part: NDArray[np
 
 
 def _cut(image: NDArray[np.uint8], left: int, top: int, size: int, outside: Any) -> NDArray[np.uint8]:
-    """A square copy of an image, filled up where it reaches beyond it."""
+    """Return a square part of an image, padded beyond its edges."""
     height, width = image.shape[:2]
     x0, y0 = min(max(left, 0), width), min(max(top, 0), height)
     x1, y1 = min(max(left + size, 0), width), min(max(top + size, 0), height)
@@ -174,7 +174,7 @@ def _cut(image: NDArray[np.uint8], left: int, top: int, size: int, outside: Any)
 
 
 def tint(part: Image, creep: Mask) -> None:
-    """Lays creep over a part of the ground."""
+    """Draw creep over a part of the ground."""
     if not creep.any():
         return
     share = _edge(_smooth(np.minimum(creep, 1), (part.shape[1], part.shape[0]))) * np.float32(0.62 * 255)
@@ -188,7 +188,7 @@ _BRIGHTNESS = np.array([_HIDDEN, _EXPLORED, 1.0, 1.0], np.float32)
 
 
 def shade(part: Image, sight: Mask) -> None:
-    """Darkens a part of the ground that is not seen."""
+    """Darken the unseen part of the ground."""
     if sight.min() >= _SEEN:
         return
     light = _smooth(_BRIGHTNESS[np.minimum(sight, 3)] * 255, (part.shape[1], part.shape[0])).astype(np.uint8)

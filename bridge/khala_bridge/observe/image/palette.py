@@ -1,7 +1,7 @@
 """The colours of pictures, as OpenCV has them: blue, green, red.
 
-Sides are told apart by hue, lightness and rim, so that the colour blind tell them apart, too: light rims around what
-is one's own, dark ones around the enemy. The ground is grey and dull; what is bright is a unit, an effect or a mark.
+Sides differ in hue, lightness and rim, so that colour blind people can distinguish them: own units have light rims,
+enemies dark ones. The ground is grey and dull; units, effects and marks are bright.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 
 Colour: TypeAlias = tuple[int, int, int]
 Side: TypeAlias = Literal["team", "own", "ally", "enemy", "neutral"]
-"""Whose a unit is: of the team or agent that looks, of the same player, of an allied one, of an enemy, of nobody."""
+"""Owner of a unit: the team or agent that looks, the same player, an ally, an enemy, or nobody."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class AllianceColors:
     """The colours of one side: of bodies, of their rims, of letters on them, and of marks and dots."""
 
     name: str
-    """As a picture's title calls the colour."""
+    """Name of the colour in a picture's title."""
     body: Colour
     rim: Colour
     ink: Colour
@@ -44,9 +44,9 @@ LOW: Colour = (74, 68, 62)
 HIGH: Colour = (126, 142, 150)
 """Ground at the lowest and at the highest level of the map."""
 RAMP: Colour = (120, 168, 184)
-"""Where one can walk but not build takes this colour's side."""
+"""Tint of ground that is walkable but not buildable."""
 ROCK: Colour = (36, 34, 36)
-"""Where one cannot walk does this one's."""
+"""Tint of ground that is not walkable."""
 CREEP: Colour = (104, 34, 88)
 POWER: Colour = (255, 170, 90)
 LINE: Colour = (255, 255, 255)
@@ -65,11 +65,11 @@ MOVING: Colour = (120, 232, 150)
 
 
 def health_colour(share: float) -> Colour:
-    """Of a bar: green above two thirds, yellow above one, red below."""
+    """Return the colour of a health bar: green above two thirds, yellow above one third, red below."""
     return HEALTHY if share > 2 / 3 else HURT if share > 1 / 3 else DYING
 
 
 def mixed(one: Colour, other: Colour, part: float) -> Colour:
-    """A colour between two, at 0 the first."""
+    """Return a mix of two colours; at 0 the first one."""
     first, second, third = (round(a + (b - a) * part) for a, b in zip(one, other, strict=True))
     return first, second, third

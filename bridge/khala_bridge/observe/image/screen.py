@@ -1,7 +1,7 @@
 """The screen of a team: 24 by 24 world units around its camera, from above.
 
-It is drawn from what the raw interface tells, so that each team has a screen of its own, wherever the game's camera is.
-`draw` is the whole of it; what stands in a picture's title, `Legend` says.
+It is drawn from raw data, so that each team has a screen of its own, wherever the game's camera is. `draw` is the
+whole of it; `Legend` holds the facts for a picture's title.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ if TYPE_CHECKING:
 
 _BAR_PX = 3
 RANK: dict[Side, int] = {"team": 0, "enemy": 1, "own": 2, "ally": 3, "neutral": 4}
-"""Whose marks get the best places."""
+"""Sides in the order in which their marks get places."""
 
 
 @dataclass(frozen=True)
 class Legend:
-    """What there is to be said of a picture in words."""
+    """The facts about a picture for its title."""
 
     sides: tuple[Side, ...] = ()
-    """Whose units are on it."""
+    """Owners of the units on it."""
     codes: dict[str, str] = field(default_factory=dict)
-    """Letters on bodies → the types that they stand for."""
+    """Letters on bodies → their types."""
     example: tuple[str, int] | None = None
-    """A mark, and the tag that it is of."""
+    """A mark, and its tag."""
     unmarked: int = 0
-    """Units for whose mark there was no room."""
+    """Number of units without room for a mark."""
     rendered: bool = False
-    """Whether the game drew it, in colours of its own; what was added has ours."""
+    """Whether the game drew it, in colours of its own; the added parts have ours."""
 
 
 class _Drawn(NamedTuple):
-    """A subject, its side as this team sees it, and where it is in pixels."""
+    """A subject, its side as this team sees it, and its place in pixels."""
 
     subject: Subject
     side: Side
@@ -58,15 +58,15 @@ class _Drawn(NamedTuple):
 def draw(
     moment: Moment, camera: Camera, team: frozenset[int], size_px: int, *, marks: bool = True, grid: bool = True
 ) -> tuple[Image, Legend]:
-    """The screen of a team.
+    """Return the screen of a team.
 
     Args:
-        moment: what there is.
+        moment: the things to draw.
         camera: the team's.
         team: tags of its units.
         size_px: of the picture on both axes, margins included.
         marks: whether units carry the digits of their tags, and the letters of their types.
-        grid: whether grid lines are drawn.
+        grid: whether to draw grid lines.
     """
     ground = moment.painting.seen(camera, inner_px(size_px, camera.size), moment.veil)
     canvas = Canvas.on(ground, size_px, camera.size)
@@ -95,7 +95,7 @@ def draw_over(
     marks: bool = True,
     grid: bool = True,
 ) -> tuple[Image, Legend]:
-    """The same from pixels of the game, on which units are drawn already: axes, grid and marks are added."""
+    """Return the screen of a team from pixels of the game, with axes, grid and marks added."""
     canvas = Canvas.on(pixels, size_px, camera.size)
     if grid:
         canvas.rule()
@@ -112,7 +112,7 @@ def _placing(canvas: Canvas, camera: Camera) -> Callable[[float, float], tuple[i
 
 
 def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) -> list[_Drawn]:
-    """What is on the screen, in the order of drawing; a team's own lie on top of their like."""
+    """Return the subjects on the screen, in the order of drawing; a team's own units come last on their level."""
     scale, place_of = canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
     seen = [
         _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
@@ -130,7 +130,7 @@ def _look(one: _Drawn, *, lettered: bool) -> BodyLook:
 
 
 def _bars(image: Image, one: _Drawn) -> None:
-    """Construction, health and shield above a unit that is hurt, and the energy of the team's own."""
+    """Draw bars: construction, health and shield above a hurt unit, and the energy of the team's own units."""
     unit = one.subject
     if one.side == "neutral" or unit.health < 0:
         return
@@ -151,19 +151,19 @@ def _bars(image: Image, one: _Drawn) -> None:
 
 
 def _fill(image: Image, left: int, top: int, width: int, height: int, colour: Colour) -> None:
-    """A rectangle; what is outside of the image is left away."""
+    """Fill a rectangle, as far as it is inside the image."""
     image[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)] = colour
 
 
 class _Marks(NamedTuple):
-    """Which marks a picture got."""
+    """The marks of a picture."""
 
     example: tuple[str, int] | None = None
     left_out: int = 0
 
 
 def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
-    """Draws the marks."""
+    """Draw the marks."""
     image = canvas.inner
     size = image.shape[0]
     inside = [one for one in seen if 0 <= one.x < size and 0 <= one.y < size]
@@ -182,7 +182,7 @@ def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
 
 
 def _legend(seen: Sequence[_Drawn], marks: _Marks, *, lettered: bool) -> Legend:
-    """What the picture shows."""
+    """Return the facts about the picture."""
     sides = tuple(sorted({one.side for one in seen}, key=RANK.__getitem__))
     readable = (one.subject for one in seen if lettered and one.subject.code and one.radius >= LETTERS_FROM_PX)
     codes = {subject.code: subject.name for subject in readable}

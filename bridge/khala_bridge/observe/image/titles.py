@@ -1,4 +1,4 @@
-"""What is said of a picture in one line: its frame, its colours, its letters and marks."""
+"""Titles of pictures, one line each: the frame, the colours, the letters and marks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ON_MINIMAP = {**_ON_SCREEN, "team": "your units"}
 
 
 def of_screen(team: str, extent: float, legend: Legend) -> str:
-    """Of a team's screen."""
+    """Return the title of a team's screen."""
     parts = [
         f"Screen of team {team}, from [0, 0] at the top left to {_corner(extent)}",
         "rendered by the game" if legend.rendered else "",
@@ -40,7 +40,7 @@ def of_screen(team: str, extent: float, legend: Legend) -> str:
 
 
 def of_minimap(extent: float, legend: Legend) -> str:
-    """Of the minimap."""
+    """Return the title of the minimap."""
     parts = [
         f"Minimap, from [0, 0] at the top left to {_corner(extent)}",
         "rendered by the game" if legend.rendered else "",
@@ -52,17 +52,17 @@ def of_minimap(extent: float, legend: Legend) -> str:
 
 
 def of_layer(team: str, extent: float, layer: FeatureLayer) -> str:
-    """Of a feature layer of a team's screen."""
+    """Return the title of a feature layer of a team's screen."""
     return f"Layer {layer.name} of the screen of team {team}, to {_corner(extent)}: {layer.about}."
 
 
 def of_minimap_layer(extent: float, layer: FeatureLayer) -> str:
-    """Of a feature layer of the minimap."""
+    """Return the title of a feature layer of the minimap."""
     return f"Layer {layer.name} of the minimap, to {_corner(extent)}: {layer.about}."
 
 
 def of_features(team: str) -> str:
-    """Of the picture of nine layers."""
+    """Return the title of the picture of nine layers."""
     rows = "; ".join(", ".join(SHOWN[start : start + 3]) for start in range(0, len(SHOWN), 3))
     return f"Feature layers of the screen of team {team}, row by row: {rows}."
 

@@ -1,14 +1,14 @@
 """An observation in words, as a model reads it: one function per section.
 
-A page is a heading at the left margin and indented lines below it; a section with nothing to say is left out. It says
-what a view says, adds what is known of the types in it, and repeats what became of the last reply. It decides nothing
-and reads no game: a page is a pure function of a sight, its task and what the agent said and heard.
+A section is a heading at the left margin and indented lines below it; an empty section is left out. A page contains
+the view, knowledge about the types in it, and the result of the last reply. It decides nothing and reads no game: a
+page is a pure function of an observation, its task and the agent's feedback.
 
-    page       how sections are registered, written and made shorter      tokens, words    the small things
-    general, units, known, actions, reply, whole_side                     the sections, by what they speak of
+    page       registers, writes and shortens sections                    tokens, words    counting, small words
+    general, units, known, actions, reply, whole_side                     the sections, by topic
 
-`SECTIONS_OF` says which sections an agent's page has by its kind; a task may say it by name (`AgentConfig.sections`),
-and a program may register sections of its own.
+`SECTIONS_OF` lists the sections of a page by the agent's kind. A task may name others (`AgentConfig.sections`), and a
+program may register sections of its own.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
 
 
 def sections_of(agent: AgentConfig) -> tuple[Section, ...]:
-    """The sections of an agent's page.
+    """Return the sections of an agent's page.
 
     Raises:
         ConfigError: its configuration names one that does not exist.

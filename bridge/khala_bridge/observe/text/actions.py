@@ -1,4 +1,4 @@
-"""Sections about what can be done: valid actions with their costs, those that are not possible now, arguments."""
+"""Sections about actions: valid ones with their costs, those that are not possible now, and their arguments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @section("valid_actions")
 def valid_actions(page: Page) -> Iterator[str]:
-    """What each team may be told now, what it does and what it costs."""
+    """Yield the valid actions of each team, with their effects and costs."""
     yield from _calls(page)
     offers = _offers(page)
     described = {action.name: action.description for team in page.teams for action in team.actions}
@@ -30,7 +30,7 @@ def valid_actions(page: Page) -> Iterator[str]:
 
 @shorter("valid_actions", rank=40, says="what the actions do")
 def valid_actions_in_short(page: Page) -> Iterator[str]:
-    """Only calls and costs."""
+    """Yield calls and costs only."""
     yield from _calls(page)
     offers = _offers(page)
     if offers:
@@ -62,7 +62,7 @@ def _price(offer: ActionCost) -> str:
 
 @section("impossible")
 def impossible(page: Page) -> Iterator[str]:
-    """What each team may be told, but not now, by the reason."""
+    """Yield the actions of each team that are not possible now, by the reason."""
     teams = [team for team in page.teams if team.barred]
     if teams:
         yield "Not possible now"
@@ -73,7 +73,7 @@ def impossible(page: Page) -> Iterator[str]:
 
 @shorter("impossible", rank=80, says="what is not possible now, and why")
 def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Nothing."""
+    """Yield nothing."""
     yield from ()
 
 
@@ -81,7 +81,7 @@ _TOO_FEW = re.compile(r"(\d+) (\w+) too few")
 
 
 def _reasons(team: TeamView) -> dict[str, list[str]]:
-    """Actions by what stands in their way; those that are only too dear stand together, with what is missing."""
+    """Return actions by the reason against them; those that are only too dear stand together, with the shortage."""
     reasons: dict[str, list[str]] = {}
     for barred in team.barred:
         if too_few := _TOO_FEW.fullmatch(barred.reason):
@@ -93,7 +93,7 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
 
 @section("arguments")
 def arguments(page: Page) -> Iterator[str]:
-    """How the arguments of the valid actions are written."""
+    """Yield the notation of the valid actions' arguments."""
     kinds = {kind for team in page.teams for action in team.actions for kind in action.args}
     if not kinds:
         return
@@ -115,7 +115,7 @@ def arguments(page: Page) -> Iterator[str]:
 
 @shorter("arguments", rank=50, says="how arguments are written")
 def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Nothing: a briefing explains them as well."""
+    """Yield nothing: the briefing explains the arguments as well."""
     yield from ()
 
 

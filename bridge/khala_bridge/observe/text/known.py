@@ -1,4 +1,4 @@
-"""Section about what is known of the types of units in sight; the words are those of `khala_bridge.knowledge`."""
+"""Section with knowledge about the types of units in sight, in the words of `khala_bridge.knowledge`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
-    """What is known of every type in sight; uses and abilities only of those under control."""
+    """Return lines about every type in sight; uses and abilities only of the agent's own types."""
     return _written(_types(page))
 
 
 @functools.lru_cache(1024)
 def _written(types: _Types) -> tuple[str, ...]:
-    """The lines about some types, which are seldom others than at the step before."""
+    """Return the lines about some types; cached, since types rarely change between steps."""
     friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
     lines = ["Unit knowledge"] if any(types) else []
     for name in _all(types):
@@ -38,7 +38,7 @@ def _written(types: _Types) -> tuple[str, ...]:
 
 @shorter("unit_knowledge", rank=20, says="weapons and abilities of the types in sight")
 def unit_knowledge_in_short(page: Page) -> Iterator[str]:
-    """One line a type."""
+    """Yield one line for each type."""
     types = _types(page)
     if any(types):
         yield "Unit knowledge"
@@ -47,22 +47,22 @@ def unit_knowledge_in_short(page: Page) -> Iterator[str]:
 
 @shorter("unit_knowledge", rank=30, says="what is known of the types in sight")
 def no_unit_knowledge(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Nothing."""
+    """Yield nothing."""
     yield from ()
 
 
 class _Types(NamedTuple):
-    """Names of known types, each once and in the order of the page."""
+    """Names of known types, without duplicates, in the order of the page."""
 
     mine: tuple[str, ...]
     """Under control."""
     allies: tuple[str, ...]
-    """Others of the own side; of its structures nothing needs to be known."""
+    """Others of the own side, without its structures."""
     enemies: tuple[str, ...]
 
 
 def _types(page: Page) -> _Types:
-    """Types that are in sight or heard of."""
+    """Return the types that are in sight or known to the side."""
     view = page.view
     mine = [unit.type for team in page.teams for unit in team.units]
     allies = [unit.type for team in page.teams for unit in team.allies]
@@ -82,5 +82,5 @@ def _all(types: _Types) -> tuple[str, ...]:
 
 
 def _opponents(name: str, friends: frozenset[str], foes: frozenset[str]) -> frozenset[str]:
-    """Types that it is worth comparing one with: those of the other side, of both for one that both sides have."""
+    """Return the types to compare a type with: those of the other side; of both sides if both have the type."""
     return (foes if name in friends else frozenset()) | (friends if name in foes else frozenset())

@@ -1,9 +1,9 @@
-"""A page: what an agent is told at one step, and how its sections are found, written and made shorter.
+"""A page: an agent's text at one step, and how its sections are found, written and made shorter.
 
-A section is a function from a page to lines; it has a name, and `@section` registers it. A section with nothing to
-say yields nothing and is left out. What an agent's page consists of is told by names: those of its configuration, or
-of its kind. A section may have shorter forms, registered by `@shorter` with a rank; a page that is over its budget
-takes them in ascending order of ranks until it fits. No line is ever cut.
+A section is a function from a page to lines; it has a name, and `@section` registers it. An empty section yields
+nothing and is left out. Names in the agent's configuration, or else its kind, select the sections of its page. A
+section may have shorter forms, registered by `@shorter` with a rank; a page that is over its budget uses them in
+ascending order of ranks until it fits. No line is ever cut.
 
 Sections are pure functions of the page: no clock, no game, no state.
 """
@@ -34,7 +34,7 @@ Part: TypeAlias = Literal["counts", "events", "alerts", "others", "resources", "
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What an agent is told of its last reply, and what others said to it."""
+    """The results of an agent's last reply, and the messages of others."""
 
     accepted: tuple[str, ...] = ()
     """Its calls that were carried out, `Stalker-1 <Attack_Unit(0x1)>`."""
@@ -44,17 +44,17 @@ class Feedback:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """All that a section may speak of."""
+    """The data for the sections."""
 
     sight: AgentObservation
     task: TaskConfig
     feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)
-    """By tag, what was written of a unit's condition: the pages of one moment share it, see `units`."""
+    """By tag, the written condition of a unit: the pages of one moment share it, see `units`."""
 
     @property
     def view(self) -> View:
-        """What the agent sees."""
+        """The agent's view."""
         return self.sight.view
 
     @property
@@ -64,7 +64,7 @@ class Page:
 
     @property
     def correspondents(self) -> list[tuple[str, str]]:
-        """Name and role of everybody this agent may write to."""
+        """Names and roles of all that this agent may write to."""
         return [(agent.name, agent.role) for agent in self.task.correspondents(self.sight.agent)]
 
     @property
@@ -82,18 +82,18 @@ class Shorter:
 
     rank: int
     says: str
-    """What is missing then, as a page says it."""
+    """What the shorter form leaves out, as a page says it."""
     write: Write
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section by its name."""
+    """A registered section."""
 
     name: str
     write: Write
     parts: frozenset[Part] = frozenset()
-    """Of the view, those that it shows."""
+    """The parts of the view that it shows."""
     shorter: list[Shorter] = field(default_factory=list)
 
 
@@ -102,12 +102,12 @@ SECTIONS: dict[str, Section] = {}
 
 
 def section(name: str, *, parts: Iterable[Part] = (), replace: bool = False) -> Callable[[Write], Write]:
-    """Registers a function as the section of this name.
+    """Register a function as the section of this name.
 
     Args:
-        name: by which configurations ask for it.
-        parts: of the view, those that it shows besides teams, time and resources.
-        replace: whether it takes the place of the section that has the name already, with its shorter forms.
+        name: as configurations use it.
+        parts: of the view, those that it shows in addition to teams, time and resources.
+        replace: whether it replaces the section that has the name already, with its shorter forms.
 
     Raises:
         ValueError: the name is taken, and `replace` was not given.
@@ -123,12 +123,12 @@ def section(name: str, *, parts: Iterable[Part] = (), replace: bool = False) -> 
 
 
 def shorter(name: str, *, rank: int, says: str) -> Callable[[Write], Write]:
-    """Registers a function as a shorter form of a section.
+    """Register a function as a shorter form of a section.
 
     Args:
         name: of the section.
-        rank: when it is taken; the lowest first, over all sections of a page.
-        says: what is missing then, for the reader: `unit knowledge`.
+        rank: its place in the order of use; the lowest first, over all sections of a page.
+        says: what it leaves out, for the reader: `unit knowledge`.
     """
 
     def register(write: Write) -> Write:
@@ -139,10 +139,10 @@ def shorter(name: str, *, rank: int, says: str) -> Callable[[Write], Write]:
 
 
 def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
-    """The sections of these names, `game`, or `my_module:game` for one that a module registers when it is imported.
+    """Return the sections of these names: `game`, or `my_module:game` for one that a module registers on import.
 
     Raises:
-        ConfigError: there is none of a name; the text says which there are.
+        ConfigError: a name has no section; the text lists the existing ones.
     """
     return tuple(map(_find, names))
 
@@ -168,12 +168,12 @@ _BETWEEN = "\n\n"
 
 
 def render(page: Page, sections: Sequence[Section], budget: int | None = None) -> str:
-    """The text of a page.
+    """Return the text of a page.
 
     Args:
-        page: what it may speak of.
-        sections: what it consists of, in their order.
-        budget: about how many tokens it may have; None for no limit. A page whose shortest form has more gets that.
+        page: the data of the sections.
+        sections: its sections, in order.
+        budget: its limit of tokens, approximate; None for no limit. A page whose shortest form has more gets that form.
     """
     blocks = [_block(section.write, page) for section in sections]
     if budget is not None:
@@ -186,7 +186,7 @@ def _block(write: Write, page: Page) -> str:
 
 
 def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
-    """The blocks with shorter forms in the order of ranks, as many as are needed, and a notice of what is missing."""
+    """Return the blocks with as many shorter forms as needed, in the order of ranks, and a notice of what is missing."""
     costs = [tokens(block + _BETWEEN) for block in blocks]
     missing: dict[str, str] = {}
     notice = ""
@@ -205,6 +205,6 @@ def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budge
 
 
 def _notice(missing: Iterable[str]) -> Iterator[str]:
-    """What was left out; it stands before the last section, which says what to do now."""
+    """Yield a notice of what was left out; it stands before the last section, which says what to do now."""
     yield "Left out to keep this short"
     yield from (f"{INDENT}{words}" for words in missing)

@@ -1,10 +1,10 @@
-"""About how many tokens a text has, without the tokenizer of any model.
+"""An estimate of the tokens of a text, without the tokenizer of any model.
 
 Tokenizers differ, but all of them take common English words as one token, at most three digits as one, often with
 the blank before them as another, and most signs as one each. So letters and digits are counted in groups, signs
-singly, and what is no ASCII as a token a character. The sizes of the groups are estimates, made by hand after the
-rules of byte-pair encodings: a unit line of 103 characters has about 43 tokens, where the usual rule of four
-characters a token says 26.
+singly, and each character outside of ASCII as a token. The sizes of the groups are estimates, made by hand after the
+rules of byte-pair encodings: a unit line of 103 characters has about 43 tokens; the usual rule of four characters
+for a token says 26.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _NO_DIGITS = {ord(sign): None for sign in string.digits}
 
 
 def tokens(text: str) -> int:
-    """About how many tokens a text has; 0 for an empty one."""
+    """Return the approximate number of tokens of a text; 0 for an empty one."""
     rest = text.translate(_NO_LETTERS)
     signs = rest.translate(_NO_DIGITS)
     ascii_signs = len(signs.encode("ascii", "ignore"))

@@ -1,4 +1,4 @@
-"""Sections about the agent's teams: who is on their screens and what happened there.
+"""Sections about the agent's teams: the units on their screens and the events there.
 
 Unit lines are fields between bars, so that programs can read them as well (the scripted players do):
 
@@ -21,33 +21,33 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Event, OrderView, TeamView, UnitDetails, UnitView
 
 NEAR = 9.0
-"""World units from the middle of a team within which enemies are told one by one on a shorter page; beyond the range
-of all weapons but those of siege."""
+"""World units from the middle of a team within which a shorter page lists enemies one by one; beyond the range of all
+weapons but siege weapons."""
 FEW, FEWEST = 8, 3
-"""Enemies that are told one by one on still shorter pages, the nearest ones."""
+"""Number of enemies that still shorter pages list one by one, the nearest ones."""
 
 
 @section("teams", parts=("resources",))
 def teams(page: Page) -> list[str]:
-    """One block per team: where it is, who is there, what happened."""
+    """Return one block per team: its place, the units there, and events."""
     return _blocks(page, _all_units, _tagged_events)
 
 
 @shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
 def near_units(page: Page) -> list[str]:
-    """Allies and far enemies only by type."""
+    """Return the blocks with allies and far enemies only by type."""
     return _blocks(page, lambda page, team: _near(page, team, _distance_within(team, NEAR)), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
 def few_units(page: Page) -> list[str]:
-    """A few enemies, and events without tags."""
+    """Return the blocks with a few enemies, and events without tags."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEW)), _counted_events)
 
 
 @shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
 def fewest_units(page: Page) -> list[str]:
-    """A handful of enemies, no events."""
+    """Return the blocks with a handful of enemies, and no events."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEWEST)), _no_events)
 
 
@@ -72,7 +72,7 @@ def _blocks(
 
 
 def _listed(heading: str, lines: list[str]) -> list[str]:
-    """A heading with lines below it, which are indented already; nothing without lines."""
+    """Return a heading with indented lines below it; nothing without lines."""
     return [f"{INDENT}{heading}", *lines] if lines else lines
 
 
@@ -92,7 +92,7 @@ def _all_units(page: Page, team: TeamView) -> list[str]:
 
 
 def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
-    """Own units and some enemies one by one, everybody else by type; but structures for those who build beside them."""
+    """Return own units and some enemies one by one, others by type; builders also get structures one by one."""
     standing = [unit for unit in team.allies if is_structure(unit.type) and page.sight.agent.kind == "builder"]
     return [
         *_listed("Your units:", _own_lines(page, team)),
@@ -104,7 +104,7 @@ def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
 
 
 def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
-    """Own units and some enemies one by one; everybody else by type."""
+    """Return own units and some enemies one by one; others by type."""
     return [
         *_listed("Your units:", _own_lines(page, team)),
         *_listed("Allied units by type:", _group_lines(team.allies)),
@@ -123,14 +123,14 @@ def _distance_within(team: TeamView, distance: float) -> list[UnitView]:
 
 
 def _nearest(team: TeamView, count: int) -> list[UnitView]:
-    """The nearest enemies, in the order in which all are listed."""
+    """Return the nearest enemies, in the order of the full list."""
     nearest = sorted(team.enemies, key=lambda unit: (unit.distance or 0.0, unit.tag))[:count]
     tags = {unit.tag for unit in nearest}
     return [unit for unit in team.enemies if unit.tag in tags]
 
 
 def _group_lines(units: Sequence[UnitView]) -> list[str]:
-    """How many of each type there are, and about where."""
+    """Return the number of units of each type, and about where they are."""
     by_type: dict[str, list[UnitView]] = {}
     for unit in units:
         by_type.setdefault(unit.type, []).append(unit)
@@ -172,7 +172,7 @@ def _lines(page: Page, units: Sequence[UnitView]) -> list[str]:
 
 
 def _condition(unit: UnitView) -> str:
-    """How a unit is: the same for every team that sees it."""
+    """Return the condition of a unit; the same for every team that sees it."""
     fields = [f"health {whole(unit.health)}/{whole(unit.health_max)}"]
     if unit.shield_max:
         fields.append(f"shield {whole(unit.shield)}/{whole(unit.shield_max)}")
@@ -206,13 +206,13 @@ def _details(details: UnitDetails) -> Iterator[str]:
 
 
 def _skills(details: UnitDetails) -> str:
-    """What a unit may be told to use now: part of no condition, since agents differ in it."""
+    """Return the skills that a unit can use now; not part of its condition, since they differ between agents."""
     ready = f" | ready {', '.join(details.ready)}" if details.ready else ""
     return ready + (f" | not ready {', '.join(details.unready)}" if details.unready else "")
 
 
 def orders(queue: Sequence[OrderView]) -> str:
-    """What a unit does and will do: `Train_Marine 83%, then 4 Train_Marine`."""
+    """Return the orders of a unit: `Train_Marine 83%, then 4 Train_Marine`."""
     if not queue:
         return ""
     waiting = [(words, len(list(same))) for words, same in groupby(map(_order, queue[1:]))]
@@ -248,7 +248,7 @@ _SIGNS = {"hurt": " -", "healed": " +"}
 
 
 def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
-    """What happened to which type, and the events, in the order of the verbs."""
+    """Return events by verb and type, in the order of the verbs."""
     groups: dict[tuple[str, str, str], list[Event]] = {}
     for event in events:
         key = event.what, event.alliance, event.type
@@ -261,13 +261,13 @@ def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
 
 
 def _passing_by(what: str, alliance: str, name: str) -> bool:
-    """Whether it only says that the team has passed what stays or works there."""
+    """Return True if an event only says that the team has passed something that stays or works there."""
     passed = alliance == "ally" and what in {"appeared", "disappeared"}
     return passed and (is_structure(name) or is_worker(name))
 
 
 def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
-    """One line for all units of a type to which the same happened."""
+    """Return one line for all units of a type with the same event."""
     words = page.conditions
     lines = []
     for what, members in _by_kind(events):
@@ -281,13 +281,13 @@ def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
 
 
 def _amount(words: dict[str, str], sign: str, event: Event) -> str:
-    """A tag and what it lost or regained; several teams tell of it in the same words."""
+    """Return a tag and what it lost or regained; cached, since several teams report it."""
     said = words[sign + event.tag] = f"{event.tag}{sign}{whole(event.amount or 0.0)}"
     return said
 
 
 def _counted_events(page: Page, events: Sequence[Event]) -> list[str]:  # noqa: ARG001  # a form of telling events
-    """The same without tags."""
+    """Return the line without tags."""
     return [f"{INDENT2}{what}: {len(members)}" for what, members in _by_kind(events)]
 
 

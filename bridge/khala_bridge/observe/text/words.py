@@ -16,37 +16,37 @@ INDENT2 = INDENT * 2
 
 @functools.lru_cache(4096)
 def n(value: float) -> str:
-    """A number without needless digits: 12, 12.5."""
+    """Return a number without needless digits: 12, 12.5."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
 def whole(value: float) -> str:
-    """A whole number that is 0 only for nothing: what lives has at least 1."""
+    """Return a whole number that is 0 only for 0: a living unit has at least 1."""
     return str(max(1, round(value)) if value > 0 else 0)
 
 
 def percent(share: float) -> str:
-    """A share of one as `62%`."""
+    """Return a share of one as `62%`."""
     return f"{100 * share:.0f}%"
 
 
 def point(place: Point) -> str:
-    """A point in the form in which actions take it."""
+    """Return a point as actions take it."""
     return f"[{n(place[0])}, {n(place[1])}]"
 
 
 def one_line(text: str) -> str:
-    """A text without line breaks, so that no part of it can pass for a heading."""
+    """Return a text without line breaks, so that no part of it looks like a heading."""
     return " ".join(text.split())
 
 
 def counted(numbers: dict[str, int]) -> str:
-    """`3 Stalker, 1 Zealot`."""
+    """Return counts in words: `3 Stalker, 1 Zealot`."""
     return ", ".join(f"{count} {what}" for what, count in numbers.items())
 
 
 def listed(heading: str, lines: Iterable[str]) -> Iterator[str]:
-    """A heading with lines below it; nothing without lines."""
+    """Yield a heading with lines below it; nothing without lines."""
     found = list(lines)
     if found:
         yield f"{INDENT}{heading}"

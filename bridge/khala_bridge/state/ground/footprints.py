@@ -48,12 +48,12 @@ class Footprint(Frozen):
         return len(self.rows[0]), len(self.rows)
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """The cell from which `cells` are counted when its middle is as near to a point as the grid allows."""
+        """Return the cell from which `cells` are counted when its middle is as near to a point as the grid allows."""
         width, height = self.size
         return _nearest(x - (width % 2) / 2), _nearest(y - (height % 2) / 2)
 
     def middle(self, cell: tuple[int, int]) -> WorldPoint:
-        """Where its middle is when its `cells` are counted from a cell."""
+        """Return where its middle is when its `cells` are counted from a cell."""
         width, height = self.size
         return WorldPoint(cell[0] + (width % 2) / 2, cell[1] + (height % 2) / 2)
 
@@ -80,19 +80,19 @@ class Site(Frozen):
 
 
 def _nearest(value: float) -> int:
-    """The nearest whole number, the lower one of two; Python's own rounding would jump to even ones."""
+    """Return the nearest whole number, the lower one of two; Python's own rounding would jump to even ones."""
     return math.ceil(value - 0.5)
 
 
 @functools.cache
 def footprints() -> dict[str, Footprint]:
-    """Every footprint by its name."""
+    """Return every footprint by its name."""
     return data.table("footprints.yaml", Footprint)
 
 
 @functools.cache
 def sites() -> dict[str, Site]:
-    """What every structure that a worker builds asks of its ground, by the structure's name."""
+    """Return what every structure that a worker builds asks of its ground, by the structure's name."""
     return data.table("sites.yaml", Site)
 
 
@@ -102,12 +102,12 @@ def _of_name() -> dict[str, tuple[str, Footprint]]:
 
 
 def footprint_of(unit: str) -> Footprint | None:
-    """What a type of unit stands on; None for one that takes no ground."""
+    """Return what a type of unit stands on; None for one that takes no ground."""
     found = _of_name().get(unit)
     return found and found[1]
 
 
 @functools.lru_cache(1024)
 def stands_on(unit_type: int) -> tuple[str, Footprint] | None:
-    """Name of the footprint of a type, given by its number, and the footprint; None for one that takes no ground."""
+    """Return name of the footprint of a type, given by its number, and the footprint; None for one that takes no ground."""
     return _of_name().get(unit_name(unit_type))

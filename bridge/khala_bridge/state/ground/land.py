@@ -63,15 +63,15 @@ class Land:
         return [unit for unit in others if stands_on(unit.unit_type) is None]
 
     def unit(self, tag: int) -> Unit | None:
-        """A unit that is seen or remembered, by its tag."""
+        """Return a unit that is seen or remembered, by its tag."""
         return self._snapshot.known.get(tag)
 
     def standing(self, footprint: str) -> list[Unit]:
-        """What is known to stand on footprints of one name, by ascending tags."""
+        """Return what is known to stand on footprints of one name, by ascending tags."""
         return [unit for name, _, unit in self._standing if name == footprint]
 
     def standing_on(self, cells: Iterable[tuple[int, int]]) -> Unit | None:
-        """What stands on any of some cells; the one with the least tag."""
+        """Return what stands on any of some cells; the one with the least tag."""
         wanted = set(cells)
         return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
 
@@ -185,7 +185,7 @@ class Land:
         return "" if unit is None else unit.name
 
     def powered(self, *, corner: bool, by: int | None = None) -> Bools:
-        """(w, h) in which cells a middle would be in a power field.
+        """Return (w, h) in which cells a middle would be in a power field.
 
         Args:
             corner: whether the middle is the lower left corner of the cell, as of structures of 2 x 2, and not its
@@ -259,13 +259,13 @@ def _covered(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
 
 
 def addon_place(structure: WorldPoint) -> WorldPoint:
-    """Where the add-on of a structure stands."""
+    """Return where the add-on of a structure stands."""
     return WorldPoint(structure.x + ADDON_OFFSET[0], structure.y + ADDON_OFFSET[1])
 
 
 @functools.lru_cache(2048)
 def built_by(ability: int) -> str | None:
-    """The structure that a worker places with an ability; None for any other ability."""
+    """Return the structure that a worker places with an ability; None for any other ability."""
     for function in functions_of(ability):
         name = function.stem.removeprefix(_PLACES)
         if function.stem.startswith(_PLACES) and name in sites():
@@ -277,7 +277,7 @@ _last: list[tuple[Snapshot, Land]] = []
 
 
 def land_of(snapshot: Snapshot) -> Land:
-    """The land at the moment of a snapshot; all who ask about one of the last two share it."""
+    """Return the land at the moment of a snapshot; all who ask about one of the last two share it."""
     for known, land in _last[:]:  # a copy: other matches of the process may ask from other threads
         if known is snapshot:
             return land
@@ -288,7 +288,7 @@ def land_of(snapshot: Snapshot) -> Land:
 
 @functools.lru_cache(maxsize=8)
 def _lines(ground: MapGround, bases: tuple[Base, ...], halls: Places) -> Bools:
-    """(w, h) between town halls and their resources, and where town halls are going to stand."""
+    """Return (w, h) between town halls and their resources, and where town halls are going to stand."""
     kept = np.zeros(ground.size, np.bool_)
     resources = [place for base in bases for place in (*base.fields, *base.geysers)]
     for place in dict.fromkeys((*(tuple(base.place) for base in bases), *halls)):

@@ -50,7 +50,7 @@ Places = tuple[tuple[float, float], ...]
 
 @functools.lru_cache(maxsize=32)
 def base_places(ground: MapGround, fields: Places, geysers: Places, halls: Places = ()) -> tuple[Base, ...]:
-    """Every place for a town hall on a map, by ascending coordinates.
+    """Return every place for a town hall on a map, by ascending coordinates.
 
     Args:
         ground: of the map.
@@ -73,7 +73,7 @@ def base_places(ground: MapGround, fields: Places, geysers: Places, halls: Place
 
 
 def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]:
-    """Indices of the places that hang together, each cluster in ascending order."""
+    """Return indices of the places that hang together, each cluster in ascending order."""
     if not len(places):
         return []
     level = np.array([ground.level(x, y) for x, y in places.tolist()])
@@ -91,7 +91,7 @@ def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]
 
 
 def _free_of(ground: MapGround, fields: Places, geysers: Places) -> Bools:
-    """(w, h) the middle cells on which a town hall would stand on free ground, clear of all resources."""
+    """Return (w, h) the middle cells on which a town hall would stand on free ground, clear of all resources."""
     clear = ground.buildable.copy()
     for name, places in (("mineral_field", fields), ("geyser", geysers)):
         footprint = footprints()[name]
@@ -116,7 +116,7 @@ def _best_place(free: Bools, resources: NDArray[np.float64], halls: Places) -> W
 
 
 def mark(grid: Bools, cells: Cells, at: Sequence[tuple[int, int]], *, value: bool) -> None:
-    """Writes a value into the cells (dx, dy) around each of some cells, as far as they are on the grid."""
+    """Write a value into the cells (dx, dy) around each of some cells, as far as they are on the grid."""
     if not at:
         return
     where = (np.array(at)[:, None, :] + np.array(cells)).reshape(-1, 2)
@@ -125,14 +125,14 @@ def mark(grid: Bools, cells: Cells, at: Sequence[tuple[int, int]], *, value: boo
 
 
 def coordinates(part: tuple[int, int], start: tuple[int, int] = (0, 0)) -> tuple[Floats, Floats]:
-    """(w, 1) and (1, h) the lower left corners of the cells of a part of a grid, which add up to its shape."""
+    """Return (w, 1) and (1, h) the lower left corners of the cells of a part of a grid, which add up to its shape."""
     x = np.arange(start[0], start[0] + part[0], dtype=np.float32)
     y = np.arange(start[1], start[1] + part[1], dtype=np.float32)
     return x[:, None], y[None, :]
 
 
 def everywhere(grid: Bools, cells: Cells) -> Bools:
-    """(w, h) at which cells all of the cells (dx, dy) around hold; what lies beyond the grid does not."""
+    """Return (w, h) at which cells all of the cells (dx, dy) around hold; what lies beyond the grid does not."""
     reach = max(max(abs(dx), abs(dy)) for dx, dy in cells)
     width, height = grid.shape
     padded = np.pad(grid, reach)

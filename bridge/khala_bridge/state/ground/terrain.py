@@ -42,7 +42,7 @@ class MapGround:
 
     @classmethod
     def of(cls, info: EpisodeInfo) -> MapGround:
-        """The ground of the map that a game is played on; remembered by the map's own grids."""
+        """Return the ground of the map that a game is played on; remembered by the map's own grids."""
         return _ground(info.size, info.playable, info.placement, info.pathing, info.height, info.starts)
 
     @property
@@ -51,17 +51,17 @@ class MapGround:
         return self.buildable.shape[0], self.buildable.shape[1]
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a point lies on the grids."""
+        """Return whether a point lies on the grids."""
         width, height = self.size
         return 0 <= x < width and 0 <= y < height
 
     def level(self, x: float, y: float) -> float:
-        """Height of the ground at a point, in world units; that of the nearest cell outside of the map."""
+        """Return height of the ground at a point, in world units; that of the nearest cell outside of the map."""
         width, height = self.size
         return float(self.height[min(max(int(x), 0), width - 1), min(max(int(y), 0), height - 1)])
 
     def ways_from(self, point: WorldPoint) -> Floats:
-        """(w, h) how far ground units walk from a point to each cell; infinite where they cannot come.
+        """Return (w, h) how far ground units walk from a point to each cell; infinite where they cannot come.
 
         Around cliffs but through structures. Walked on the grid in turn with and without diagonal steps: up to a ninth
         shorter than the way itself, and without the first `SEED_REACH` cells.
@@ -115,7 +115,7 @@ def _ways(ground: MapGround, cell: tuple[int, int]) -> Floats:
 
 
 def _grown(front: Bools, *, diagonal: bool) -> Bools:
-    """Some cells with their neighbours: four of each, or eight."""
+    """Return some cells with their neighbours: four of each, or eight."""
     grown = front.copy()
     grown[1:] |= front[:-1]
     grown[:-1] |= front[1:]
