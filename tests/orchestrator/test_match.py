@@ -168,10 +168,10 @@ async def test_what_the_game_refuses_is_said_as_well(play: Play) -> None:
 
 
 async def test_an_episode_begins_as_if_there_had_been_none_before(play: Play) -> None:
-    played = await play({}, max_steps=3, episodes=2, after={0: {"dead": [0xB]}})
+    played = await play({}, max_steps=3, episodes=2, after={1: {"dead": [0xB]}})
     seen = [(seen.text, seen.view) for seen in played.pool.of("Stalkers")]
     assert seen[:3] == seen[3:]
-    assert seen[0] != seen[1]
+    assert seen[0] != seen[2]
 
 
 async def test_what_is_shown_of_one_episode_is_not_shown_in_the_next(play: Play) -> None:
