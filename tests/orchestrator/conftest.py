@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import pytest
 from rich.console import Console
-from s2clientprotocol import raw_pb2
+from s2clientprotocol import error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.act.raw import RawExecutor
@@ -149,8 +149,10 @@ _UNITS = (
 )
 
 
-def make_snapshot(*, loop: int = 0, dead: Sequence[int] = (), outcome: Outcome | None = None) -> Snapshot:
-    """A Stalker and a Zealot before a Zealot of the enemy's, those that died left out."""
+def make_snapshot(
+    *, loop: int = 0, dead: Sequence[int] = (), refuse: Sequence[int] = (), outcome: Outcome | None = None
+) -> Snapshot:
+    """A Stalker and a Zealot before a Zealot of the enemy's; some died, and some could not do what was ordered."""
     response = sc_pb.ResponseObservation()
     response.observation.game_loop = loop
     response.observation.player_common.player_id = 1
@@ -164,6 +166,8 @@ def make_snapshot(*, loop: int = 0, dead: Sequence[int] = (), outcome: Outcome |
             unit.health = unit.health_max = known.health
             unit.shield = unit.shield_max = known.shield
             unit.pos.x, unit.pos.y, unit.pos.z = x, 16, 10
+    for tag in refuse:
+        response.action_errors.add(unit_tag=tag, result=error_pb2.CantTargetAirUnits)
     details = response.observation.score.score_details
     details.killed_minerals.army = 100.0 * (ENEMY in dead)
     details.lost_minerals.army = 125.0 * (STALKER in dead)

@@ -158,6 +158,22 @@ async def test_what_is_refused_is_said_in_the_report_and_in_the_next_step(play: 
     assert played.results[0].rejections == dict.fromkeys((r.reason for r in rejections), 1)
 
 
+async def test_what_the_game_refuses_is_said_as_well(play: Play) -> None:
+    played = await play({("Stalkers", 0): ATTACK}, max_steps=2, after={0: {"refuse": [0x1]}})
+    (rejection,) = played.ear.reports[0].agents[0].rejections
+    assert rejection.reason == "refused_by_game"
+    assert rejection.message == "The game refused Attack_Unit: cant target air units."
+    assert played.pool.of("Stalkers")[1].rejections == (rejection,)
+    assert played.pool.of("Zealots")[1].rejections == ()
+
+
+async def test_an_episode_begins_as_if_there_had_been_none_before(play: Play) -> None:
+    played = await play({}, max_steps=3, episodes=2, after={1: {"dead": [0xB]}})
+    seen = [(seen.text, seen.view) for seen in played.pool.of("Stalkers")]
+    assert seen[:3] == seen[3:]
+    assert seen[0] != seen[2]
+
+
 async def test_what_is_shown_of_one_episode_is_not_shown_in_the_next(play: Play) -> None:
     words = f"{ATTACK}\n<Fly()>\nCommunications:\n<MessageTo(Zealots, 'go')>"
     played = await play({("Stalkers", 0): words}, max_steps=1, episodes=2)

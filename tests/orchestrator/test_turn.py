@@ -271,7 +271,8 @@ async def test_one_that_answers_before_the_others_are_asked_does_not_end_the_ste
     async with Roster(host, RUN, [ZEALOTS, STALKERS]) as roster, Turn(host, RUN, roster) as turn:
         await roster.assemble([ZEALOTS, STALKERS], 1)
         quick = asyncio.create_task(zealots.play(lambda peer, seen: peer.answer(seen, "quick")))
-        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        first, second = observe(ZEALOTS, STALKERS, within_s=10)
+        asked = asyncio.create_task(turn.ask([first, second._replace(pictures=[b"slow"])]))
         await stalkers.observed()
         await asyncio.sleep(3)
         await stalkers.reply("slow")
@@ -280,7 +281,7 @@ async def test_one_that_answers_before_the_others_are_asked_does_not_end_the_ste
     assert answers.wait_s == 3.0
     assert [(seat.agent, a.text, a.latency_s) for seat, a in answers.by_seat.items()] == [
         ("Zealots", "quick", 2.0),
-        ("Stalkers", "slow", 5.0),
+        ("Stalkers", "slow", 7.0),
     ]
 
 
