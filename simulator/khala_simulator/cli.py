@@ -30,7 +30,7 @@ Directory = Annotated[Path, typer.Argument(help="Made if it is not there. Never 
 
 @app.command("install")
 def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = False) -> None:
-    """Lay out DIRECTORY like a StarCraft II install.
+    """Set up DIRECTORY like a StarCraft II install.
 
     Clients find it by the environment variable SC2PATH:
 

@@ -45,7 +45,7 @@ OBJECTS = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def encrypted(data: bytes, key: int) -> bytes:
-    """What the reader's own decryption turns back into ``data``."""
+    """Return the bytes that the reader's own decryption turns back into ``data``."""
     table: dict[int, int] = mpyq.MPQArchive.encryption_table
     seed, out = 0xEEEEEEEE, []
     for (value,) in struct.iter_unpack("<I", data):
@@ -57,7 +57,7 @@ def encrypted(data: bytes, key: int) -> bytes:
 
 
 def archive(files: dict[str, bytes]) -> bytes:
-    """An MPQ archive of format 0: header, files of one unit each, hash table, block table."""
+    """Return an MPQ archive of format 0: header, files of one unit each, hash table, block table."""
     hashed = mpyq.MPQArchive.__new__(mpyq.MPQArchive)._hash
     body, blocks, hashes = b"", b"", b""
     for index, (name, content) in enumerate(files.items()):
@@ -86,7 +86,7 @@ def map_info(playable: tuple[int, ...] = PLAYABLE, size: tuple[int, int] = (WIDT
 
 
 def plateau() -> tuple[NDArray[np.uint16], NDArray[np.uint8]]:
-    """A level 128 in the west and 64 in the east, with a cliff at x = 20 and a ramp in rows 12 to 17."""
+    """Return a level 128 in the west and 64 in the east, with a cliff at x = 20 and a ramp in rows 12 to 17."""
     cliff = np.full((HEIGHT, WIDTH), 64, dtype=np.uint16)
     cliff[:, :20] = 128
     cliff[12:18, 18:22] = (112, 96, 88, 72)

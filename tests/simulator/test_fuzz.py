@@ -83,7 +83,7 @@ def prepare(state: Status) -> Client:
 
 
 def tame(kind: str, body: Any) -> None:
-    """Leaves out what is legal and only takes long: endless steps, huge images, real time, waiting for others."""
+    """Leave out what is legal and only takes long: endless steps, huge images, real time, waiting for others."""
     if kind == "join_game":
         body.ClearField("server_ports")
     if kind == "observation":
@@ -99,7 +99,7 @@ def tame(kind: str, body: Any) -> None:
 
 
 def observe() -> Client:
-    """Somebody who observes a game of computers."""
+    """Return a client that observes a game of computers."""
     client = Client()
     players = [sc.PlayerSetup(type=kind) for kind in (sc.Computer, sc.Computer, sc.Observer)]
     game_map = sc.LocalMap(map_path="llm_smac/2s3z")

@@ -109,7 +109,7 @@ def port() -> int:
 
 
 async def begin(port: int, players: int = 2, **options: Any) -> list[Process]:
-    """Processes with a game that all of them have joined, the host first."""
+    """Return processes with a game that all of them have joined, the host first."""
     processes = [Process() for _ in range(players)]
     await processes[0].create(players, **options)
     joined = await asyncio.gather(*(process.join(port) for process in processes))
@@ -123,7 +123,7 @@ async def together(processes: list[Process], count: int = 1) -> list[sc.Response
 
 
 async def is_waiting(task: asyncio.Task[Any]) -> bool:
-    """Whether a request still waits after everything that can happen by itself has happened."""
+    """Return whether a request still waits after everything that can happen by itself has happened."""
     done, _ = await asyncio.wait([task], timeout=0.1)
     return not done
 
@@ -442,7 +442,7 @@ async def test_an_observer_has_a_process_of_its_own(port: int) -> None:
 
 
 class Wall:
-    """A clock on the wall that only moves when somebody sleeps, and lets the others have their turn then."""
+    """A wall clock that only moves when a task sleeps, and gives the other tasks their turn then."""
 
     now_s = 100.0
 

@@ -1,4 +1,4 @@
-"""Archives that StarCraft II's own tools and everybody's readers can read."""
+"""Archives that StarCraft II's own tools and common readers can read."""
 
 import io
 

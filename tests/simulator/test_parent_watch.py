@@ -11,7 +11,7 @@ ALONE = PATIENCE_LOOKS
 
 
 async def looks_until_over(parents: Iterable[int], clients: Iterable[bool]) -> int | None:
-    """After how many looks the game ends; None if it lives on after all of them."""
+    """Return after how many looks the game ends; None if it goes on after all of them."""
     looked = 0
     parent_ids, connected = iter(parents), iter(clients)
     forever = asyncio.get_running_loop().create_future()

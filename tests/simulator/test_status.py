@@ -7,7 +7,7 @@ from khala_simulator.process.status import AFTER, GAME_OVER, LEGAL, Machine, Sta
 
 KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
 
-# What PySC2's own gate lets through in each state (its `valid_status` decorators): refusing one of these would
+# What PySC2's own gate admits in each state (its `valid_status` decorators): refusing one of these would
 # break a client that plays by the rules.
 PYSC2_SENDS = {
     "create_game": {"launched", "ended", "in_game", "in_replay"},

@@ -1,4 +1,4 @@
-"""What a player sees of the shooting: who has just fired at whom, and what is in the air.
+"""What a player sees of the shooting: recent attacks between units, and missiles in the air.
 
 The API does not report it; rendered images show it, as the game's own picture does. Above: `painting`. Below:
 `sight.py`, which says which units are visible.

@@ -1,4 +1,4 @@
-"""Lay out a directory like a StarCraft II install whose game is this simulator.
+"""Set up a directory like a StarCraft II install whose game is this simulator.
 
 Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that becomes the process of
 `__main__.py`. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are

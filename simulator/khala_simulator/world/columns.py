@@ -183,7 +183,7 @@ class UnitColumns:
     bonus_bits: Ints = trait(int)  # attributes (bits) against which its hits deal
     bonus_add: Floats = trait(float)  # more damage, before armor
     walks: Bools = trait(bool)  # its order is to walk to a point
-    looks_around: Bools = trait(bool)  # its order lets it pick fights
+    looks_around: Bools = trait(bool)  # its order allows it to pick fights
     holds: Bools = trait(bool)  # its order is to stay on the spot
     needs_target: Bools = trait(bool)  # its order ends with its target
     wants: Bools = trait(bool)  # it wants to move this loop

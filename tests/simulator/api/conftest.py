@@ -1,4 +1,4 @@
-"""Games to look at: a map of the test's choice, units where it wants them, and what a player is sent of them."""
+"""Games for tests: a map and units of the test's choice, and what a player receives of them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ DTYPES: dict[int, np.dtype[Any]] = {8: np.dtype(np.uint8), 24: np.dtype(np.uint8
 
 
 def unpack(data: common_pb2.ImageData) -> NDArray[Any]:
-    """An image by the contract: rows from the top, most significant bit first, little-endian, RGB."""
+    """Return an image by the contract: rows from the top, most significant bit first, little-endian, RGB."""
     if data.bits_per_pixel == 1:
         pixels = np.unpackbits(np.frombuffer(data.data, np.uint8))[: data.size.x * data.size.y]
     else:

@@ -38,7 +38,7 @@ def make(unit_type: int, owner: int, *points: tuple[float, float]) -> list[debug
 
 
 def stage(*units: debug_pb2.DebugCommand, options: sc.InterfaceOptions | None = None) -> Client:
-    """A game with these units instead of the map's own."""
+    """Return a game with these units instead of the map's own."""
     client = Client()
     first = client.play(options=options)
     tags = [unit.tag for unit in first.observation.raw_data.units]
@@ -214,9 +214,9 @@ def test_several_actions_are_done_and_reported_in_their_order() -> None:
 
 
 def judgements(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The abilities whose use is judged from now on, in order.
+    """Return the abilities whose use is judged from now on, in order.
 
-    The engine, which looks again when a unit begins, stands still.
+    The engine, which judges again when a unit begins, stands still.
     """
     asked: list[int] = []
     refusal = casting.refusal
@@ -367,7 +367,7 @@ ON_LEFT, ON_RIGHT, ON_FOE, ON_GROUND = (53, 64), (74, 64), (64, 42), (20, 20)
 
 @pytest.fixture
 def three() -> Client:
-    """Two Stalkers of ours, and a Zealot of theirs."""
+    """Return two own Stalkers, and an enemy Zealot."""
     return stage(*make(STALKER, 1, LEFT, RIGHT), *make(ZEALOT, 2, FOE_AT))
 
 

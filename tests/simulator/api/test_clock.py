@@ -9,7 +9,7 @@ from khala_simulator.process.client import Client, ResponseError, interface
 
 
 class Wall:
-    """A clock on the wall that only moves when somebody sleeps."""
+    """A wall clock that only moves when a task sleeps."""
 
     def __init__(self) -> None:
         self.now_s = 100.0

@@ -46,7 +46,7 @@ def kill(client: Client, unit: int) -> None:
 
 
 def blocked(client: Client) -> set[tuple[int, int]]:
-    """Cells of the bare ground that the game info says cannot be walked on."""
+    """Return the cells of the bare ground that the game info says cannot be walked on."""
     grid = client.ask(game_info=sc.RequestGameInfo()).game_info.start_raw.pathing_grid
     bits = np.unpackbits(np.frombuffer(grid.data, np.uint8)).reshape(grid.size.y, grid.size.x).astype(bool)
     walk = client.session._process.table.game.world.map.terrain.walk

@@ -31,7 +31,7 @@ MINIMAP = {
 def options(
     screen: tuple[int, int] = (64, 64), minimap: tuple[int, int] = (32, 32), **setup: Any
 ) -> sc.InterfaceOptions:
-    """An interface with feature layers alone; one pixel of the minimap is one cell of a map of 32 x 32."""
+    """Return an interface with feature layers alone; one pixel of the minimap is one cell of a map of 32 x 32."""
     layers = sc.SpatialCameraSetup(
         width=setup.pop("width", 32),
         resolution=common_pb2.Size2DI(x=screen[0], y=screen[1]),
@@ -42,7 +42,7 @@ def options(
 
 
 def cells(image: NDArray[Any], value: int) -> set[tuple[int, int]]:
-    """The pixels (column, row) that hold a value."""
+    """Return the pixels (column, row) that hold a value."""
     return {(int(x), int(y)) for y, x in np.argwhere(image == value)}
 
 

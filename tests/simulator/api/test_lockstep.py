@@ -1,4 +1,4 @@
-"""Lock-step without a network: messages in any order of arrival, and messages that nobody can have sent."""
+"""Lock-step without a network: messages in any order of arrival, and messages that no member can have sent."""
 
 from collections import deque
 
@@ -17,7 +17,7 @@ MEMBERS = frozenset({1, 2, 3})
 
 
 def game(players: int = 2) -> HostedGame:
-    """A battle of two, with a third one who has nothing if there are to be three."""
+    """Return a battle of two, or of three with a third player without units."""
     setup = Setup(
         game_map=load_map("llm_smac/2s3z"),
         map_data=b"",

@@ -1,4 +1,4 @@
-"""What clients see of the maps' own scripts: scores, selections, start locations, episodes that begin anew."""
+"""What clients see of the maps' own scripts: scores, selections, start locations, new episodes."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def kill(tags: list[int]) -> debug_pb2.DebugCommand:
 
 
 def stage(*units: debug_pb2.DebugCommand, options: sc.InterfaceOptions | None = None) -> Client:
-    """A game in which only these units are left, one loop after they were made."""
+    """Return a game in which only these units are left, one loop after they were made."""
     client = Client()
     first = client.play(options=options)
     client.debug(*units)
@@ -43,7 +43,7 @@ def of_type(seen: sc.ResponseObservation, unit_type: int) -> raw_pb2.Unit:
 
 
 def image(data: common_pb2.ImageData) -> NDArray[Any]:
-    """An image as PySC2 unpacks it."""
+    """Return an image as PySC2 unpacks it."""
     if data.bits_per_pixel == 1:
         pixels = np.unpackbits(np.frombuffer(data.data, np.uint8))[: data.size.x * data.size.y]
     else:
@@ -291,7 +291,7 @@ def test_terrain_is_upright_and_black_outside_of_the_map() -> None:
 
 
 def client_pixel(seen: sc.ResponseObservation, x: int, y: int) -> tuple[int, int]:
-    """Height and path of a cell as the minimap (64 pixels for 32 cells, from the top) shows them."""
+    """Return height and path of a cell as the minimap (64 pixels for 32 cells, from the top) shows them."""
     row = 63 - (2 * y + 1)
     return minimap(seen, "height_map")[row, 2 * x], minimap(seen, "pathable")[row, 2 * x]
 

@@ -1,4 +1,4 @@
-"""What a player is told of units that are hidden, remembered, carried or under a spell."""
+"""What a player knows of units that are hidden, remembered, carried or under a spell."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def is_snapshot(unit: raw_pb2.Unit) -> bool:
 
 @pytest.fixture
 def fogged(make_table: Any) -> Any:
-    """A table with fog: a marine near the left edge, and an enemy pylon far to the right."""
+    """Return a table with fog: a marine near the left edge, and an enemy pylon far to the right."""
     table = make_table(RAW, fog=True)
     table.marine = table.put("Marine", 1, 4, 16)
     table.pylon = table.put("Pylon", 2, 26, 16)

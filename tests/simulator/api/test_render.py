@@ -37,14 +37,14 @@ def setup(screen: tuple[int, int], minimap: tuple[int, int], width: float = 0) -
 def options(
     screen: tuple[int, int] = (192, 192), minimap: tuple[int, int] = (64, 64), *, layers: int = 0
 ) -> sc.InterfaceOptions:
-    """An interface with rendered images: 8 pixels per cell on the screen, 2 on the minimap of a map of 32 x 32."""
+    """Return an interface with rendered images: 8 pixels per cell on the screen, 2 on the minimap of a 32 x 32 map."""
     asked = interface(screen=layers)
     asked.render.CopyFrom(setup(screen, minimap))
     return asked
 
 
 def near(image: Image, colour: tuple[int, int, int], within: float = 60.0) -> int:
-    """How many pixels are about this colour."""
+    """Return how many pixels are about this colour."""
     distance = np.linalg.norm(image.astype(float) - colour, axis=-1)
     return int(np.count_nonzero(distance < within))
 

@@ -15,7 +15,7 @@ LOOPS = 120
 
 
 def play(client: Client) -> list[sc.ResponseObservation]:
-    """A short game with actions of every kind and a debug command."""
+    """Return a short game with actions of every kind and a debug command."""
     seen = [client.play(seed=3)]
     own = [unit.tag for unit in seen[0].observation.raw_data.units if unit.alliance == raw_pb2.Self]
     camera = sc.Action()

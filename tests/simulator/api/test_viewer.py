@@ -36,7 +36,7 @@ def create(client: Client, *players: sc.PlayerSetup) -> None:
 
 
 def watch(observed: int, *players: sc.PlayerSetup, **options: Any) -> Client:
-    """Somebody who observes a game of computers."""
+    """Return a client that observes a game of computers."""
     client = Client()
     create(client, *(players or (COMPUTER, COMPUTER, OBSERVER)))
     join = sc.RequestJoinGame(observed_player_id=observed, options=interface(screen=32, minimap=32, **options))
@@ -46,7 +46,7 @@ def watch(observed: int, *players: sc.PlayerSetup, **options: Any) -> Client:
 
 
 def turn(client: Client, **action: Any) -> sc.ResponseObservation:
-    """What is seen after an action of an observer."""
+    """Return the view after an action of an observer."""
     request = sc.RequestObserverAction(actions=[sc.ObserverAction(**action)])
     assert client.ask(obs_action=request).HasField("obs_action")
     return client.observe()
@@ -160,7 +160,7 @@ def test_the_view_changes_to_another_player() -> None:
 
 @pytest.fixture(scope="module")
 def replay() -> bytes:
-    """A game in which the player moved his camera at the first loop, and selected his army."""
+    """Return a game in which the player moved the camera at the first loop, and selected the army."""
     client = Client()
     create(client, PARTICIPANT, COMPUTER)
     client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=32, minimap=32)))

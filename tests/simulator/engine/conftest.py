@@ -1,4 +1,4 @@
-"""Worlds to try single laws in: flat ground without a script, and units put where a test wants them."""
+"""Worlds to test single rules in: flat ground without a script, and units put where a test wants them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Field:
         return lifecycle.spawn(self.world, unit, owner, (x, y), facing)
 
     def still(self, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
-        """Put a unit that stays where it is and fights nobody."""
+        """Put a unit that stays where it is and does not fight."""
         slot = self.put(name, owner, x, y)
         self.world.looks_around[slot] = False
         buffs.apply(self.world, slot, "LurkerHoldFireB")
@@ -72,7 +72,7 @@ class Field:
     def order(
         self, slot: int, ability: int, target: int | None = None, point: tuple[float, float] | None = None
     ) -> bool:
-        """Tell a unit (slot) to use an ability (id); whether it will."""
+        """Order a unit (slot) to use an ability (id); return whether it will."""
         tag = 0 if target is None else self.world.tag_of(target)
         number = self.world.catalog.ability(ability)
         return casting.use(self.world, [slot], number, target=tag, point=point) == [slot]
@@ -80,7 +80,7 @@ class Field:
     def why_not(
         self, slot: int, ability: int, target: int = NOBODY, point: tuple[float, float] | None = None
     ) -> ActionResult:
-        """Why a unit can't use an ability like this now."""
+        """Return why a unit can't use an ability like this now."""
         number = self.world.catalog.ability(ability)
         why = casting.refusal(self.world, slot, number)
         return (
@@ -96,13 +96,13 @@ class Field:
         return self.world
 
     def loops(self, count: int) -> Iterator[int]:
-        """Play loop by loop, yielding the number of each after it was played."""
+        """Play loop by loop; yield the number of each loop after it."""
         for _ in range(count):
             advance(self.world)
             yield self.world.loop
 
     def until(self, holds: Callable[[], object], most: int = 500) -> int:
-        """Play until something holds; the loop at which it did."""
+        """Play until something holds; return the loop at which it does."""
         for loop in self.loops(most):
             if holds():
                 return loop

@@ -1,9 +1,9 @@
-"""Plays a map with orders drawn by lot, and prints the world's digest: run by tests, in processes of their own.
+"""Play a map with random orders, and print the world's digest: run by tests, in processes of their own.
 
     python random_orders.py MAP SEED LOOPS
 
-Every few loops some units of each player get something to do that they can do now, at whatever it may be aimed at.
-Fails when a unit leaves the map or a number stops being one.
+Every few loops some units of each player get an order that they can carry out now, at any target. Fails when a unit
+leaves the map or a number becomes NaN or infinite.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ORDERS = 6
 
 
 def give_orders(world: World, chance: random.Random) -> None:
-    """Some orders to some units of each player, as a client would give them."""
+    """Give some orders to some units of each player, as a client would."""
     for player in range(1, len(world.players)):
         mine = world.units_of(player).tolist()
         for _ in range(min(ORDERS, len(mine))):
@@ -52,7 +52,7 @@ def _give(world: World, player: int, slot: int, ability: int, chance: random.Ran
 
 
 def check(world: World) -> None:
-    """Nobody is off the map, and every number is one."""
+    """Check that no unit is off the map, and that every number is finite."""
     width, height = world.map.terrain.size
     pos = world.pos[world.live]
     assert np.isfinite(pos).all()
@@ -65,7 +65,7 @@ def check(world: World) -> None:
 
 
 def play(name: str, seed: int, loops: int) -> World:
-    """A game of at most ``loops`` loops, played by lot; every debug state that allows more is on."""
+    """Play at most ``loops`` loops with random orders; every debug state that allows more is on."""
     world, chance = new_game(load_map(name), seed=seed), random.Random(seed)
     for player in world.players[1:]:
         player.cheats += ["tech_tree", "cooldown"]

@@ -1,4 +1,4 @@
-"""Whole battles: that they end, that skill pays, and that nobody is favoured by where he stands."""
+"""Whole battles: that they end, that skill pays, and that no side has an advantage by its place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STEP_LOOPS = 8
 
 
 def idle(world: World) -> None:
-    """Player 1 gives no orders."""
+    """Give no orders for player 1."""
 
 
 def attack(world: World) -> None:
@@ -34,7 +34,7 @@ def run_away(world: World) -> None:
 
 
 def focus_fire(world: World) -> None:
-    """All shoot at the weakest enemy that is near."""
+    """Make all units shoot at the weakest enemy that is near."""
     mine, foes = world.units_of(1), world.units_of(2)
     if not len(mine) or not len(foes):
         return
@@ -76,7 +76,7 @@ def play(name: str, policy: Policy, seed: int) -> World:
 
 
 def margin(world: World) -> float:
-    """Damage dealt less damage taken by player 1."""
+    """Return the damage dealt less the damage taken by player 1."""
     score = world.players[1].score
     return (score.damage_dealt.life + score.damage_dealt.shields) - (
         score.damage_taken.life + score.damage_taken.shields

@@ -24,7 +24,7 @@ SIEGE_MODE, UNSIEGE = 388, 390
 
 
 class Trick:
-    """A skill that only remembers what happened to it."""
+    """A skill that only records its calls."""
 
     def __init__(self, *, lasts: int = 0) -> None:
         self.effects: list[int] = []
@@ -56,7 +56,7 @@ def trick(monkeypatch: pytest.MonkeyPatch) -> Trick:
 
 
 def ability(field: Any, **changes: Any) -> Ability:
-    """An ability like no other, known to the field's own catalog."""
+    """Return an ability like no other, known to the field's own catalog."""
     made: Ability = dataclasses.replace(field.world.catalog.abilities[0], id=1, effect="trick", link="Trick", **changes)
     field.world.catalog = dataclasses.replace(
         field.world.catalog, ability_of_id={**field.world.catalog.ability_of_id, 1: made}

@@ -26,7 +26,7 @@ CANCEL, HALT, TECHLAB, REACTOR, CANCEL_ADDON = 314, 315, 421, 422, 451
 
 @pytest.fixture
 def field(make_field: Callable[..., Field]) -> Field:
-    """Level ground, and plenty of everything for player 1."""
+    """Return level ground, and plenty of everything for player 1."""
     field = make_field("{flat: [64, 64]}")
     field.world.players[1].minerals = field.world.players[1].vespene = 2000.0
     return field
@@ -37,7 +37,7 @@ def order(field: Field, slot: int, number: int, **aim: object) -> list[int]:
 
 
 def find(field: Field, name: str) -> int:
-    """The only living unit of a type."""
+    """Return the only living unit of a type."""
     row = CATALOG.unit(name).row
     (slot,) = (s for s in field.world.live.tolist() if field.world.type[s] == row)
     return int(slot)
@@ -48,7 +48,7 @@ def has(field: Field, name: str) -> bool:
 
 
 def placed(field: Field, name: str, limit: int = 200) -> int:
-    """Play until a structure is begun; returns its slot."""
+    """Play until a structure is begun; return its slot."""
     for _ in field.loops(limit):
         if has(field, name):
             return find(field, name)

@@ -1,4 +1,4 @@
-"""Which bodies are near each other, and what they do about it."""
+"""Which bodies are near each other, and how they react."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def table(version: str) -> Any:
 
 
 def mask(version: str, unit: str, stage: str) -> int:
-    """How many cells a stage of a unit's creep has."""
+    """Return how many cells a stage of a unit's creep has."""
     row = next(row for row in table(version)["rows"] if row["unit"] == unit)
     rows = next(m["rows"] for m in table(version)["masks"] if m["id"] == row[stage])
     return sum(text.count("o") for text in rows)
@@ -38,7 +38,7 @@ def mask(version: str, unit: str, stage: str) -> int:
 
 @pytest.fixture(params=VERSIONS)
 def ground(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any:
-    """Level ground of each version, wide enough for all of a town hall's creep."""
+    """Return level ground of each version, wide enough for all of a town hall's creep."""
     return make_field(FLAT, version=request.param)
 
 

@@ -149,7 +149,7 @@ def test_damage_is_never_lost_or_made_up(
 
 
 def test_a_colossus_burns_a_line_across_its_shot(field: Any) -> None:
-    """Both beams sweep 1.25 to each side of the target; whom they touch burns once per beam, light units for 15."""
+    """Both beams sweep 1.25 to each side of the target; units in reach burn once per beam, light units for 15."""
     world = field.world
     colossus = field.put("Colossus", 1, 10, 16)
     target = field.put("Zergling", 2, 16, 16)
@@ -163,7 +163,7 @@ def test_a_colossus_burns_a_line_across_its_shot(field: Any) -> None:
     deaths_by_loop = {}
     for loop in field.loops(24):
         deaths_by_loop[loop] = len(world.deaths)
-    # 2 x 15 is less than 35 life: nobody dies of one shot, everybody on the line is burnt twice
+    # 2 x 15 is less than 35 life: no unit dies of one shot, every unit on the line burns twice
     assert [35 - world.life[s] for s in beside] == pytest.approx([30, 30], abs=0.5)
     assert 35 - world.life[target] == pytest.approx(30, abs=0.5)
     assert world.life[outside] == world.life[behind] == 35

@@ -61,7 +61,7 @@ PLAYGROUNDS = ["pvz_task6_level1", "pvz_task8_level1", "MMM2", "2c_vs_64zg", "Si
 
 
 def by_lot(name: str, loops: int, hash_seed: str) -> str:
-    """Loop and digest at the end of a game with random orders of every kind, in a process of its own."""
+    """Return loop and digest at the end of a game with random orders of every kind, in a process of its own."""
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(RANDOM_ORDERS.parents[3])}
     arguments = [sys.executable, str(RANDOM_ORDERS), name, "11", str(loops)]
     done = subprocess.run(arguments, env=environment, check=False, capture_output=True, text=True)
@@ -84,7 +84,7 @@ def test_two_thousand_loops_of_random_orders_end_the_same_in_two_processes(name:
 
 
 def test_the_game_is_the_same_on_every_python_and_numpy() -> None:
-    """Digests kept in a file; a change of the rules changes them, and then the file is to be written anew."""
+    """The digests are in a file; a change of the rules changes them, and then the file must be written again."""
     kept = json.loads((Path(__file__).parent / "golden_digests.json").read_text(encoding="utf-8"))
     now = {name: played(name, 3).digest() for name in kept}
     assert now == kept, json.dumps(now, indent=1)

@@ -1,8 +1,8 @@
 """Every ability that has a rule is used once, and its rule changes the world.
 
 A world is set up in which as much as possible is allowed, and twice the same order is given in it: once with the
-skill's effect, once with an effect that does nothing. Whatever differs then is what the ability does. How much it does
-is the matter of the tests of skills.
+skill's effect, once with an effect that does nothing. Whatever differs then is what the ability does. The tests of
+skills check how much it does.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def modelled(version: str) -> list[Ability]:
 
 
 def stage(version: str) -> World:
-    """A flat map with something of everything on it; the first player may do what he likes, and nobody fights."""
+    """Return a flat map with something of everything on it; the first player may do anything, and no unit fights."""
     players = (PlayerSetup(1, "protoss", "agent"), PlayerSetup(2, "zerg", "agent"))
     world = World(load_map("Melee/Flat64"), players, seed=3, catalog=load_catalog(version))
     world.fog = False
@@ -74,7 +74,7 @@ def stage(version: str) -> World:
 
 
 def casters(world: World, ability: Ability) -> Iterator[int]:
-    """One unit of each type that has the ability, put in the middle one after the other."""
+    """Yield one unit of each type that has the ability, put in the middle one after the other."""
     for name in ability.users:
         unit = world.catalog.unit(name) if name in world.catalog.row_of_name else None
         if unit is not None and ability in world.catalog.abilities_of(unit.row):
@@ -85,7 +85,7 @@ def casters(world: World, ability: Ability) -> Iterator[int]:
 
 
 def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point | None]]:
-    """Everything that the ability could be aimed at here, the nearest first."""
+    """Yield everything that the ability could be aimed at here, the nearest first."""
     if Aim.NONE in ability.aim:
         yield NOBODY, None
     if Aim.UNIT in ability.aim:
@@ -104,12 +104,12 @@ def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point
 
 
 def _bear(*names: str) -> Callable[[World, int], None]:
-    """Lay the first of the buffs that the version has."""
+    """Apply the first of the buffs that the version has."""
     return lambda world, slot: buffs.apply(world, slot, next(n for n in names if n in world.catalog.buff_of_name))
 
 
 def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], None]:
-    """Have the unit use another ability first, at the enemy's Marine or beside it."""
+    """Make the unit use another ability first, at the enemy's Marine or beside it."""
 
     def prepare(world: World, slot: int) -> None:
         ability = world.catalog.ability(number)
@@ -148,13 +148,13 @@ def _worker(world: World, slot: int) -> None:
 
 
 def _pair(world: World, slot: int) -> None:
-    """Tell a second Templar to merge, too."""
+    """Order a second Templar to merge, too."""
     partner = lifecycle.spawn(world, world.unit_type(slot), 1, (31.0, 33.0))
     casting.use(world, [partner], world.catalog.ability(1766))
 
 
 def _split(world: World, slot: int) -> None:
-    """Have an Adept shift its phase; a shade becomes that of another Adept."""
+    """Make an Adept shift its phase; a shade becomes that of another Adept."""
     adept = (
         slot
         if world.unit_type(slot).name == "Adept"
@@ -176,7 +176,7 @@ def _power(world: World, slot: int) -> None:
 
 
 def _recharge(world: World, slot: int) -> None:
-    """Have a battery recharge somebody."""
+    """Make a battery recharge a unit."""
     _power(world, slot)
     advance(world, 6)
 
@@ -188,7 +188,7 @@ def _battery(world: World, slot: int) -> None:
 
 
 def _queue(world: World, slot: int) -> None:
-    """Have a structure or an egg make something."""
+    """Make a structure or an egg produce something."""
     production.enqueue(world, slot, world.catalog.ability(1006), makes="Probe", loops=100.0)
 
 
@@ -198,7 +198,7 @@ def _in_the_making(world: World, slot: int) -> None:
 
 
 def _at_work(world: World, slot: int) -> None:
-    """Have an SCV build the structure, or the SCV build another one."""
+    """Make an SCV build the structure, or the SCV build another one."""
     worker = world.unit_type(slot).worker
     site = lifecycle.spawn(world, world.catalog.unit("SupplyDepot"), 1, (40.0, 42.0)) if worker else slot
     _in_the_making(world, site)
@@ -217,7 +217,7 @@ def _to_creep(world: World, slot: int) -> None:
 
 
 def begin_what_it_cancels(world: World, slot: int, cancel: Ability) -> None:
-    """Have the unit begin the morph or add-on that an ability calls off, or else be in the making itself."""
+    """Make the unit begin the morph or add-on that an ability calls off, or else be unfinished itself."""
     x, y = world.pos[slot].tolist()
     if world.unit_type(slot).structure:
         lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y))
@@ -235,7 +235,7 @@ def _near_power(world: World, slot: int) -> None:
 
 
 def _on_creep(world: World, slot: int) -> None:
-    """Creep around the caster."""
+    """Put creep around the caster."""
     x, y = world.pos[slot].tolist()
     world.growth.add(world.tag_of(slot), "Hatchery", (int(x), int(y)), world.loop, grown=True)
     world.growth.settle()
@@ -246,7 +246,7 @@ def _hungry(world: World, slot: int) -> None:
 
 
 def _morphing(*kinds: str) -> Callable[[World, int], None]:
-    """In the middle of a morph of its own; a cocoon has just begun to be one."""
+    """Put the unit in the middle of a morph of its own; a cocoon has just begun to be one."""
 
     def prepare(world: World, slot: int) -> None:
         _on_creep(world, slot)
@@ -299,11 +299,11 @@ PREPARE: dict[str, Callable[[World, int], None]] = {
     **dict.fromkeys(("redirect_attack", "redirect_stop", "redirect_stim"), _man),
     **dict.fromkeys(("unload_all", "unload_all_at", "unload_unit"), _fill),
 }
-"""By a skill's name: what has to be the case before a unit can use it."""
+"""By a skill's name: what must hold before a unit can use it."""
 
 
 def attempt(world: World, ability: Ability) -> list[int]:
-    """Give the order to the first caster and at the first aim that takes it; returns who did."""
+    """Give the order to the first caster and at the first aim that takes it; return that caster."""
     for slot in casters(world, ability):
         if ability.effect == "cancel":
             begin_what_it_cancels(world, slot, ability)
@@ -320,7 +320,7 @@ def attempt(world: World, ability: Ability) -> list[int]:
 
 
 def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch, *, inert: bool) -> tuple[str, int]:
-    """The world's digest soon after the effect, and how often it took effect."""
+    """Return the world's digest soon after the effect, and how often it took effect."""
     skill, calls = SKILLS[ability.effect], 0
 
     def effect(world: World, cast: Cast) -> None:
@@ -341,9 +341,9 @@ def state_after(version: str, ability: Ability, monkeypatch: pytest.MonkeyPatch,
 
 
 def cases() -> Iterator[Any]:
-    """Every ability of every version; the first of each skill now, all others in the long tests.
+    """Yield every ability of every version; the first of each skill now, all others in the long tests.
 
-    One that is the same as in the default version counts for nothing new.
+    One that is the same as in the default version is not new.
     """
     usual = {a.id: a for a in modelled(DEFAULT_VERSION)}
     shown: set[tuple[str, str]] = set()

@@ -37,7 +37,7 @@ class Case:
 
 
 def cases() -> list[Any]:
-    """One carrier of every weapon that deals damage, per version; those of a kind that had one, in the long tests."""
+    """Return one carrier of every damaging weapon, per version; further ones of a kind are in the long tests."""
     found: dict[tuple[str, str], Any] = {}
     shown: set[object] = set()
     for version in VERSIONS:
@@ -54,7 +54,7 @@ def cases() -> list[Any]:
 
 
 def kind(weapon: Weapon) -> object:
-    """What rules a weapon's attack goes by, without its numbers."""
+    """Return the rules of a weapon's attack, without its numbers."""
     hits = {
         (
             h.when,
@@ -115,7 +115,7 @@ class Duel:
         commands.attack_unit(world, [self.attacker], world.tag_of(self.target))
 
     def attack(self) -> tuple[float, float]:
-        """Let one attack start and everything it does happen; what it took from shields and life."""
+        """Play one attack with all its effects; return what it took from shields and life."""
         world, slot = self.world, self.attacker
         shields, life = float(world.shields[self.target]), float(world.life[self.target])
         world.cooldown[slot] = 0.0
@@ -130,7 +130,7 @@ class Duel:
 
 
 def strikes(duel: Duel) -> list[tuple[float, bool]]:
-    """What one attack does to its target, hit by hit: damage before armor, and whether armor counts."""
+    """Return what one attack does to its target, hit by hit: damage before armor, and whether armor counts."""
     unit = duel.target_type
     taken = [branch(hit, duel.weapon, unit) for hit in duel.weapon.hits]
     return [
@@ -141,7 +141,7 @@ def strikes(duel: Duel) -> list[tuple[float, bool]]:
 
 
 def branch(hit: Hit, weapon: Weapon, unit: UnitType) -> bool:
-    """Whether the game's switch comes to this hit for an enemy of this type."""
+    """Return whether the game's switch comes to this hit for an enemy of this type."""
     facts = {
         "": True,
         "GroundUnitFilter": not unit.flying,

@@ -1,4 +1,4 @@
-"""Harvesting: rounds, loads, room at a field, exhaustion, and the income that comes of it."""
+"""Harvesting: rounds, loads, room at a field, exhaustion, and the resulting income."""
 
 from __future__ import annotations
 

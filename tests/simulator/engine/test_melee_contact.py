@@ -1,4 +1,4 @@
-"""Whoever touches something reaches it: bodies and walls that keep others off are hit by melee as well."""
+"""A unit reaches what it touches: melee also hits bodies and walls that keep others off."""
 
 from __future__ import annotations
 

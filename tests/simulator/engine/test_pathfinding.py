@@ -107,7 +107,7 @@ def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
 
 
 def shortest(grid: np.ndarray[tuple[int, int], np.dtype[np.bool_]], goal: int) -> list[float]:
-    """How far every cell is from a goal, by relaxing all steps until nothing changes."""
+    """Return the distance of every cell from a goal, by relaxing all steps until nothing changes."""
     height, width = grid.shape
     far = [math.inf] * grid.size
     far[goal], changed = 0.0, True

@@ -1,4 +1,4 @@
-"""Power: what supplies it, what goes without, and what follows from that."""
+"""Power: what supplies it, what lacks it, and the effects."""
 
 from __future__ import annotations
 

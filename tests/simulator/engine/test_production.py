@@ -25,7 +25,7 @@ CANCEL = {"Nexus": 1831, "Barracks": 306, "Egg": 304}
 
 @pytest.fixture
 def rich(field: Field) -> Field:
-    """Plenty of everything for player 1."""
+    """Return a field with plenty of everything for player 1."""
     player = field.world.players[1]
     player.minerals = player.vespene = 1000.0
     player.cheats.append("food")
@@ -37,7 +37,7 @@ def order(field: Field, slots: list[int], number: int, **aim: object) -> list[in
 
 
 def born(field: Field, name: str, limit: int = 3000) -> list[int]:
-    """The loops in which units of a type come, until none is in a queue."""
+    """Return the loops in which units of a type come, until none is in a queue."""
     row = field.world.catalog.unit(name).row
     seen, loops = 0, []
     for loop in field.loops(limit):

@@ -1,4 +1,4 @@
-"""The parts of the scenario language: places, conditions, actions, and files that are laid over each other."""
+"""The parts of the scenario language: places, conditions, actions, and files that extend each other."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def kill(world: World, player: int, *names: str, leave: int = 0) -> None:
 
 
 def calm(name: str) -> World:
-    """A game in which nobody has a weapon that he would use, and no computer player makes anything new."""
+    """Return a game in which no unit uses a weapon, and no computer player makes anything new."""
     world = new_game(load_map(name))
     world.opponents = ()
     world.stats.range[:] = -100.0
@@ -44,7 +44,7 @@ def results(world: World) -> list[GameResult]:
     return [player.result for player in world.players[1:]]
 
 
-# (map, who is killed at loop 100, down to how many; the loop of the end, the agent's result)
+# (map, whose units are killed at loop 100, down to how many; the loop of the end, the agent's result)
 ENDS = [
     ("pvz_task1_level1", [(2, "Drone", 5)], 160, VICTORY),
     ("pvz_task1_level1", [(2, "Queen", 0)], 160, VICTORY),

@@ -1,4 +1,4 @@
-"""What stands on the shipped maps when a game begins, held to numbers that were written down apart from the files."""
+"""The units on the shipped maps at the start of a game, against numbers that were written down independently."""
 
 from __future__ import annotations
 
@@ -107,13 +107,13 @@ FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 23, "llm_smac": 9, "mini_games": 7, "M
 
 
 def army(world: World, player: int) -> dict[str, int]:
-    """Units in the world and how many, passengers left out."""
+    """Return the units in the world and how many, without passengers."""
     return dict(Counter(world.unit_type(slot).name for slot in world.units_of(player).tolist()))
 
 
 @cache
 def begun(name: str) -> World:
-    """A game at its start; not to be played."""
+    """Return a game at its start; not to be played."""
     return new_game(load_map(name))
 
 

@@ -123,7 +123,7 @@ def test_dark_templars_are_cloaked_for_good(field: Any) -> None:
 
 
 def charger(field: Any, x: float) -> tuple[int, int]:
-    """A Zealot that attacks a big enemy whose edge is ``x`` from its own."""
+    """Return a Zealot that attacks a big enemy whose edge is ``x`` from its own."""
     zealot = field.put("Zealot", 1, 8.0, 8.0)
     enemy = field.put("Ultralisk", 2, 8.0 + 0.5 + x + 1.0, 8.0)
     field.world.looks_around[enemy] = False

@@ -24,7 +24,7 @@ def templar(field: Any, x: float = 8.0, y: float = 8.0) -> int:
 
 
 def still(field: Any, name: str, owner: int, x: float, y: float) -> int:
-    """A unit that stays where it is and fights nobody."""
+    """Return a unit that stays where it is and does not fight."""
     slot: int = field.put(name, owner, x, y)
     field.world.looks_around[slot] = False
     return slot

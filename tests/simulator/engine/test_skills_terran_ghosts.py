@@ -220,7 +220,7 @@ def test_weapons_free_ends_holding_fire(field: Any) -> None:
 
 
 def armed(field: Any) -> int:
-    """A Ghost whose owner has a Nuke ready."""
+    """Return a Ghost whose owner has a Nuke ready."""
     slot: int = field.still("Ghost", 1, 6, 16)
     academy = field.still("GhostAcademy", 1, 4.5, 28.5)
     nuke = field.put("Nuke", 1, 4.5, 28.5)

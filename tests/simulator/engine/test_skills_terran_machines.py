@@ -280,7 +280,7 @@ def test_whom_a_mine_may_fire_at(field: Any, name: str, owner: int, why: ActionR
 
 
 def locked(field: Any, name: str = "Ultralisk", away: float = 6.0) -> tuple[int, int]:
-    """A Cyclone that has just locked on to a unit."""
+    """Return a Cyclone that has just locked on to a unit."""
     slot, victim = field.still("Cyclone", 1, 4, 10), field.still(name, 2, 4 + away, 10)
     field.world.autocast.pop(slot, None)
     assert field.order(slot, LOCK_ON, victim)

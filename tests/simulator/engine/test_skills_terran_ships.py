@@ -114,7 +114,7 @@ def test_a_ship_caught_in_fungal_growth_can_not_jump(field: Any) -> None:
 
 
 def guarding(field: Any, point: tuple[float, float] = (14, 10)) -> int:
-    """A Liberator at (8, 10) that has laid out its zone and taken its mode."""
+    """Return a Liberator at (8, 10) that has laid out its zone and taken its mode."""
     slot: int = field.put("Liberator", 1, 8, 10)
     assert field.order(slot, GUARD, point=point)
     field.until(lambda: field.world.unit_type(slot).name == "LiberatorAG")

@@ -22,7 +22,7 @@ EDGE = 1e-6
 
 
 def order_somebody(field: Any, rng: np.random.Generator) -> None:
-    """One random order of a random Terran unit: any ability of its card at anything, or a walk."""
+    """Give one random order to a random Terran unit: any ability of its card at anything, or a walk."""
     world = field.world
     mine = world.units_of(1)
     if not len(mine):

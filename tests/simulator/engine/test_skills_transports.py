@@ -1,4 +1,4 @@
-"""Loading and unloading: whom a carrier takes, how it gets in and out, and what becomes of passengers."""
+"""Loading and unloading: which units a carrier takes, how they get in and out, and the fate of passengers."""
 
 from __future__ import annotations
 

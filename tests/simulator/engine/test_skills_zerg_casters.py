@@ -29,14 +29,14 @@ CASTERS = {
 
 @pytest.fixture(autouse=True)
 def _peace(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody picks a fight by himself."""
+    """Keep all units from picking fights by themselves."""
     laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
     monkeypatch.setattr(tick, "SYSTEMS", laws)
 
 
 @pytest.fixture(params=VERSIONS)
 def arena(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any:
-    """A bare field of each version whose first player has researched what his spells need."""
+    """Return a bare field of each version whose first player has researched what the spells need."""
     field = make_field(version=request.param)
     field.research(1, "NeuralParasite", "Burrow")
     return field
@@ -49,14 +49,14 @@ def caster(field: Any, ability: int, x: float = 8.0, y: float = 16.0) -> int:
 
 
 def victim(field: Any, name: str = "Disruptor", x: float = 14.0, y: float = 16.0, owner: int = 2) -> int:
-    """A unit that stays where it is."""
+    """Return a unit that stays where it is."""
     slot: int = field.put(name, owner, x, y)
     commands.hold(field.world, [slot])
     return slot
 
 
 def aim_for(field: Any, ability: int) -> tuple[int, int, tuple[float, float] | None]:
-    """A caster far away from a fitting target: (caster, target slot or NOBODY, point)."""
+    """Return a caster far away from a fitting target: (caster, target slot or NOBODY, point)."""
     slot = caster(field, ability)
     match ability:
         case 2063 | 74 | 2338:

@@ -26,7 +26,7 @@ CENTRE = (32.5, 32.5)
 
 
 def rules(does: str, *, named: str = "") -> list[Any]:
-    """(version, ability) of every ability with this skill that a type of the version has on its card.
+    """Return (version, ability) of every ability with this skill on the card of a type of the version.
 
     One that is the same as in the first version is left to the long tests.
     """
@@ -44,7 +44,7 @@ def rules(does: str, *, named: str = "") -> list[Any]:
 
 
 def ready(make_field: Callable[..., Any], version: str, *upgrades: str) -> Any:
-    """A wide field whose first player has all structures and means, on creep."""
+    """Return a wide field whose first player has all structures and means, on creep."""
     field = make_field(FLAT, version=version)
     field.world.growth.paint(0, 0, 64, 64)
     player = field.world.players[1]

@@ -1,4 +1,4 @@
-"""What the Zerg bring forth: larvae, locusts, broodlings, changelings; and what they burst, spray and contaminate."""
+"""Units that the Zerg spawn: larvae, locusts, broodlings, changelings; and bursting, spraying and contaminating."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def field(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any
 
 @pytest.fixture
 def peace(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody picks a fight by himself."""
+    """Keep all units from picking fights by themselves."""
     laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
     monkeypatch.setattr(tick, "SYSTEMS", laws)
 
@@ -43,7 +43,7 @@ def census(field: Any) -> Counter[str]:
 
 
 def those(field: Any, name: str) -> list[int]:
-    """Slots of the living units of a type."""
+    """Return the slots of the living units of a type."""
     world = field.world
     slots: list[int] = world.live[world.type[world.live] == world.catalog.unit(name).row].tolist()
     return slots

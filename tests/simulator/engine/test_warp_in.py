@@ -93,7 +93,7 @@ def test_chrono_boost_makes_the_gate_ready_sooner(gate: Gate) -> None:
         ((50.0, 47.0), ActionResult.SUCCESS),
         ((35.0, 40.0), ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER),
         ((50.0, 50.0), ActionResult.CANT_WARP_IN_UNITS_THERE),  # the Pylon itself
-        ((48.0, 52.0), ActionResult.CANT_WARP_IN_UNITS_THERE),  # somebody stands there
+        ((48.0, 52.0), ActionResult.CANT_WARP_IN_UNITS_THERE),  # a unit stands there
     ],
 )
 def test_where_units_can_be_warped_in(gate: Gate, point: tuple[float, float], refusal: ActionResult) -> None:

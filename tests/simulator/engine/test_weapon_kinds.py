@@ -15,7 +15,7 @@ from khala_simulator.combat.traits import set_weapon
 
 
 def dummy(field: Any, name: str, x: float, y: float, owner: int = 2) -> int:
-    """A unit that stands there and does nothing."""
+    """Return a unit that stands there and does nothing."""
     world = field.world
     slot: int = field.put(name, owner, x, y)
     world.acquires[slot] = False
@@ -24,7 +24,7 @@ def dummy(field: Any, name: str, x: float, y: float, owner: int = 2) -> int:
 
 
 def shot_at(field: Any, attacker: str, x: float, target: int, y: float = 16.0, facing: float = 0.0) -> int:
-    """An attacker at (x, y) that is told to attack."""
+    """Return an attacker at (x, y) with an attack order."""
     world = field.world
     slot: int = field.put(attacker, 1, x, y, facing)
     world.acquires[slot] = False
@@ -33,7 +33,7 @@ def shot_at(field: Any, attacker: str, x: float, target: int, y: float = 16.0, f
 
 
 def one_shot(field: Any, attacker: int, loops: int = 60) -> None:
-    """Play until the first attack has started, then let it take effect without a second one."""
+    """Play until the first attack has started, then until it takes effect without a second one."""
     world = field.world
     while world.cooldown[attacker] <= 0.0:
         field.play(1)
@@ -97,7 +97,7 @@ def test_an_archon_shocks_in_rings_of_falling_damage(field: Any) -> None:
 
 @pytest.mark.parametrize(("attacker", "radius", "per_shot"), [("Thor", 0.5, 4 * (6 + 6)), ("Liberator", 1.5, 2 * 5)])
 def test_missiles_at_flyers_burst_among_flyers(field: Any, attacker: str, radius: float, per_shot: float) -> None:
-    """Whoever hovers within the radius takes as much as the target; what walks below takes nothing."""
+    """Flyers within the radius take as much as the target; walkers below take nothing."""
     world = field.world
     body = world.catalog.unit("Mutalisk").radius
     target = dummy(field, "Mutalisk", 14, 16)

@@ -19,7 +19,7 @@ PERIODS = [  # attacker, target, distance between centres, period in loops as 16
 
 
 def duel(field: Any, attacker: str, target: str, distance: float) -> tuple[int, int]:
-    """An attacker that was told to fight, and a target that can take anything and does nothing."""
+    """Return an attacker with an attack order, and a target that can take anything and does nothing."""
     world = field.world
     a, t = field.put(attacker, 1, 10, 16, facing=0.0), field.put(target, 2, 10 + distance, 16)
     world.life[t] = 1e6
@@ -30,7 +30,7 @@ def duel(field: Any, attacker: str, target: str, distance: float) -> tuple[int, 
 
 
 def starts_of(field: Any, attacker: int, loops: int) -> list[int]:
-    """Loops at which the attacker began an attack, which is when its cooldown goes up."""
+    """Return the loops at which the attacker began an attack, which is when its cooldown goes up."""
     starts, before = [], 0.0
     for loop in field.loops(loops):
         now = float(field.world.cooldown[attacker])

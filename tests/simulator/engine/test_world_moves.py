@@ -1,4 +1,4 @@
-"""What holds for bodies on the ground whatever they are told."""
+"""What holds for bodies on the ground under any orders."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def sc2(install_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def make_env(sc2: Path) -> Iterator[Callable[..., Any]]:  # the install must be in place first
-    """Starts environments, and closes them when the test is over."""
+    """Yield a function that starts environments; close them when the test is over."""
     made = []
 
     def make(map_name: str = "Map2s3z", **options: Any) -> Any:
@@ -65,7 +65,7 @@ def make_env(sc2: Path) -> Iterator[Callable[..., Any]]:  # the install must be 
 
 @pytest.fixture
 def no_process_left(install_path: Path) -> Iterator[None]:
-    """Fails the test if a game process of this install outlives it."""
+    """Fail the test if a game process of this install outlives it."""
     yield
     found = [process.name for process in Path("/proc").glob("[0-9]*") if str(install_path) in _command_line(process)]
     assert not found
@@ -80,7 +80,7 @@ def _command_line(process: Path) -> str:
 
 @pytest.fixture
 def launch(sc2: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
-    """Starts the game as clients do, and ends it when the test is over."""
+    """Yield a function that starts the game as clients do; end it when the test is over."""
     started = []
 
     def start(port: int, *arguments: str) -> subprocess.Popen[bytes]:

@@ -52,7 +52,7 @@ class Settler(BotAI):
 
 
 class Fighter(BotAI):
-    """Attacks whatever is nearest."""
+    """Attacks the nearest enemy."""
 
     async def on_step(self, iteration: int) -> None:
         """Called by python-sc2."""
@@ -75,7 +75,7 @@ class Fighter(BotAI):
 class Quitter(BotAI):
     """Walks off and gives up soon; with `waits`, not before the other one knows.
 
-    When the first of two bots is done, python-sc2 kills the game processes of both. In real time the other one is told
+    When the first of two bots is done, python-sc2 kills the game processes of both. In real time the other one learns
     of its victory only with the next loop.
     """
 
@@ -133,7 +133,7 @@ def _bot(ai: BotAI, name: str) -> Bot:
 
 
 def main(game: str, out: Path) -> None:
-    """Plays a game, and writes what was seen of it."""
+    """Play a game, and write what was seen of it."""
     computer = Computer(Race.Protoss, Difficulty.VeryEasy)
     match game:
         case "melee":

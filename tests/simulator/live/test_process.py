@@ -1,4 +1,4 @@
-"""The game as a process: it starts at once, and ends when it is told to."""
+"""The game as a process: it starts at once, and ends on command."""
 
 import asyncio
 import contextlib
@@ -48,7 +48,7 @@ async def _patiently(http: aiohttp.ClientSession, port: int) -> aiohttp.ClientWe
             try:
                 return await http.ws_connect(f"http://127.0.0.1:{port}/sc2api", max_msg_size=0)
             except aiohttp.ClientConnectorError:
-                await asyncio.sleep(0.02)  # the process is not there yet; nothing tells when
+                await asyncio.sleep(0.02)  # the process is not there yet; nothing signals when
 
 
 async def ask(ws: aiohttp.ClientWebSocketResponse, **request: object) -> sc.Response:
@@ -112,7 +112,7 @@ async def start_long_step(ws: aiohttp.ClientWebSocketResponse) -> None:
 
 
 async def start(ws: aiohttp.ClientWebSocketResponse, **request: object) -> None:
-    """Sends a request that takes long."""
+    """Send a request that takes long."""
     await ws.send_bytes(sc.Request(**request).SerializeToString())  # type: ignore[arg-type]  # one field
     with pytest.raises(TimeoutError):  # it is at work
         await ws.receive_bytes(timeout=0.3)

@@ -26,7 +26,7 @@ def tags(timestep: Any, alliance: int) -> list[int]:
 
 
 def focus(timestep: Any) -> sc.Action:
-    """All own units on the first enemy that is left."""
+    """Return an attack of all own units on the first enemy that is left."""
     enemies = tags(timestep, features.PlayerRelative.ENEMY)
     return command(3674, tags(timestep, features.PlayerRelative.SELF), target=enemies[0]) if enemies else sc.Action()
 

@@ -18,7 +18,7 @@ BOTS = Path(__file__).with_name("python_sc2_bots.py")
 
 
 def play(game: str, directory: Path) -> dict[str, Any]:
-    """What the bots saw of a game."""
+    """Return what the bots saw of a game."""
     out = directory / "seen.json"
     run = subprocess.run([sys.executable, str(BOTS), game, str(out)], capture_output=True, timeout=100, check=False)
     assert run.returncode == 0, (run.stdout + run.stderr).decode()

@@ -47,7 +47,7 @@ MAPS = {
 
 
 def assert_sane(timestep: Any, size: tuple[int, int]) -> None:
-    """Every number that an agent is given is one, and every unit is on the map."""
+    """Check that every number that an agent gets is finite, and that every unit is on the map."""
     units = np.asarray(timestep.observation.raw_units).reshape(-1, len(features.FeatureUnit))
     assert np.isfinite(np.asarray(units, dtype=np.float64)).all()
     x, y = units[:, features.FeatureUnit.x], units[:, features.FeatureUnit.y]
