@@ -166,7 +166,7 @@ class Scene:
         return tuple(units)
 
     def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
-        """Return the units of a team, each with the skills that it can use now and those that only others of them can."""
+        """Return the units of a team, each with the skills that it can use now and those that only others can."""
         skills = [self.possible.skills(agent, body) for body in bodies]
         ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
         if not ready_somewhere:

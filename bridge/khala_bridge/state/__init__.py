@@ -1,10 +1,10 @@
-"""State: what one player knows of the game at one moment, as values.
+"""State: a player's knowledge of the game at one moment, as values.
 
     snapshot   `Snapshot`, one per player and step        unit       `Unit` and `UnitOrder`
     episode    `EpisodeInfo`, one per episode             grid       creep, sight and ground as sent
     read       messages of the SC2 API → these values     pictures   the game's own pixels
 
-Below are names, frames and what is known of types. Above is everything that sees or acts; none of it reads a message.
+Below are names, frames and the knowledge of types. Above is everything that observes or acts; it reads no messages.
 """
 
 from khala_bridge.state.episode import EpisodeInfo, PictureSizes

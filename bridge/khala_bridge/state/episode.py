@@ -1,7 +1,7 @@
-"""What stays the same during an episode: the map, and the sizes of the game's own pictures.
+"""The constants of an episode: the map, and the sizes of the game's own pictures.
 
-Read once an episode by `khala_bridge.state.read`. What can be built or walked on is worked out from it by
-`khala_bridge.state.ground`.
+`khala_bridge.state.read` reads them once an episode. `khala_bridge.state.ground` works out from them where structures
+can stand and units can walk.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class PictureSizes(NamedTuple):
-    """How large the game draws its screen and its minimap."""
+    """The sizes of the game's screen and minimap."""
 
     screen: tuple[int, int] = (0, 0)
     """Width and height of the feature layers of the screen, in pixels."""
     minimap: tuple[int, int] = (0, 0)
     """Width and height of the feature layers of the minimap, in pixels."""
     layer_width: float = 0.0
-    """World units that the feature layers of the screen show on their longer axis; 0 if it is not known."""
+    """World units that the feature layers of the screen show on their longer axis; 0 if unknown."""
     render_width: float = 0.0
     """World units that the rendered screen shows; 0 if nothing is rendered."""
 
@@ -36,7 +36,7 @@ class EpisodeInfo(NamedTuple):
     playable: tuple[int, int, int, int] = (0, 0, 0, 0)
     """The part of the map that units can be on: x0, y0, x1, y1 in the world frame."""
     starts: tuple[WorldPoint, ...] = ()
-    """Where other players may have begun."""
+    """Possible starts of other players."""
     placement: Grid = NO_GRID
     """1 where the bare ground takes structures."""
     pathing: Grid = NO_GRID

@@ -1,7 +1,7 @@
 """Grids of the map as the game sends them: a value for each cell, 1 or 8 bits wide.
 
-A grid stays bytes until somebody asks for its array, since most snapshots are never asked. Rendered images and feature
-layers, which begin at the top, are in `khala_bridge.state.pictures`.
+A grid stays bytes until its array is used, since most snapshots never need it. Rendered images and feature layers,
+which begin at the top, are in `khala_bridge.state.pictures`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Grid(NamedTuple):
     """Row after row from the bottom left; the first of eight cells is the highest bit."""
 
     def cells(self) -> Bytes | None:
-        """Return (w, h) the values of the cells, indexed `[x, y]` with y up; None for a grid that was not sent."""
+        """Return the values of the cells, (w, h), indexed `[x, y]` with y up; None for a grid that was not sent."""
         count = self.width * self.height
         if not self.data or not count:
             return None

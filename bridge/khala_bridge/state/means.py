@@ -1,8 +1,8 @@
-"""A snapshot as `khala_bridge.rules` wants it: the side, its units and the accounts of a turn, as plain values.
+"""A snapshot as input for `khala_bridge.rules`: the side, its units and the accounts of a turn, as plain values.
 
-The one place between the two; who asks for a judgement takes the values from here. Above: `khala_bridge.observe`,
-`khala_bridge.act` and `khala_bridge.auto`; below: `khala_bridge.rules`, and `khala_bridge.state.ground` for what is
-going to be built.
+The only link between the two: every caller of a judgement takes the values from here. Above: `khala_bridge.observe`,
+`khala_bridge.act` and `khala_bridge.auto`; below: `khala_bridge.rules`, and `khala_bridge.state.ground` for planned
+structures.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _last: list[tuple[Snapshot, Side]] = []
 
 
 def side_of(snapshot: Snapshot) -> Side:
-    """Return the player's side at the moment of a snapshot; all who ask about one of the last two share it."""
-    for known, side in _last[:]:  # a copy: other matches of the process may ask from other threads
+    """Return the player's side at the moment of a snapshot; cached for the last two snapshots."""
+    for known, side in _last[:]:  # a copy: other threads of the process may play other matches
         if known is snapshot:
             return side
     own = snapshot.own
@@ -76,7 +76,7 @@ def _gathers(ability: int) -> bool:
 
 
 def _planned(snapshot: Snapshot) -> tuple[float, float]:
-    """Return minerals and vespene that structures will cost which workers are on their way to build."""
+    """Return the minerals and vespene for structures that workers are on their way to build."""
     if not any(_builds(ability) for ability in side_of(snapshot).ordered):
         return 0.0, 0.0
     plans = [knowledge()[structure] for structure, _ in land_of(snapshot).plans]

@@ -1,7 +1,7 @@
 """The game's own pictures of one moment: feature layers and rendered images.
 
-They are large and seldom wanted, so they are decoded when they are asked for. Row 0 is at the top. Where the game's
-camera is, and how much its screen shows, is said by the snapshot (`camera`) and by `EpisodeInfo.pictures`.
+They are large and rarely used, so they are decoded on demand. Row 0 is at the top. The snapshot (`camera`) has the
+place of the game's camera, `EpisodeInfo.pictures` the extent of its screen.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _DEPTHS = {1: "u1", 8: "u1", 16: "<u2", 32: "<i4"}
 
 
 class GamePictures:
-    """What the game drew; every method returns None for what it did not draw."""
+    """The game's drawings; every method returns None if the game did not draw it."""
 
     __slots__ = ("_observation",)
 
     def __init__(self, observation: sc_pb.Observation) -> None:
-        """Take the observation that the pictures are in; `khala_bridge.state.read` does."""
+        """Take the observation with the pictures, from `khala_bridge.state.read`."""
         self._observation = observation
 
     def screen(self) -> NDArray[np.uint8] | None:
@@ -36,11 +36,11 @@ class GamePictures:
         return _colours(self._observation.render_data.minimap)
 
     def layer(self, name: str) -> NDArray[np.int32] | None:
-        """Return a feature layer of the screen by the API's name, (height, width), values as they are."""
+        """Return a feature layer of the screen by the API's name, (height, width), values unchanged."""
         return _values(getattr(self._observation.feature_layer_data.renders, name, None))
 
     def minimap_layer(self, name: str) -> NDArray[np.int32] | None:
-        """Return a feature layer of the minimap by the API's name, (height, width), values as they are."""
+        """Return a feature layer of the minimap by the API's name, (height, width), values unchanged."""
         return _values(getattr(self._observation.feature_layer_data.minimap_renders, name, None))
 
     def layer_pixel(self, name: str, column: int, row: int) -> int | None:

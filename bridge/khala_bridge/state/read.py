@@ -3,10 +3,10 @@
     info = read_info(controller.game_info())                      once an episode
     snapshot = read_snapshot(controller.observe(), info)                   once a step
 
-Every attribute of a message is read once: 100 units take a third of a millisecond. Placeholders (what is planned and
-not begun) are no units: the orders of their builders tell of them.
+Every attribute of a message is read once: 100 units take a third of a millisecond. Placeholders (structures that are
+planned and not begun) are not units: they appear in the orders of their builders.
 
-With `khala_bridge.state.pictures`, the only place that knows how the API lays out an observation.
+With `khala_bridge.state.pictures`, the only place that knows the layout of the API's observations.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _CLOAKED = frozenset({raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedA
 
 
 def read_info(info: sc_pb.ResponseGameInfo) -> EpisodeInfo:
-    """Return what an episode is played on."""
+    """Return the map of an episode, and its picture sizes."""
     raw, layers, render = info.start_raw, info.options.feature_layer, info.options.render
     area = raw.playable_area
     return EpisodeInfo(
@@ -73,17 +73,17 @@ def read_snapshot(
     ended: bool = False,
     outcome: Outcome | None = None,
 ) -> Snapshot:
-    """Return what a player knows by an observation.
+    """Return the snapshot of an observation.
 
     Args:
-        response: of the API; nobody may change it afterwards.
+        response: of the API; it must not be changed afterwards.
         info: of the episode.
         abilities: by tag of an own unit, what the game would take from it; None if it was not asked.
         functions: ids of the PySC2 functions that the selection allows.
-        dead: tags of those who died in earlier observations that no agent has seen.
-        errors: what the game refused in these.
+        dead: tags of the units that died in earlier observations that no agent has seen.
+        errors: refusals of the game in these.
         ended: whether the episode is over.
-        outcome: the player's result, if the response does not tell it.
+        outcome: the player's result, if the response does not have it.
     """
     observation = response.observation
     raw = observation.raw_data
@@ -130,7 +130,7 @@ _tag = operator.attrgetter("tag")
 
 
 class _Type(NamedTuple):
-    """What every unit of a type has."""
+    """The values that all units of a type share."""
 
     name: str
     facts: UnitFacts | None
@@ -166,7 +166,7 @@ def read_unit(unit: raw_pb2.Unit) -> Unit | None:
 
 
 def _only_own(unit: raw_pb2.Unit) -> tuple[Any, ...]:
-    """Return what the API tells of the player's own units, in the order of the fields of `Unit`."""
+    """Return the API's values for the player's own units, in the order of the fields of `Unit`."""
     passengers, orders = unit.passengers, unit.orders
     inside = tuple([unit_name(passenger.unit_type) for passenger in passengers]) if passengers else ()
     return (*_of_own(unit), inside, tuple([_order(order) for order in orders]) if orders else ())

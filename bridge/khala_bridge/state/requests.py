@@ -1,7 +1,7 @@
 """Messages that go into the game: orders to units, switches, and moves of its own camera.
 
-The counterpart of `khala_bridge.state.read`: values in, messages of the SC2 API out. Who is ordered what is decided by
-`khala_bridge.act`, which hands these messages on without looking into them.
+The counterpart of `khala_bridge.state.read`: values in, messages of the SC2 API out. `khala_bridge.act` decides on the
+orders, and passes these messages on without reading them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def unit_order(
     """Return an order to units.
 
     Args:
-        ability_id: what they have to do.
+        ability_id: the ability to use.
         units: their tags.
         target: tag of a unit, a place of the world, or None.
         queued: whether it comes after the orders that they have.
@@ -41,7 +41,7 @@ def unit_order(
 
 
 def autocast_switch(ability_id: int, units: Iterable[int]) -> sc_pb.Action:
-    """Return a switch of what units do by themselves: on where it is off, off where it is on."""
+    """Return a switch of an autocast: on where it is off, off where it is on."""
     action = sc_pb.Action()
     action.action_raw.toggle_autocast.ability_id = ability_id
     action.action_raw.toggle_autocast.unit_tags.extend(units)

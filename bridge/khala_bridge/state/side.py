@@ -1,4 +1,4 @@
-"""The units of the player's side, sorted by what they are for: workers, army, town halls, producers.
+"""The units of the player's side, sorted by their purpose: workers, army, town halls, producers.
 
 A reading of a snapshot that the rules share. It decides nothing.
 """
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot, Unit
 
 NO_ARMY = frozenset({"Queen", "QueenBurrowed"})
-"""Armed, and yet at home: they heal, spread creep and make larvae."""
+"""Armed units that stay at home: they heal, spread creep and make larvae."""
 
 
 UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "RavagerCocoon", "LurkerCocoon"})
-"""What is to become a unit, and does nothing until then."""
+"""Types that are to become a unit, and do nothing until then."""
 
 
 def kind(unit: Unit) -> UnitFacts | None:
-    """Return what is known of the type of a unit."""
+    """Return the facts about the type of a unit."""
     return _kind(unit.unit_type)
 
 
@@ -38,48 +38,48 @@ def _kind(unit_type: int) -> UnitFacts | None:
 
 
 def name(unit: Unit) -> str:
-    """Return name of the type of a unit."""
+    """Return the name of the type of a unit."""
     return unit.name
 
 
 def place(unit: Unit) -> WorldPoint:
-    """Return where a unit is."""
+    """Return the position of a unit."""
     return WorldPoint(unit.pos.x, unit.pos.y)
 
 
 def is_structure(unit: Unit) -> bool:
-    """Return whether a unit is a structure."""
+    """Return True if a unit is a structure."""
     known = kind(unit)
     return known is not None and known.structure
 
 
 def is_worker(unit: Unit) -> bool:
-    """Return whether a unit gathers and builds."""
+    """Return True if a unit gathers and builds."""
     known = kind(unit)
     return known is not None and known.worker and name(unit) != "MULE"
 
 
 def finished(units: Iterable[Unit]) -> list[Unit]:
-    """Return those that are there completely."""
+    """Return the finished ones of some units."""
     return [unit for unit in units if unit.build_progress >= 1]
 
 
 def of_types(snapshot: Snapshot, types: Iterable[str]) -> list[Unit]:
-    """Return own units of some types, finished or not, by ascending tags."""
+    """Return the own units of some types, finished or not, by ascending tags."""
     wanted = frozenset(types)
     return [unit for unit in snapshot.own if name(unit) in wanted]
 
 
 def workers(snapshot: Snapshot) -> list[Unit]:
-    """Return own workers, by ascending tags."""
+    """Return the own workers, by ascending tags."""
     return [unit for unit in finished(snapshot.own) if is_worker(unit)]
 
 
 def army(snapshot: Snapshot, *, home: bool = False) -> list[Unit]:
-    """Return own units that fight or help to fight and can move, by ascending tags.
+    """Return the own units that fight or help to fight and can move, by ascending tags.
 
-    No workers, structures, larvae and Overlords; neither what stands rooted (a sieged tank, a burrowed Lurker) nor what
-    acts and vanishes by itself (Interceptors, Broodlings). Queens only at `home`.
+    No workers, structures, larvae and Overlords; no rooted units (a sieged tank, a burrowed Lurker), and none that act
+    and vanish by themselves (Interceptors, Broodlings). Queens only at `home`.
     """
     return [unit for unit in finished(snapshot.own) if _fights(kind(unit)) and (home or name(unit) not in NO_ARMY)]
 
@@ -89,9 +89,9 @@ def _fights(known: UnitFacts | None) -> bool:
 
 
 def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
-    """Return enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
+    """Return the enemy units and structures in sight that any of some own units can shoot at, by ascending tags.
 
-    A Zealot hits no Overlord: what flies over an army on the ground is no aim. Neither are Larvae and eggs.
+    A Zealot cannot hit an Overlord: flyers over an army on the ground are not targets. Neither are Larvae and eggs.
     """
     enemies = [u for u in snapshot.units.values() if u.is_enemy and name(u) not in UNBORN]
     ours = tuple(sorted({unit.unit_type for unit in of}))
@@ -100,7 +100,7 @@ def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
 
 @functools.lru_cache(4096)
 def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
-    """Return whether a unit of any of some types hits one of another; unknown types are taken to, and to be hit."""
+    """Return True if a unit of any of some types can hit one of another type; unknown types can hit, and be hit."""
     known = [kind for kind in map(_kind, ours) if kind is not None]
     target = _kind(other)
     if target is None or len(known) < len(ours) or not any(kind.weapons for kind in known):
@@ -110,29 +110,29 @@ def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
 
 
 def is_armed(unit: Unit) -> bool:
-    """Return whether a unit fights, workers aside."""
+    """Return True if a unit fights and is not a worker."""
     known = kind(unit)
     return known is None or (bool(known.weapons) and not known.worker)
 
 
 def enemy_structures(snapshot: Snapshot) -> list[Unit]:
-    """Return enemy structures that are known, those remembered under the fog too, by ascending tags."""
+    """Return the known enemy structures, also those remembered under the fog, by ascending tags."""
     found = (u for u in snapshot.known.values() if u.is_enemy and is_structure(u))
     return sorted(found, key=lambda unit: unit.tag)
 
 
 def own_structures(snapshot: Snapshot) -> list[Unit]:
-    """Return own structures, finished or not, by ascending tags."""
+    """Return the own structures, finished or not, by ascending tags."""
     return [unit for unit in snapshot.own if is_structure(unit)]
 
 
 def bears_resources(unit: Unit) -> bool:
-    """Return whether a worker carries something home."""
+    """Return True if a worker carries resources."""
     return any(buff_name(buff).startswith("Carry") for buff in unit.buff_ids)
 
 
 def is_doing(unit: Unit, *abilities: int) -> bool:
-    """Return whether a unit's present order is one of these abilities, special or general."""
+    """Return True if a unit's present order is one of these abilities, special or general."""
     return bool(unit.orders) and _among(unit.orders[0].ability_id, abilities)
 
 

@@ -1,7 +1,7 @@
-"""What one player knows of the game at one moment: one frozen value per player and step.
+"""A player's knowledge of the game at one moment: one frozen value per player and step.
 
 Everything above the game is a function of snapshots. `khala_bridge.state.read` makes them; nothing else in Khala reads
-the messages of the SC2 API. A snapshot is no connection: it asks the game nothing.
+the messages of the SC2 API. A snapshot is not a connection: it asks the game nothing.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 
 
 class PlayerState(NamedTuple):
-    """What the player has."""
+    """The resources and counts of a player."""
 
     player_id: int = 0
     minerals: int = 0
     vespene: int = 0
     food_cap: int = 0
-    """Supply that there is room for."""
+    """The cap of supply."""
     food_used: int = 0
     food_army: int = 0
-    """Supply of the units that are no workers."""
+    """Supply of the units except workers."""
     food_workers: int = 0
     """Supply of the workers, which is their number."""
     idle_worker_count: int = 0
     army_count: int = 0
-    """Units that the game counts as army."""
+    """Number of units that the game counts as army."""
 
 
 class PlayerScore(NamedTuple):
@@ -44,33 +44,33 @@ class PlayerScore(NamedTuple):
     total: float = 0.0
     """The score itself."""
     killed: float = 0.0
-    """Minerals and vespene of all that the player destroyed in the episode."""
+    """Minerals and vespene of everything that the player destroyed in the episode."""
     lost: float = 0.0
-    """Minerals and vespene of all that the player lost in the episode."""
+    """Minerals and vespene of everything that the player lost in the episode."""
 
 
 class PowerSource(NamedTuple):
-    """A field that powers structures or hastens warping in."""
+    """A field that powers structures or speeds up warping in."""
 
     tag: int
-    """Of what it comes from."""
+    """Of its source."""
     pos: WorldPoint
     radius: float
     """In world units."""
 
 
 class Effect(NamedTuple):
-    """Something that lies on the ground: a storm, a bile, a cloud."""
+    """An effect on the ground: a storm, a bile, a cloud."""
 
     effect_id: int
     alliance: Alliance
     radius: float
-    """In world units; 0 for one that the game gives none."""
+    """In world units; 0 if the game has none for it."""
     places: tuple[WorldPoint, ...]
 
 
 class ActionError(NamedTuple):
-    """What the game refused of what a unit was ordered."""
+    """The game's refusal of a unit's order."""
 
     unit_tag: int
     ability_id: int
@@ -80,7 +80,7 @@ class ActionError(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """One observation, with what the game said when it was asked, and what earlier steps have to add."""
+    """One observation, with the game's answers to queries, and the losses and refusals of earlier steps."""
 
     info: EpisodeInfo
     """About the map; the same object for a whole episode."""
@@ -89,7 +89,7 @@ class Snapshot:
     known: dict[int, Unit]
     """Every unit that the player knows of by its tag, the remembered ones too, in ascending order of tags."""
     units: dict[int, Unit]
-    """Those of them that are there now: in sight, or cloaked at a known place."""
+    """Those of `known` that are there now: in sight, or cloaked at a known place."""
     own: tuple[Unit, ...]
     """The player's own units, in ascending order of tags."""
     player: PlayerState
@@ -101,7 +101,7 @@ class Snapshot:
     effects: tuple[Effect, ...]
     """In the order of the game."""
     alerts: tuple[str, ...]
-    """What the game warns of, by the API's names, `NuclearLaunchDetected`."""
+    """The game's warnings, by the API's names, `NuclearLaunchDetected`."""
     camera: WorldPoint
     """The middle of the game's own screen."""
     creep: Grid
@@ -109,17 +109,17 @@ class Snapshot:
     visibility: Grid
     """2 where the player sees now, 1 where it once saw, 0 elsewhere."""
     pictures: GamePictures = field(repr=False, compare=False)
-    """The game's own pictures, decoded when they are asked for."""
+    """The game's own pictures, decoded on demand."""
     abilities: Mapping[int, frozenset[int]] | None = None
     """By tag of an own unit, the abilities that the game would take from it now, each as itself and in its general
     form; None if the game was not asked."""
     functions: frozenset[int] = frozenset()
     """Ids of the PySC2 functions that the current selection allows."""
     dead: frozenset[int] = frozenset()
-    """Tags of the units that died since the snapshot that agents saw before this one."""
+    """Tags of the units that died since the last snapshot that agents saw."""
     errors: tuple[ActionError, ...] = ()
-    """What the game refused since then."""
+    """Refusals of the game since then."""
     ended: bool = False
-    """True if the episode is over: by a result, or because its steps are used up."""
+    """True if the episode is over: by a result, or at its limit of steps."""
     outcome: Outcome | None = None
     """The player's result; None while it plays, and after an end without one."""

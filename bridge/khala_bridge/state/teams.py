@@ -1,8 +1,8 @@
-"""Which unit answers to which agent and team: the one home of the rules of grouping.
+"""The rules of grouping: the agent and the team of each unit.
 
-A unit is grouped when it is seen finished for the first time, in ascending order of tags, and stays where it is
-until it is gone. A unit that comes back (out of a transport, a gas building) returns to its old team. Structures are
-units like all others: whoever lists their type has them. What no team lists answers to nobody.
+A unit is grouped when it is first seen finished, in ascending order of tags, and stays in its team until it is gone.
+A unit that comes back (out of a transport, a gas building) returns to its old team. Structures are units like all
+others: the agent that lists their type has them. Units that no team lists belong to no agent.
 
 *Agent*: one that admits only `airborne` units, if the unit stands by a transport; otherwise the first agent in
 the order of the task that lists its type and admits it:
@@ -21,12 +21,12 @@ nearest head within 15, else an empty team, else the nearest head. A `side` team
 
 *Change of type* (a Gateway becomes a WarpGate, a tank digs in): the unit stays, if its team lists the new type;
 otherwise it goes to a team that does. If none does, a unit in another form (burrowed, sieged, lifted off, in a
-cocoon) counts as the type whose form it is, and any other unit is nobody's from then on. What comes out of an egg,
+cocoon) counts as the type whose form it is, and any other unit belongs to no agent from then on. A unit out of an egg,
 and the Archon of two Templar, is a new unit to the game and is grouped as one.
 
-The head of a team is its oldest unit. (The order of a Python set decided it in the original, so that the camera
-jumped.) Sources of the rules: the paper's appendix D and its first implementation; the rule of changes is our own;
-see SOURCES.md.
+The head of a team is its oldest unit. (In the original the order of a Python set decided, so that the camera jumped.)
+Sources of the rules: the paper's appendix D and its first implementation; the rule of changes is our own; see
+SOURCES.md.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ ARMY_PER_DEFENDER = 15
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """A team as agents name it, with the units that it has now."""
+    """A team as agents name it, with its present units."""
 
     agent: str
     name: str
@@ -72,7 +72,7 @@ class Team:
 
 
 class TeamRoster:
-    """Who has which unit in a running episode; one per side."""
+    """The units of each team in a running episode; one roster per side."""
 
     def __init__(self, agents: Iterable[AgentConfig]) -> None:
         self._groups = [[_Group(agent, team) for team in agent.teams] for agent in agents]
@@ -81,7 +81,7 @@ class TeamRoster:
         self._takers: dict[int, list[list[_Group]]] = {}  # by unit type; [] for a type that no team lists
 
     def update(self, own: Sequence[Unit], player: PlayerState) -> None:
-        """Drop the units that are gone and gives new ones to their teams; `own` in ascending order of tags."""
+        """Drop the units that are gone and add new ones to their teams; `own` in ascending order of tags."""
         units = {unit.tag: unit for unit in own}
         self._keep(units)
         transports: list[Unit] | None = None
@@ -97,7 +97,7 @@ class TeamRoster:
         return tuple(team for group in self._all_groups() if group.agent.name == agent for team in group.teams())
 
     def idle_teams(self, agent: str) -> tuple[str, ...]:
-        """Return names of the agent's teams that have no unit now, though they could."""
+        """Return the names of the agent's teams that could have units and have none now."""
         groups = (group for group in self._all_groups() if group.agent.name == agent and group.config.kind != "side")
         return tuple(group.config.name for group in groups if not group.tags)
 
@@ -105,7 +105,7 @@ class TeamRoster:
         return (group for groups in self._groups for group in groups)
 
     def _keep(self, units: Mapping[int, Unit]) -> None:
-        """Leave in the teams those who are still there, as what they were; moves out those who became another."""
+        """Keep the units in the teams that are still there with their old type; release units of a new type."""
         for tag in self._grouped & units.keys():
             home, unit_type = self._homes[tag], units[tag].unit_type
             if home.unit_type != unit_type:
@@ -150,7 +150,7 @@ class _Group:
     config: TeamConfig
     tags: list[int] = field(default_factory=list)
     numbers: dict[int, int] = field(default_factory=dict)
-    """Number of every unit that it ever had; a dead unit's number is not given again."""
+    """Number of every unit that it ever had; the number of a dead unit is not used again."""
 
     def add(self, tag: int) -> None:
         self.tags.append(tag)
@@ -169,7 +169,7 @@ class _Group:
 
 @dataclass(slots=True)
 class _Home:
-    """Where a unit belongs, and the type that it had when that was last looked at."""
+    """The group of a unit, and its type when that was last checked."""
 
     group: _Group
     unit_type: int
@@ -177,7 +177,7 @@ class _Home:
 
 @dataclass(frozen=True, slots=True)
 class _Arrival:
-    """A unit that has no team, and what there is around it."""
+    """A unit without a team, and its surroundings."""
 
     unit: Unit
     units: Mapping[int, Unit]
@@ -190,7 +190,7 @@ def _lists(takers: Iterable[Sequence[_Group]], group: _Group) -> bool:
 
 
 def _find(takers: Sequence[Sequence[_Group]], arrival: _Arrival) -> _Group | None:
-    """Return the group that takes a unit: agents of airborne units are asked first, then all others, in their order."""
+    """Return the group that takes a unit: first agents of airborne units, then all others, in their order."""
     for airborne in (True, False):
         for groups in takers:
             if (groups[0].agent.admits == "airborne") == airborne and _admits(groups, arrival):

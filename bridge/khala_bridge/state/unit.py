@@ -1,7 +1,7 @@
 """A unit as the game shows it to a player: numbers and names, no messages of the API.
 
-Fields have the names of the SC2 API where they are the API's. Positions are in the world frame; times are in game
-loops, 22.4 of which pass in a second. What the API tells only of the player's own units is empty or 0 for all others.
+Fields that come from the SC2 API have its names. Positions are in the world frame; times are in game loops, 22.4 of
+which pass in a second. Values that the API has only for the player's own units are empty or 0 for all others.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Alliance(IntEnum):
-    """Whose a unit is, by the numbers of the SC2 API."""
+    """Owner of a unit, by the numbers of the SC2 API."""
 
     OWN = 1
     ALLY = 2
@@ -26,14 +26,14 @@ class Alliance(IntEnum):
 
 
 class Display(IntEnum):
-    """How a unit is known, by the numbers of the SC2 API; its placeholders are no units here."""
+    """Visibility of a unit, by the numbers of the SC2 API; its placeholders are not units here."""
 
     VISIBLE = 1
     """It is in sight."""
     REMEMBERED = 2
-    """It was seen where the fog of war is now; all values are those of that time."""
+    """It was seen before and is now under the fog of war; all values are of that time."""
     HIDDEN = 3
-    """It is cloaked and not detected; the game tells its place all the same."""
+    """It is cloaked and not detected; the game sends its place all the same."""
 
 
 # an attribute of an enumeration takes ten times as long as a global
@@ -64,7 +64,7 @@ class Unit(NamedTuple):
     name: str
     """Name of its type as PySC2 has it, `Stalker`."""
     facts: UnitFacts | None
-    """What is known of its type; None for a type that `khala_bridge.knowledge` does not have."""
+    """The facts about its type; None for a type that `khala_bridge.knowledge` does not have."""
     alliance: Alliance
     display_type: Display
     pos: WorldPoint
@@ -72,20 +72,20 @@ class Unit(NamedTuple):
     is_cloaked: bool
     """True if it is cloaked, whether it is detected or not."""
     buff_ids: tuple[int, ...]
-    """Numbers of what lies on it for a time."""
+    """Numbers of its buffs."""
     # --- as in the API ---
     tag: int
-    """The game's own number of the unit; it keeps it for the whole episode."""
+    """The game's own number of the unit, constant for the whole episode."""
     unit_type: int
     """Number of its type."""
     owner: int
     """Number of the player that it belongs to; 16 for neutral ones."""
     facing: float
-    """Where it looks, in radians from east, counterclockwise."""
+    """Direction that it faces, in radians from east, counterclockwise."""
     radius: float
-    """In world units; 0 for a unit that the game gives none."""
+    """In world units; 0 if the game has none for it."""
     build_progress: float
-    """Share of its construction that is done; 1 for what is finished."""
+    """Share of its construction that is done; 1 for a finished unit."""
     health: float
     health_max: float
     shield: float
@@ -112,11 +112,11 @@ class Unit(NamedTuple):
     weapon_cooldown: float = 0.0
     """Game loops until it can fire again."""
     cargo_space_max: int = 0
-    """Places for passengers; 0 for what carries nobody."""
+    """Places for passengers; 0 for a unit that carries none."""
     assigned_harvesters: int = 0
-    """Workers that gather for a town hall or at a gas structure."""
+    """Number of workers that gather for a town hall or at a gas structure."""
     ideal_harvesters: int = 0
-    """Workers that it has work for."""
+    """Number of workers that it has work for."""
     passengers: tuple[str, ...] = ()
     """Types of the units in it, by name."""
     orders: tuple[UnitOrder, ...] = ()
@@ -139,22 +139,22 @@ class Unit(NamedTuple):
 
     @property
     def is_remembered(self) -> bool:
-        """True if it is not in sight and was seen before."""
+        """True if it was seen before and is not in sight now."""
         return self.display_type is _REMEMBERED
 
     @property
     def is_structure(self) -> bool:
-        """True if it is a structure; a type that is not known is none."""
+        """True if it is a structure; unknown types are not."""
         return self.facts is not None and self.facts.structure
 
     @property
     def buffs(self) -> tuple[str, ...]:
-        """Names of what lies on it for a time, `GravitonBeam`."""
+        """Names of its buffs, `GravitonBeam`."""
         return tuple(map(buff_name, self.buff_ids))
 
     @property
     def planes(self) -> frozenset[str]:
-        """Where weapons find it now: `ground`, `air`, or both for a Colossus; what a Phoenix lifts is in the air."""
+        """Where weapons hit it now: `ground`, `air`, or both for a Colossus; a unit lifted by a Phoenix: `air`."""
         usual = frozenset(self.facts.planes) if self.facts is not None else frozenset[str]()
         if self.is_flying or "GravitonBeam" in self.buffs:
             return (usual | {"air"}) - {"ground"}

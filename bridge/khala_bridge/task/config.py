@@ -1,8 +1,8 @@
-"""A task: a map, the agents that play it, which units answer to them and what they may do with them.
+"""A task: a map, the agents that play it, their units, and their actions.
 
-The model of the files in `configs/tasks/`. It is checked against the map table, the catalogue and PySC2's unit
-names while it is read, so that a wrong name is an error with its line, not a surprise in the game. It holds no
-state: who has which unit in a running game is known by `khala_bridge.state.teams`.
+The model of the files in `configs/tasks/`. Reading checks it against the map table, the catalogue and PySC2's unit
+names, so that a wrong name is an error with its line, not a surprise in the game. It holds no state:
+`khala_bridge.state.teams` knows the units of each team in a running game.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _known(name: str, known: Iterable[str], what: str) -> str:
 
 
 def _known_action(name: str) -> str:
-    """Return an action as the catalogue spells it; a group is left to those who know whom it is for."""
+    """Return the name of an action in the catalogue's spelling; names of groups are checked later, with their owner."""
     if name.startswith(GROUP_SELECTOR):
         return name
     action = alias_of(name)
@@ -58,7 +58,7 @@ def _known_action(name: str) -> str:
 
 
 def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """Return what the forms of some types may be told: of what is listed for a type all that the form has as well."""
+    """Return the actions of the forms of some types: those of the type that the form has as well."""
     return {
         form: tuple(name for name in chosen(names, form) if catalogue()[name].fits(form))
         for unit_type, names in actions.items()
@@ -67,7 +67,7 @@ def _of_forms(actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]
 
 
 def _some(values: tuple[T, ...]) -> tuple[T, ...]:
-    """Return at least one value; `min_length` of pydantic would hide what is wrong with the ones that are there."""
+    """Return at least one value; pydantic's `min_length` would hide the errors of the present values."""
     if not values:
         raise ValueError("at least one is needed")
     return values
@@ -88,7 +88,7 @@ class Stage(Frozen):
     within: float = Field(default=4.0, gt=0)
     """Cells of the minimap that count as being there."""
     until_s: float | None = Field(default=None, ge=0)
-    """Second of the game's clock that ends the stage."""
+    """Time on the game's clock that ends the stage, in seconds."""
 
 
 class TeamConfig(Frozen):
@@ -99,15 +99,15 @@ class TeamConfig(Frozen):
     kind: TeamKind = "group"
     """`select`: every unit is a team of its own, named `<name>-1`, `<name>-2`, …; `select_all_type`: the units of
     a type around the first one; `group`: a control group, units are spread over the agent's teams; `side`: no units,
-    but orders to those of the whole side, its producers, workers or army, which the host chooses."""
+    but orders to units of the whole side, its producers, workers or army, which the host chooses."""
     actions: tuple[ActionName, ...] = ()
-    """What a team of the kind `side` may be told; `group:<name>` stands for a whole group of actions."""
+    """Actions of a team of the kind `side`; `group:<name>` stands for a whole group of actions."""
     control_group: int | None = Field(default=None, ge=0, le=9)
     """Control group that the screen executor keeps the team in; without one it selects unit by unit."""
     task: str = ""
-    """What it has to do all the time."""
+    """Its task for all the time."""
     stages: tuple[Stage, ...] = ()
-    """What it has to do besides, one after the other: the line of time of a task."""
+    """Further tasks, one after the other."""
 
     @field_validator("stages")
     @classmethod
@@ -135,42 +135,42 @@ class TeamConfig(Frozen):
 
 
 class AutoConfig(Frozen):
-    """What the host does by itself, with units that no agent has ordered in the same turn."""
+    """Orders that the host gives by itself, to units that no agent has ordered in the same turn."""
 
     gather: bool = False
-    """Sends idle workers to minerals and gas."""
+    """Send idle workers to minerals and gas."""
     train_workers: bool = False
-    """Trains workers while bases have room for them."""
+    """Train workers while bases have room for them."""
     warpgates: bool = False
-    """Turns Gateways into WarpGates once that is researched."""
+    """Turn Gateways into WarpGates once that is researched."""
 
 
 class AgentConfig(Frozen):
-    """One agent: who it is, its teams, and what each type of unit may be told."""
+    """One agent: its name, its teams, and the actions of each type of unit."""
 
     name: KeyName
     role: str
     kind: AgentKind = "combat_group"
-    """What it is for; decides what its observations speak of unless `sections` says it."""
+    """Its role; decides on the sections of its observations unless `sections` does."""
     sections: tuple[str, ...] = ()
     """Names of the [sections](observations.md) of its observations, in their order; () for those of its kind.
     `my_module:mine` is one that a module of yours registers."""
     images: tuple[ImageSpec, ...] = ()
     text_tokens: int | None = Field(default=None, ge=100)
-    """About how many tokens its observations may have; None for no limit. Longer ones leave things out and say so."""
+    """Approximate limit of tokens of its observations; None for no limit. Longer ones leave things out and say so."""
     talks_to: tuple[KeyName, ...] | None = None
     """Agents that it may write to; None for all."""
     admits: Admission = "combat"
-    """Which units it takes of those that its teams list; see `khala_bridge.state.teams`."""
+    """Units that it takes of those that its teams list; see `khala_bridge.state.teams`."""
     teams: tuple[TeamConfig, ...] = ()
     """One or more; a commander may have none, and only talk."""
     actions: dict[UnitTypeName, tuple[ActionName, ...]] = Field(default_factory=dict)
     """Names of text actions by unit type, in the order in which they are shown; `group:<name>` stands for those of a
-    group that the type has. A form of a type (sieged, burrowed, …) that is not listed may be told what the type may."""
+    group that the type has. A form (sieged, burrowed, …) that is not listed has the actions of its type."""
     task: str = ""
-    """What it has to do besides the task of all."""
+    """Its task in addition to the task of all."""
     max_actions: int | None = Field(default=None, ge=1)
-    """Actions that one of its teams may have in one reply; None for as many as the task says."""
+    """Limit of actions for one of its teams in one reply; None for the task's limit."""
     required: bool = True
     """Whether the match waits for it at the start."""
 
@@ -194,25 +194,25 @@ class AgentConfig(Frozen):
         return self
 
     def catalogue(self) -> tuple[Action, ...]:
-        """Return every action that any of its units may be told, in the order in which they are first listed."""
+        """Return every action of any of its units, in the order in which they are first listed."""
         lists = (*(team.actions for team in self.teams), *self.actions.values())
         names = dict.fromkeys(name for listed in lists for name in listed)
         return tuple(catalogue()[name] for name in names)
 
     def team_specs(self) -> tuple[TeamSpec, ...]:
-        """Return its teams as its briefing tells them."""
+        """Return its teams as its briefing describes them."""
         return tuple(TeamSpec(name=t.name, unit_types=t.unit_types, task=t.task) for t in self.teams)
 
 
 class Opponent(Frozen):
-    """The computer player; what is not given is as the map table says."""
+    """The computer player; values that are missing come from the map table."""
 
     race: Race | None = None
     difficulty: Difficulty | None = None
 
 
 class TaskConfig(Frozen):
-    """What is played, by whom, under which rules."""
+    """The map, the agents, and the rules of a match."""
 
     name: KeyName
     description: str = ""
@@ -225,10 +225,10 @@ class TaskConfig(Frozen):
     side: KeyName = "blue"
     """Name of the agents' side in keys and reports."""
     task: str
-    """What all agents have to do."""
+    """The task of all agents."""
     agents: Annotated[tuple[AgentConfig, ...], AfterValidator(_some)]
     channels: tuple[str, ...] = ()
-    """Names under which more than one agent can be written to."""
+    """Names for groups of agents that can receive messages."""
     communication: bool = True
     """Whether agents may write to each other."""
     executor: Literal["raw", "screen"] = "raw"
@@ -236,11 +236,11 @@ class TaskConfig(Frozen):
     frames: Frames = Frames()
     auto: AutoConfig = AutoConfig()
     default_reply: str = ""
-    """What an agent is taken to have said that said nothing in time; empty: its units go on with what they do."""
+    """Reply of an agent that did not answer in time; empty: its units continue."""
     max_actions: int = Field(default=3, ge=1)
-    """Actions that one team may have in one reply."""
+    """Limit of actions for one team in one reply."""
     max_steps: int | None = Field(default=None, ge=1)
-    """Decisions after which an episode ends without a result; None leaves it to the map."""
+    """Decisions after which an episode ends without a result; None: the map decides."""
 
     @field_validator("clock")
     @classmethod
@@ -269,7 +269,7 @@ class TaskConfig(Frozen):
 
     @property
     def map_spec(self) -> MapSpec:
-        """The map, with what this task changes of it."""
+        """The map, with this task's changes."""
         changed = {"race": self.race, "opponent": self.opponent.race, "difficulty": self.opponent.difficulty}
         if self.own_map is None:
             spec = known_maps()[self.map]
@@ -279,7 +279,7 @@ class TaskConfig(Frozen):
 
     @property
     def render_px(self) -> int | None:
-        """Size of the pictures that the game itself has to render; None if it need not."""
+        """Size of the pictures that the game itself must render; None for none."""
         sizes = [image.size_px for agent in self.agents for image in agent.images if image.is_rendered]
         return max(sizes, default=None)
 
@@ -288,7 +288,7 @@ class TaskConfig(Frozen):
         return next(agent for agent in self.agents if agent.name == name)
 
     def max_actions_of(self, agent: AgentConfig) -> int:
-        """Return actions that one team of an agent may have in one reply."""
+        """Return the limit of actions for one team of an agent in one reply."""
         return self.max_actions if agent.max_actions is None else agent.max_actions
 
     def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:

@@ -1,6 +1,6 @@
-"""What pictures can be asked for in a task file, and how: names and sizes, nothing that draws.
+"""Pictures in task files: their names and sizes, without any drawing.
 
-`khala_bridge.observe.image` draws what is asked for here.
+`khala_bridge.observe.image` draws them.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ GAME_LAYERS = (
     "active",
     "placeholder",
 )
-"""Those that only the game itself draws, where its own camera is."""
+"""Feature layers that only the game itself draws, where its own camera is."""
 MINIMAP_LAYERS = (
     "height_map",
     "visibility_map",
@@ -70,11 +70,11 @@ PAPER = {
     "developer": ("minimap",),
     "builder": ("screen", "minimap", "layer:power", "layer:pathable", "layer:buildable"),
 }
-"""What the paper shows to each kind of agent."""
+"""Pictures that the paper shows to each kind of agent."""
 
 
 class ImageSpec(Frozen):
-    """One kind of picture that an agent is shown with each observation."""
+    """One kind of picture in each observation of an agent."""
 
     what: str
     """`screen`: what a team sees, in colours; `minimap`: the whole map; `features`: nine feature layers of a team's
@@ -88,13 +88,13 @@ class ImageSpec(Frozen):
     marks: bool = True
     """Whether units on a screen carry three digits of their tags, and their types two letters."""
     grid: bool = True
-    """Whether grid lines are drawn."""
+    """Whether to draw grid lines."""
     source: Literal["drawn", "game", "auto"] | None = None
-    """`drawn` from raw data, for any team at any time; `game`: the game's own pixels, and no picture where its camera
-    is not at the team; `auto`: those where they are there, and drawn elsewhere. By default what can be drawn is
-    drawn."""
+    """`drawn` from raw data, for any team at any time; `game`: the game's own pixels, and no picture if its camera
+    is not at the team; `auto`: the game's own pixels if they are available, else drawn. By default all pictures that
+    can be drawn are drawn."""
     max_teams: int = Field(default=3, ge=1)
-    """A picture is made for so many of the agent's teams, the first ones of its observation."""
+    """Number of the agent's teams that get a picture, the first ones of its observation."""
 
     @field_validator("what")
     @classmethod
@@ -117,12 +117,12 @@ class ImageSpec(Frozen):
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it may be drawn from raw data."""
+        """True if it may be drawn from raw data."""
         return self._is_drawable and self.source != "game"
 
     @property
     def is_taken(self) -> bool:
-        """Whether the game's own pixels will do, where they are there."""
+        """True if the game's own pixels are accepted, if they are available."""
         return self.source in {"game", "auto"} or not self._is_drawable
 
     @property
@@ -132,20 +132,20 @@ class ImageSpec(Frozen):
 
     @property
     def is_rendered(self) -> bool:
-        """Whether it asks the game to render."""
+        """True if the game must render."""
         return self.is_taken and self.what in {"screen", "minimap"}
 
     @property
     def of_teams(self) -> bool:
-        """Whether it shows what a team sees, and not the whole map."""
+        """True if it shows a team's screen, and not the whole map."""
         return not self.what.startswith("minimap")
 
 
 def images_for(words: str, kind: str) -> tuple[ImageSpec, ...]:
-    """Return the pictures that a few words ask for.
+    """Return the pictures of a short description.
 
     Args:
-        words: `paper` for those of the agent's kind, `none`, or what each picture shows, with commas between.
+        words: `paper` for those of the agent's kind, `none`, or the content of each picture, separated by commas.
         kind: of the agent.
 
     Raises:

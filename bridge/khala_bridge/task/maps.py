@@ -1,6 +1,6 @@
 """The maps that can be played: a typed reading of `bridge/khala_bridge/data/maps.yaml`.
 
-Where a map is, who plays on it and what for; what else stands on it is known by the game alone.
+The file of a map, its players and its purpose; only the game knows the rest.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Difficulty: TypeAlias = Literal[
 
 
 class MapSpec(Frozen):
-    """One map and who plays on it."""
+    """One map and its players."""
 
     name: str = ""
     file: str
@@ -41,11 +41,11 @@ class MapSpec(Frozen):
     limit_loops: int | None = None
     """Game loop at which the map itself ends the game."""
     goal: str = ""
-    """What has to be done there."""
+    """The task on the map."""
     units: tuple[str, ...] = ()
     """Types of the agents' units, for a task that is made for the map."""
     upgrades: tuple[str, ...] = ()
-    """What the map grants the agents' side, as far as actions need it; named as in `pysc2.lib.upgrades`."""
+    """Upgrades that the map grants the agents' side, as far as actions need them; named as in `pysc2.lib.upgrades`."""
 
 
 @functools.cache

@@ -1,7 +1,7 @@
-"""The task that a map is played with when no task file is there for it: one commander for all of its units.
+"""The task of a map without a task file: one commander for all of its units.
 
-So every map is a task. It is made of what `bridge/khala_bridge/data/maps.yaml` says of the map: what has to be done
-there, which types of units there are, and which upgrades the map grants. A file in `configs/tasks` of the map's name
+So every map is a task. It is made from the map's entry in `bridge/khala_bridge/data/maps.yaml`: what to do there,
+which types of units there are, and which upgrades the map grants. A file in `configs/tasks` with the map's name
 comes first.
 """
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 AGENT = "Commander"
 BASE = "Base"
 GROUPS = ("basic", "orders", "skill", "macro", "build")
-"""Groups of actions that units have; what the catalogue makes by rule would fill a prompt and say nothing more."""
+"""Groups of actions that units have; the generated actions would fill a prompt and add nothing."""
 SIDE_GROUPS = ("easy-build", "train", "research", "easy-warp", "chrono", "macro", "easy-control")
 STEP_LOOPS = 11
 """Half a second of the game between two decisions, as in the other tasks."""
 
 
 def standard_task(spec: MapSpec) -> TaskConfig:
-    """Return the task that is made for a map."""
+    """Return the standard task of a map."""
     return TaskConfig(
         name=spec.name,
         description=spec.goal,
@@ -51,7 +51,7 @@ def _commander(spec: MapSpec) -> AgentConfig:
 
 
 def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
-    """Return where there are workers, the team of no units that trains and builds."""
+    """Return the team without units that trains and builds, if there are workers."""
     if not _has_workers(spec):
         return ()
     known = {action.group for action in catalogue().values() if action.race in (spec.race, None)}
@@ -60,12 +60,12 @@ def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
 
 
 def _has_workers(spec: MapSpec) -> bool:
-    """Return whether there is an economy, so that what is not there yet can be built and researched."""
+    """Return True if there is an economy, so that missing structures and upgrades can be built and researched."""
     return any(knowledge()[unit].worker for unit in spec.units)
 
 
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
-    """Return whether units of a type are told the action on this map."""
+    """Return True if units of a type get the action on this map."""
     return (
         action.group in GROUPS
         and action.subject != "side"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @section("valid_actions")
 def valid_actions(page: Page) -> Iterator[str]:
-    """Yield the valid actions of each team, with their effects and costs."""
+    """Show the valid actions of each team, with their effects and costs."""
     yield from _calls(page)
     offers = _offers(page)
     described = {action.name: action.description for team in page.teams for action in team.actions}
@@ -30,7 +30,7 @@ def valid_actions(page: Page) -> Iterator[str]:
 
 @shorter("valid_actions", rank=40, says="what the actions do")
 def valid_actions_in_short(page: Page) -> Iterator[str]:
-    """Yield calls and costs only."""
+    """Show calls and costs only."""
     yield from _calls(page)
     offers = _offers(page)
     if offers:
@@ -62,7 +62,7 @@ def _price(offer: ActionCost) -> str:
 
 @section("impossible")
 def impossible(page: Page) -> Iterator[str]:
-    """Yield the actions of each team that are not possible now, by the reason."""
+    """Show the actions of each team that are not possible now, by the reason."""
     teams = [team for team in page.teams if team.barred]
     if teams:
         yield "Not possible now"
@@ -73,7 +73,7 @@ def impossible(page: Page) -> Iterator[str]:
 
 @shorter("impossible", rank=80, says="what is not possible now, and why")
 def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Yield nothing."""
+    """Show nothing."""
     yield from ()
 
 
@@ -93,7 +93,7 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
 
 @section("arguments")
 def arguments(page: Page) -> Iterator[str]:
-    """Yield the notation of the valid actions' arguments."""
+    """Show the notation of the valid actions' arguments."""
     kinds = {kind for team in page.teams for action in team.actions for kind in action.args}
     if not kinds:
         return
@@ -115,7 +115,7 @@ def arguments(page: Page) -> Iterator[str]:
 
 @shorter("arguments", rank=50, says="how arguments are written")
 def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Yield nothing: the briefing explains the arguments as well."""
+    """Show nothing: the briefing explains the arguments as well."""
     yield from ()
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @section("game")
 def game(page: Page) -> Iterator[str]:
-    """Yield the time, and the resources if the agent spends them."""
+    """Show the time, and the resources if the agent spends them."""
     view, used = page.view, page.view.resources
     yield "Game"
     minutes, seconds = divmod(int(view.time_s), 60)
@@ -38,7 +38,7 @@ def _promised(resources: Resources) -> str:
 
 @section("task")
 def task(page: Page) -> Iterator[str]:
-    """Yield the tasks of all, of this agent, and of its teams at this time."""
+    """Show the tasks of all, of this agent, and of its teams at this time."""
     yield "Task"
     yield f"{INDENT}{one_line(page.task.task)}"
     if page.sight.agent.task:
@@ -50,7 +50,7 @@ def task(page: Page) -> Iterator[str]:
 
 @section("answer")
 def answer(page: Page) -> Iterator[str]:
-    """Yield the limit of actions, one piece of advice, and the signal to begin."""
+    """Show the limit of actions, one piece of advice, and the signal to begin."""
     parts = ['"Analysis:"']
     yield "Answer"
     if page.teams:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
-    """Return lines about every type in sight; uses and abilities only of the agent's own types."""
+    """Show lines about every type in sight; uses and abilities only of the agent's own types."""
     return _written(_types(page))
 
 
@@ -38,7 +38,7 @@ def _written(types: _Types) -> tuple[str, ...]:
 
 @shorter("unit_knowledge", rank=20, says="weapons and abilities of the types in sight")
 def unit_knowledge_in_short(page: Page) -> Iterator[str]:
-    """Yield one line for each type."""
+    """Show one line for each type."""
     types = _types(page)
     if any(types):
         yield "Unit knowledge"
@@ -47,7 +47,7 @@ def unit_knowledge_in_short(page: Page) -> Iterator[str]:
 
 @shorter("unit_knowledge", rank=30, says="what is known of the types in sight")
 def no_unit_knowledge(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Yield nothing."""
+    """Show nothing."""
     yield from ()
 
 

@@ -186,7 +186,7 @@ def _block(write: Write, page: Page) -> str:
 
 
 def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
-    """Return the blocks with as many shorter forms as needed, in the order of ranks, and a notice of what is missing."""
+    """Return the blocks with as many shorter forms as needed, in the order of ranks, and a notice of the rest."""
     costs = [tokens(block + _BETWEEN) for block in blocks]
     missing: dict[str, str] = {}
     notice = ""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @section("last_actions")
 def last_actions(page: Page) -> Iterator[str]:
-    """Yield the calls of the last reply that were carried out."""
+    """Show the calls of the last reply that were carried out."""
     if page.feedback.accepted:
         yield "Your last actions"
         yield from (f"{INDENT}accepted: {call}" for call in page.feedback.accepted)
@@ -25,7 +25,7 @@ def last_actions(page: Page) -> Iterator[str]:
 
 @section("rejections")
 def rejections(page: Page) -> Iterator[str]:
-    """Yield the calls that were not carried out, and why."""
+    """Show the calls that were not carried out, and why."""
     if page.feedback.rejections:
         yield "Your last errors"
     for fault in page.feedback.rejections:
@@ -35,7 +35,7 @@ def rejections(page: Page) -> Iterator[str]:
 
 @section("messages")
 def messages(page: Page) -> Iterator[str]:
-    """Yield the messages of others."""
+    """Show the messages of others."""
     if page.feedback.messages:
         yield "Messages"
     yield from (f"{INDENT}{_message(message, page.sight.agent.name)}" for message in page.feedback.messages)
@@ -43,13 +43,13 @@ def messages(page: Page) -> Iterator[str]:
 
 @section("communication")
 def communication(page: Page) -> Iterator[str]:
-    """Yield the possible receivers of messages, and how to write to them."""
+    """Show the possible receivers of messages, and how to write to them."""
     yield from _communication(page, with_roles=True)
 
 
 @shorter("communication", rank=90, says="what the other agents are there for")
 def communication_in_short(page: Page) -> Iterator[str]:
-    """Yield names only."""
+    """Show names only."""
     yield from _communication(page, with_roles=False)
 
 

@@ -29,25 +29,25 @@ FEW, FEWEST = 8, 3
 
 @section("teams", parts=("resources",))
 def teams(page: Page) -> list[str]:
-    """Return one block per team: its place, the units there, and events."""
+    """Show one block per team: its place, the units there, and events."""
     return _blocks(page, _all_units, _tagged_events)
 
 
 @shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
 def near_units(page: Page) -> list[str]:
-    """Return the blocks with allies and far enemies only by type."""
+    """Show the blocks with allies and far enemies only by type."""
     return _blocks(page, lambda page, team: _near(page, team, _distance_within(team, NEAR)), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
 def few_units(page: Page) -> list[str]:
-    """Return the blocks with a few enemies, and events without tags."""
+    """Show the blocks with a few enemies, and events without tags."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEW)), _counted_events)
 
 
 @shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
 def fewest_units(page: Page) -> list[str]:
-    """Return the blocks with a handful of enemies, and no events."""
+    """Show the blocks with a handful of enemies, and no events."""
     return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEWEST)), _no_events)
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @section("counts", parts=("counts",))
 def counts(page: Page) -> Iterator[str]:
-    """Yield the side's units and production, and the known enemies."""
+    """Show the side's units and production, and the known enemies."""
     found = page.view.counts
     if found is None:
         return
@@ -72,7 +72,7 @@ def _enemy(enemy: EnemyCount) -> str:
 
 @section("alerts", parts=("alerts",))
 def alerts(page: Page) -> Iterator[str]:
-    """Yield the places where the side loses health or units, and the game's warnings."""
+    """Show the places where the side loses health or units, and the game's warnings."""
     view = page.view
     if view.alerts or view.warnings:
         yield "Alerts"
@@ -94,7 +94,7 @@ _HAPPENED = {
 
 @section("events", parts=("events",))
 def events(page: Page) -> Iterator[str]:
-    """Yield the side's events since the last observation."""
+    """Show the side's events since the last observation."""
     by_kind: dict[str, dict[str, int]] = {}
     for event in page.view.events:
         of_kind = by_kind.setdefault(_HAPPENED[event.what, event.alliance], {})
@@ -109,7 +109,7 @@ def events(page: Page) -> Iterator[str]:
 
 @section("others", parts=("others",))
 def others(page: Page) -> Iterator[str]:
-    """Yield the teams of the other agents: their units, places and condition."""
+    """Show the teams of the other agents: their units, places and condition."""
     if page.view.others:
         yield "Teams of other agents"
     agent = ""
@@ -123,7 +123,7 @@ def others(page: Page) -> Iterator[str]:
 
 @shorter("others", rank=100, says="the single teams of other agents")
 def others_in_short(page: Page) -> Iterator[str]:
-    """Yield one line for each agent."""
+    """Show one line for each agent."""
     by_agent: dict[str, dict[str, int]] = {}
     for team in page.view.others:
         units = by_agent.setdefault(team.agent, {})
@@ -138,7 +138,7 @@ def others_in_short(page: Page) -> Iterator[str]:
 
 @section("structures", parts=("structures",))
 def structures(page: Page) -> Iterator[str]:
-    """Yield the own structures with their tags and orders, a line for each type."""
+    """Show the own structures with their tags and orders, a line for each type."""
     by_type: dict[str, list[str]] = {}
     for mark in _marks(page, "structure"):
         by_type.setdefault(mark.type, []).append(mark.tag + (f" {mark.about}" if mark.about else ""))
@@ -148,13 +148,13 @@ def structures(page: Page) -> Iterator[str]:
 
 @shorter("structures", rank=70, says="tags of your structures")
 def no_structures(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Yield nothing."""
+    """Show nothing."""
     yield from ()
 
 
 @section("warp", parts=("power",))
 def warp(page: Page) -> Iterator[str]:
-    """Yield the WarpGates, and the places for warping in."""
+    """Show the WarpGates, and the places for warping in."""
     gates, fields = page.view.warp_gates, _marks(page, "power field")
     if gates is None and not fields:
         return
@@ -167,7 +167,7 @@ def warp(page: Page) -> Iterator[str]:
 
 @section("places", parts=("places", "power"))
 def places(page: Page) -> Iterator[str]:
-    """Yield free places for a base and free geysers, by the tags that name them, and the power fields."""
+    """Show free places for a base and free geysers, by the tags that name them, and the power fields."""
     bases, geysers, fields = (_marks(page, what) for what in ("base place", "geyser", "power field"))
     if bases or geysers or fields:
         yield "Places to build at"

@@ -1,7 +1,7 @@
-"""The ground: terrain, footprints, resources and base places, and what stands where at a moment, all as arrays.
+"""The ground: terrain, footprints, resources, base places, and the land at a moment, all as arrays.
 
-`MapGround.of(info)` is of a map and never changes; `land_of(snapshot)` is of a moment. Above: `khala_bridge.auto`, and
-whoever shows the ground to an agent.
+`MapGround.of(info)` belongs to a map and never changes; `land_of(snapshot)` belongs to a moment. Above:
+`khala_bridge.auto`, and the modules that show the ground to an agent.
 """
 
 from khala_bridge.state.ground.footprints import Footprint, Site, footprint_of, footprints, sites

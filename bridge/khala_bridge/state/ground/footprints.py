@@ -1,8 +1,8 @@
-"""Footprints: which cells of the ground something stands on, and what a structure asks of the ground under it.
+"""Footprints: the cells of the ground that a thing stands on, and a structure's demands on the ground under it.
 
 A typed reading of `bridge/khala_bridge/data/footprints.yaml` and `bridge/khala_bridge/data/sites.yaml`. Cells are those
-of the world: cell (x, y) is the square from x to x + 1 and from y to y + 1. Whether a place is free is told by
-`khala_bridge.state.ground.land`.
+of the world: cell (x, y) is the square from x to x + 1 and from y to y + 1. `khala_bridge.state.ground.land` knows
+which places are free.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ Cells = tuple[tuple[int, int], ...]
 ADDON: Cells = ((2, -1), (3, -1), (2, 0), (3, 0))
 """Cells of an add-on, from the middle cell of the structure that it belongs to."""
 ADDON_OFFSET = (2.5, -0.5)
-"""Where the middle of an add-on is, from that of its structure."""
+"""Offset of the middle of an add-on from that of its structure."""
 
 
 class Footprint(Frozen):
-    """The cells that something stands on, around its middle."""
+    """The cells that a thing stands on, around its middle."""
 
     rows: tuple[str, ...]
-    """Northernmost first: `x` stands there, `o` keeps town halls away."""
+    """Northernmost first: `x` is occupied, `o` keeps town halls away."""
     units: tuple[str, ...]
     flat: bool = False
-    """Whether units walk over it."""
+    """Whether units can walk over it."""
 
     @functools.cached_property
     def cells(self) -> Cells:
-        """(dx, dy) of every cell that it stands on, from the cell that `cell` gives."""
+        """(dx, dy) of every cell that it stands on, from the cell that `cell` returns."""
         return self._marked("x")
 
     @functools.cached_property
@@ -48,12 +48,12 @@ class Footprint(Frozen):
         return len(self.rows[0]), len(self.rows)
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return the cell from which `cells` are counted when its middle is as near to a point as the grid allows."""
+        """Return the origin of `cells` when its middle is as near to a point as the grid allows."""
         width, height = self.size
         return _nearest(x - (width % 2) / 2), _nearest(y - (height % 2) / 2)
 
     def middle(self, cell: tuple[int, int]) -> WorldPoint:
-        """Return where its middle is when its `cells` are counted from a cell."""
+        """Return its middle when a cell is the origin of `cells`."""
         width, height = self.size
         return WorldPoint(cell[0] + (width % 2) / 2, cell[1] + (height % 2) / 2)
 
@@ -68,13 +68,13 @@ class Footprint(Frozen):
 
 
 class Site(Frozen):
-    """What a structure asks of the ground that it is placed on."""
+    """A structure's demands on the ground under it."""
 
     ground: Literal["bare", "powered", "creep", "any", "geyser"]
     clear: bool = False
     """Whether it keeps its distance from resources."""
     seen: bool = False
-    """Whether every cell has to be in sight when it is placed."""
+    """Whether every cell must be in sight when it is placed."""
     addon: bool = False
     """Whether it can have an add-on beside it."""
 
@@ -92,7 +92,7 @@ def footprints() -> dict[str, Footprint]:
 
 @functools.cache
 def sites() -> dict[str, Site]:
-    """Return what every structure that a worker builds asks of its ground, by the structure's name."""
+    """Return the demands of every structure that a worker builds, by the structure's name."""
     return data.table("sites.yaml", Site)
 
 
@@ -102,12 +102,12 @@ def _of_name() -> dict[str, tuple[str, Footprint]]:
 
 
 def footprint_of(unit: str) -> Footprint | None:
-    """Return what a type of unit stands on; None for one that takes no ground."""
+    """Return the footprint of a type of unit; None for one that takes no ground."""
     found = _of_name().get(unit)
     return found and found[1]
 
 
 @functools.lru_cache(1024)
 def stands_on(unit_type: int) -> tuple[str, Footprint] | None:
-    """Return name of the footprint of a type, given by its number, and the footprint; None for one that takes no ground."""
+    """Return the name of a footprint, and the footprint, of a type by its number; None for one that takes no ground."""
     return _of_name().get(unit_name(unit_type))

@@ -1,7 +1,7 @@
-"""The land: what stands on the ground at one moment, what lies on it, and what has to stay free.
+"""The land: everything on the ground at one moment, and the places that must stay free.
 
-Made of a snapshot, remembered for the last one. Grids are indexed `[x, y]` as those of
-`khala_bridge.state.ground.terrain`. Which of the free places is the best is the business of `khala_bridge.auto`.
+Made of a snapshot, and cached for the last two. Grids are indexed `[x, y]` like those of
+`khala_bridge.state.ground.terrain`. `khala_bridge.auto` chooses among the free places.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground.terrain import Bools, Bytes
 
 POWER_RISE = 0.5
-"""Ground that lies so much higher than a Pylon is not powered by it: it does not reach up a cliff."""
+"""Ground that is higher than a Pylon by this much has no power from it: the field does not reach up a cliff."""
 GIVE_POWER = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing", ""})
-"""What powers; a source of which nothing else is known does."""
+"""Types that give power; an unknown source does, too."""
 AROUND_HALL = 4
-"""Cells from the middle of a town hall that stay free on each side: its own 2, and 2 to walk on."""
+"""Cells from the middle of a town hall that stay free on each side: its own 2, and 2 for walking."""
 LINE_WIDTH = 1.0
-"""A cell is in the way of workers if the way over it is longer than the straight one by less than this."""
+"""A cell is on the workers' way if the way over it is longer than the straight one by less than this."""
 LINE_REACH = 10.0
-"""Resources farther from a town hall are not its own."""
+"""Distance up to which resources belong to a town hall."""
 SEEN_NOW = 2
-"""The game's number for a cell that is in sight; 1 was seen once, 0 never."""
+"""The game's number for a cell that is in sight; 1 means seen before, 0 never seen."""
 RESOURCES = ("mineral_field", "geyser")
-"""Footprints of resources; that of a gas structure is its geyser's."""
+"""Footprints of resources; a gas structure has that of its geyser."""
 _PLACES = "Build_"
 
 
 class Land:
-    """What is known of the ground at the moment of a snapshot."""
+    """The state of the ground at the moment of a snapshot."""
 
     def __init__(self, snapshot: Snapshot) -> None:
         self.ground = MapGround.of(snapshot.info)
@@ -52,13 +52,13 @@ class Land:
 
     @functools.cached_property
     def _standing(self) -> list[tuple[str, Footprint, Unit]]:
-        """What takes ground, with its footprint, by ascending tags; what is only ordered is in `plans`."""
+        """Units that take ground, with their footprints, by ascending tags; ordered structures are in `plans`."""
         found = ((stands_on(unit.unit_type), unit) for unit in self._snapshot.known.values())
         return [(*kind, unit) for kind, unit in found if kind]
 
     @functools.cached_property
     def _bodies(self) -> list[Unit]:
-        """Units of others that are on the ground and in the way of who builds."""
+        """Units of other players that are on the ground and in the way of a structure."""
         others = (unit for unit in self._snapshot.known.values() if not unit.is_own and not unit.is_flying)
         return [unit for unit in others if stands_on(unit.unit_type) is None]
 
@@ -67,19 +67,19 @@ class Land:
         return self._snapshot.known.get(tag)
 
     def standing(self, footprint: str) -> list[Unit]:
-        """Return what is known to stand on footprints of one name, by ascending tags."""
+        """Return the known units with a footprint of this name, by ascending tags."""
         return [unit for name, _, unit in self._standing if name == footprint]
 
     def standing_on(self, cells: Iterable[tuple[int, int]]) -> Unit | None:
-        """Return what stands on any of some cells; the one with the least tag."""
+        """Return a unit that stands on any of some cells: the one with the least tag."""
         wanted = set(cells)
         return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
 
-    # --- what stands there ------------------------------------------------------------------------------------
+    # --- things on the ground ------------------------------------------------------------------------------------
 
     @functools.cached_property
     def taken(self) -> Bools:
-        """(w, h) where something stands, or a unit of others is in the way, so that nothing can be built."""
+        """(w, h): cells where nothing can be built, since something stands there or a unit of others is in the way."""
         taken = np.zeros(self.ground.size, np.bool_)
         for footprint, cells in self._cells.values():
             mark(taken, footprint.cells, cells, value=True)
@@ -88,7 +88,7 @@ class Land:
 
     @functools.cached_property
     def _cells(self) -> dict[str, tuple[Footprint, list[tuple[int, int]]]]:
-        """By name of a footprint, where it is."""
+        """By name of a footprint, the cells of its units."""
         found: dict[str, tuple[Footprint, list[tuple[int, int]]]] = {}
         for name, footprint, unit in self._standing:
             _, cells = found.setdefault(name, (footprint, []))
@@ -97,9 +97,9 @@ class Land:
 
     @functools.cached_property
     def plans(self) -> tuple[tuple[str, WorldPoint], ...]:
-        """What own workers are on their way to build, and where its middle is going to be; nothing stands there yet.
+        """Structures that own workers are on their way to build, and their future middles; nothing stands there yet.
 
-        The game takes the price when it is begun, so that these are not paid for.
+        The game takes the price when construction begins, so these are not paid for.
         """
         return tuple(plan for unit in self._snapshot.own for plan in self._plans_of(unit))
 
@@ -128,7 +128,7 @@ class Land:
 
     @functools.cached_property
     def planned(self) -> Bools:
-        """(w, h) where own units are on their way to build something."""
+        """(w, h): cells of the structures that own units are on their way to build."""
         planned = np.zeros(self.ground.size, np.bool_)
         for structure, middle in self.plans:
             footprint = footprint_of(structure)
@@ -138,7 +138,7 @@ class Land:
 
     @functools.cached_property
     def open(self) -> Bools:
-        """(w, h) where ground units can walk now."""
+        """(w, h): cells where ground units can walk now."""
         walls = np.zeros(self.ground.size, np.bool_)
         for footprint, cells in self._cells.values():
             if not footprint.flat:
@@ -147,35 +147,35 @@ class Land:
 
     @functools.cached_property
     def free(self) -> Bools:
-        """(w, h) where a structure could stand now: buildable, and nothing there or planned to be there."""
+        """(w, h): cells where a structure could stand now: buildable, not occupied, and not planned for another one."""
         return self.ground.buildable & ~self.taken & ~self.planned
 
     @functools.cached_property
     def clear(self) -> Bools:
-        """(w, h) where the game lets town halls stand, as far as resources go."""
+        """(w, h): cells where the game allows town halls, as far as resources go."""
         clear = np.ones(self.ground.size, np.bool_)
         for name, (footprint, cells) in self._cells.items():
             if name in RESOURCES:
                 mark(clear, footprint.near, cells, value=False)
         return clear
 
-    # --- what lies on it --------------------------------------------------------------------------------------
+    # --- creep, sight, power --------------------------------------------------------------------------------------
 
     @functools.cached_property
     def creep(self) -> Bools:
-        """(w, h) where creep is."""
+        """(w, h): cells with creep."""
         return self._state(self._snapshot.creep.cells()) > 0
 
     @functools.cached_property
     def sight(self) -> Bytes:
-        """(w, h) 2 where the player sees, 1 where it once saw, 0 elsewhere."""
+        """(w, h): 2 where the player sees, 1 where it once saw, 0 elsewhere."""
         return self._state(self._snapshot.visibility.cells())
 
     @functools.cached_property
     def power_sources(self) -> tuple[PowerSource, ...]:
-        """The fields that power structures and take warped in units, by ascending tags.
+        """The fields that power structures and allow warping in, by ascending tags.
 
-        The game may also tell of those that only hasten warping in, as a Nexus does.
+        The game may also list those that only speed up warping in, such as a Nexus.
         """
         found = (s for s in self._snapshot.power_sources if self._name(s.tag) in GIVE_POWER)
         return tuple(sorted(found, key=lambda source: source.tag))
@@ -185,7 +185,7 @@ class Land:
         return "" if unit is None else unit.name
 
     def powered(self, *, corner: bool, by: int | None = None) -> Bools:
-        """Return (w, h) in which cells a middle would be in a power field.
+        """Return the cells (w, h) where a structure's middle would be in a power field.
 
         Args:
             corner: whether the middle is the lower left corner of the cell, as of structures of 2 x 2, and not its
@@ -232,7 +232,7 @@ class Land:
 
     @functools.cached_property
     def halls(self) -> tuple[Unit, ...]:
-        """Every town hall that is known of, whoever's and also those under construction, by ascending tags."""
+        """Every known town hall of any player, also those under construction, by ascending tags."""
         return tuple(self.standing("town_hall"))
 
     @functools.cached_property
@@ -240,11 +240,11 @@ class Land:
         """The player's own town halls, finished or not, by ascending tags."""
         return tuple(unit for unit in self.halls if unit.is_own)
 
-    # --- what has to stay free --------------------------------------------------------------------------------
+    # --- cells that stay free --------------------------------------------------------------------------------
 
     @functools.cached_property
     def kept(self) -> Bools:
-        """(w, h) where nothing should be built unasked: ways of workers, places of town halls, room for add-ons."""
+        """(w, h): cells where the host builds nothing by itself: workers' ways, town hall places, room for add-ons."""
         kept = _lines(self.ground, self.bases, tuple((u.pos.x, u.pos.y) for u in self.own_halls)).copy()
         for _, footprint, unit in self._standing:
             site = sites().get(unit.name) if unit.is_own else None
@@ -259,7 +259,7 @@ def _covered(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
 
 
 def addon_place(structure: WorldPoint) -> WorldPoint:
-    """Return where the add-on of a structure stands."""
+    """Return the place of a structure's add-on."""
     return WorldPoint(structure.x + ADDON_OFFSET[0], structure.y + ADDON_OFFSET[1])
 
 
@@ -277,8 +277,8 @@ _last: list[tuple[Snapshot, Land]] = []
 
 
 def land_of(snapshot: Snapshot) -> Land:
-    """Return the land at the moment of a snapshot; all who ask about one of the last two share it."""
-    for known, land in _last[:]:  # a copy: other matches of the process may ask from other threads
+    """Return the land at the moment of a snapshot; cached for the last two snapshots."""
+    for known, land in _last[:]:  # a copy: other threads of the process may play other matches
         if known is snapshot:
             return land
     land = Land(snapshot)
@@ -288,7 +288,7 @@ def land_of(snapshot: Snapshot) -> Land:
 
 @functools.lru_cache(maxsize=8)
 def _lines(ground: MapGround, bases: tuple[Base, ...], halls: Places) -> Bools:
-    """Return (w, h) between town halls and their resources, and where town halls are going to stand."""
+    """Return the cells (w, h) between town halls and their resources, and around the places for town halls."""
     kept = np.zeros(ground.size, np.bool_)
     resources = [place for base in bases for place in (*base.fields, *base.geysers)]
     for place in dict.fromkeys((*(tuple(base.place) for base in bases), *halls)):
@@ -301,7 +301,7 @@ def _lines(ground: MapGround, bases: tuple[Base, ...], halls: Places) -> Bools:
 
 
 def _mark_way(kept: Bools, start: tuple[float, ...], end: WorldPoint) -> None:
-    """Marks the cells over which the way between two points is little longer than the straight one."""
+    """Mark the cells over which the way between two points is little longer than the straight one."""
     x0, x1 = sorted((int(start[0]), int(end.x)))
     y0, y1 = sorted((int(start[1]), int(end.y)))
     x0, y0 = max(x0 - 2, 0), max(y0 - 2, 0)

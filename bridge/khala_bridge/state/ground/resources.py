@@ -1,7 +1,7 @@
 """Resources of the map, and the places where a town hall gathers them best.
 
-A base place is where the game itself lets a town hall stand nearest to its resources: as far from each as the rings
-of their footprints ask, with the least sum of distances. So it is found on every map, without a list of places.
+A base place is the nearest place to its resources where the game allows a town hall: as far from each as the rings
+of their footprints demand, with the least sum of distances. So it is found on every map, without a list of places.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from khala_bridge.state.ground.terrain import Bools, Floats, MapGround
 
 SPREAD = 8.5
-"""Resources of one base lie at most so far from the next one; the usual figure of bots, an estimate."""
+"""Largest distance between neighbouring resources of one base; the usual figure of bots, an estimate."""
 SAME_LEVEL = 1.25
-"""Resources of one base differ by less in height, in world units; the same."""
+"""Difference in height that resources of one base stay below, in world units; also an estimate."""
 MIN_FIELDS = 3
 """A cluster with fewer mineral fields is an obstacle and no base."""
 REACH = 10
 """World units around a cluster within which its town hall stands."""
 KNOWN_START = 3.0
-"""A start location so near to a computed place is the place."""
+"""A start location within this distance of a computed place is the place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def base_places(ground: MapGround, fields: Places, geysers: Places, halls: Place
         ground: of the map.
         fields: middles of the mineral fields.
         geysers: middles of the geysers.
-        halls: where players begin; such a place is taken as it is.
+        halls: where players begin; such a place is used unchanged.
     """
     everything = np.array([*fields, *geysers], float).reshape(-1, 2)
     free = _free_of(ground, fields, geysers)
@@ -73,7 +73,7 @@ def base_places(ground: MapGround, fields: Places, geysers: Places, halls: Place
 
 
 def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]:
-    """Return indices of the places that hang together, each cluster in ascending order."""
+    """Return the clusters of neighbouring places as indices, each in ascending order."""
     if not len(places):
         return []
     level = np.array([ground.level(x, y) for x, y in places.tolist()])
@@ -91,7 +91,7 @@ def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]
 
 
 def _free_of(ground: MapGround, fields: Places, geysers: Places) -> Bools:
-    """Return (w, h) the middle cells on which a town hall would stand on free ground, clear of all resources."""
+    """Return the cells (w, h) in which the middle of a town hall would be on free ground, clear of all resources."""
     clear = ground.buildable.copy()
     for name, places in (("mineral_field", fields), ("geyser", geysers)):
         footprint = footprints()[name]
@@ -125,14 +125,14 @@ def mark(grid: Bools, cells: Cells, at: Sequence[tuple[int, int]], *, value: boo
 
 
 def coordinates(part: tuple[int, int], start: tuple[int, int] = (0, 0)) -> tuple[Floats, Floats]:
-    """Return (w, 1) and (1, h) the lower left corners of the cells of a part of a grid, which add up to its shape."""
+    """Return the lower left corners of the cells of a part of a grid: x as (w, 1) and y as (1, h)."""
     x = np.arange(start[0], start[0] + part[0], dtype=np.float32)
     y = np.arange(start[1], start[1] + part[1], dtype=np.float32)
     return x[:, None], y[None, :]
 
 
 def everywhere(grid: Bools, cells: Cells) -> Bools:
-    """Return (w, h) at which cells all of the cells (dx, dy) around hold; what lies beyond the grid does not."""
+    """Return the cells (w, h) around which all of the cells (dx, dy) are set; cells beyond the grid are not."""
     reach = max(max(abs(dx), abs(dy)) for dx, dy in cells)
     width, height = grid.shape
     padded = np.pad(grid, reach)

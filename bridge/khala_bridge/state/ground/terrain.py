@@ -1,7 +1,7 @@
-"""The ground of a map, as arrays: where one can build and walk, how high it is, where players may begin.
+"""The ground of a map, as arrays: buildable and walkable cells, heights, and possible starts of players.
 
-Grids are indexed `[x, y]` in cells of the world, y up, so that cell (x, y) is the square from x to x + 1. What stands
-on the ground at a moment is `khala_bridge.state.ground.land`'s. It knows no unit.
+Grids are indexed `[x, y]` in cells of the world, y up, so that cell (x, y) is the square from x to x + 1. It knows no
+unit; `khala_bridge.state.ground.land` has the things on the ground at a moment.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Floats: TypeAlias = NDArray[np.float32]
 HEIGHT_LOW, HEIGHT_STEP = -16.0, 32.0 / 255.0
 """World height of a byte of the terrain, z = -16 + 32 byte / 255, as the game's API has it."""
 SEED_REACH = 4
-"""Cells around a point from which ways begin: what stands on the point itself may be a structure."""
+"""Cells around a point from which ways begin: there may be a structure on the point itself."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,17 +32,17 @@ class MapGround:
     """The ground of one map; one object for all snapshots of an episode."""
 
     buildable: Bools
-    """(w, h) where the bare ground takes structures."""
+    """(w, h): cells where the bare ground takes structures."""
     walkable: Bools
-    """(w, h) where ground units walk, as far as no structure or resource stands there."""
+    """(w, h): cells where ground units can walk, if no structure or resource stands there."""
     height: Floats
-    """(w, h) height of the lower left corner of each cell, in world units."""
+    """(w, h): height of the lower left corner of each cell, in world units."""
     starts: tuple[WorldPoint, ...]
-    """Where other players may have begun."""
+    """Possible starts of other players."""
 
     @classmethod
     def of(cls, info: EpisodeInfo) -> MapGround:
-        """Return the ground of the map that a game is played on; remembered by the map's own grids."""
+        """Return the ground of an episode's map; cached by the map's own grids."""
         return _ground(info.size, info.playable, info.placement, info.pathing, info.height, info.starts)
 
     @property
@@ -51,20 +51,20 @@ class MapGround:
         return self.buildable.shape[0], self.buildable.shape[1]
 
     def holds(self, x: float, y: float) -> bool:
-        """Return whether a point lies on the grids."""
+        """Return True if a point is on the grids."""
         width, height = self.size
         return 0 <= x < width and 0 <= y < height
 
     def level(self, x: float, y: float) -> float:
-        """Return height of the ground at a point, in world units; that of the nearest cell outside of the map."""
+        """Return the height of the ground at a point, in world units; outside of the map, that of the nearest cell."""
         width, height = self.size
         return float(self.height[min(max(int(x), 0), width - 1), min(max(int(y), 0), height - 1)])
 
     def ways_from(self, point: WorldPoint) -> Floats:
-        """Return (w, h) how far ground units walk from a point to each cell; infinite where they cannot come.
+        """Return the distances (w, h) that ground units walk from a point to each cell; infinite if there is no way.
 
-        Around cliffs but through structures. Walked on the grid in turn with and without diagonal steps: up to a ninth
-        shorter than the way itself, and without the first `SEED_REACH` cells.
+        Ways go around cliffs but through structures. They alternate between grid steps with and without diagonals: up
+        to a ninth shorter than the real way, and without the first `SEED_REACH` cells.
         """
         return _ways(self, (int(point.x), int(point.y)))
 
@@ -84,7 +84,7 @@ def _ground(
     inside[x0:x1, y0:y1] = True
     built, walked, raised = (grid.cells() for grid in (placement, pathing, height))
     buildable = (empty if built is None else built).astype(np.bool_) & inside
-    # what stood there when the game began is not walkable in the game's grid, but the ground under it is
+    # the game's grid is not walkable under the structures of the start, but the ground there is
     walkable = ((empty if walked is None else walked).astype(np.bool_) & inside) | buildable
     levels = HEIGHT_LOW + HEIGHT_STEP * (empty if raised is None else raised).astype(np.float32)
     for array in (buildable, walkable, levels):
