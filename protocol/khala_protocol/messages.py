@@ -1,6 +1,6 @@
 """The messages, as frozen pydantic models with a literal `kind` each.
 
-They stand alone: this module imports no game, no bus, no model provider. Positions are in one of two frames,
+They stand alone: no game, no bus, no model provider is imported here. Positions are in one of two frames,
 x right and y down in both: *screen*, `[0, 24)` cells of one world unit around the centre of a team's
 (virtual) camera, and *minimap*, `[0, 64)`. The world frame never leaves the host.
 
