@@ -36,7 +36,7 @@ from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
 from khala_bridge.state.teams import Team, TeamRoster
 from khala_orchestrator.announce import Announcer
-from khala_orchestrator.brief import briefing
+from khala_orchestrator.cards import briefing
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Roster as Attendance
 from khala_orchestrator.roster import Seat

@@ -5,11 +5,10 @@ import itertools
 import json
 import logging
 import os
-import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -32,8 +31,8 @@ from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
+from khala_protocol.signals import cancelled_by_signal
 
-T = TypeVar("T")
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells expect it."""
@@ -265,7 +264,7 @@ def _until_interrupted(
     """Play with a live picture, print the results, and end in order on SIGINT and SIGTERM."""
     screen = stderr_console()
     with Progress(screen, config.task.max_steps) as progress:
-        results = asyncio.run(_cancelled_by_signals(play(progress)))
+        results = asyncio.run(cancelled_by_signal(play(progress)))
     if results is None:
         screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)
         raise typer.Exit(INTERRUPTED)
@@ -273,22 +272,3 @@ def _until_interrupted(
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-
-
-async def _cancelled_by_signals(work: Coroutine[Any, Any, T]) -> T | None:
-    """Return the result of `work`, or None if a signal ended it."""
-    task = asyncio.ensure_future(work)
-    told = asyncio.Event()
-
-    def tell() -> None:
-        told.set()
-        task.cancel()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, tell)
-    try:
-        return await task
-    except asyncio.CancelledError:
-        if told.is_set():
-            return None
-        raise

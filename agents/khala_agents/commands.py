@@ -10,7 +10,6 @@ import asyncio
 import gc
 import json
 import os
-import signal
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
@@ -25,6 +24,7 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
+from khala_protocol.signals import stop_on_signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
@@ -184,18 +184,7 @@ def _until_signal(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
     """Run `work` with an event that SIGINT and SIGTERM set; a second signal ends the process at once."""
 
     async def main() -> T:
-        stop = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        signals = (signal.SIGINT, signal.SIGTERM)
-
-        def tell() -> None:
-            stop.set()
-            for number in signals:
-                loop.remove_signal_handler(number)
-
-        for number in signals:
-            loop.add_signal_handler(number, tell)
-        return await work(stop)
+        return await work(stop_on_signal())
 
     return asyncio.run(main())
 

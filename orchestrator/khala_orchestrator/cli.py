@@ -5,7 +5,6 @@ A mistake of the user is raised as a `khala_protocol.errors.KhalaError` of one s
 
 import asyncio
 import json
-import signal
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +17,7 @@ from rich.text import Text
 from khala_orchestrator.config import all_tasks
 from khala_orchestrator.console import stderr_console
 from khala_protocol.bus.config import BusConfig
+from khala_protocol.signals import stop_on_signal
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")]
 Listen = Annotated[
@@ -131,9 +131,7 @@ async def _probe(endpoint: str) -> list[str]:
 async def _route(config: BusConfig, *, as_json: bool) -> None:
     from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415
 
-    stop, loop = asyncio.Event(), asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
+    stop = stop_on_signal()
     bus = await open_bus(config)
     try:
         _out({"endpoints": bus.endpoints}, f"router at {', '.join(bus.endpoints)}; Ctrl-C ends it", as_json=as_json)

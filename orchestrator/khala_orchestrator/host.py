@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
 from khala_orchestrator.announce import Announcer
-from khala_orchestrator.brief import run_card
+from khala_orchestrator.cards import run_card
 from khala_orchestrator.mailbox import Mailbox
 from khala_orchestrator.match import Match
 from khala_orchestrator.record import Listener, RecordingBus

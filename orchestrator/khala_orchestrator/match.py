@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 from khala_bridge.observe import Feedback
-from khala_orchestrator.brief import briefing
+from khala_orchestrator.cards import briefing
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.tally import Tally
 from khala_orchestrator.turn import Question

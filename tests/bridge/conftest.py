@@ -66,7 +66,7 @@ def make_snapshot(
     change: Change | None = None,
     **fields: Any,
 ) -> Snapshot:
-    """Return what a player sees: these units on a map of this size; `change` may add to the messages before they are read."""
+    """Return what a player sees: these units on a map of this size; `change` may add to the messages first."""
     response = sc_pb.ResponseObservation()
     observation = response.observation
     observation.game_loop = loop

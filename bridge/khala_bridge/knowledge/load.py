@@ -1,7 +1,8 @@
 """Load the knowledge of the game: the facts of a version, merged with the words about them, once on the first use.
 
-People write the words in `bridge/khala_bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above: every module
-that describes the game. Below: `facts`, which reads the generated files, and `words`, which fills in numbers.
+People write the words in `bridge/khala_bridge/data/knowledge/words/*.yaml`; their numbers are filled in here. Above:
+every module that describes the game. Below: `facts`, which reads the generated files, and `words`, which fills in
+numbers.
 """
 
 from __future__ import annotations

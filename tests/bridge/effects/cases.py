@@ -75,7 +75,7 @@ def cases() -> dict[str, Case]:
 
 
 def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> list[ParameterSet]:
-    """Return cases in lists by who is told, for tests with subtests: the first of each kind now, all others in the long tests.
+    """Return cases in lists by who carries them out: the first of each kind now, all others in the long tests.
 
     Args:
         chosen: whether the action of this name may stand for others.

@@ -236,7 +236,7 @@ def _usual_place(unit: UnitType) -> Point:
 
 
 def _eyes() -> Any:
-    """Return the part of PySC2 that reads observations and translates functions, as the game of the bridge asks for it."""
+    """Return the part of PySC2 that reads observations and translates functions, as the game asks for it."""
     interface_format = features.AgentInterfaceFormat(
         feature_dimensions=features.Dimensions(screen=128, minimap=64),
         camera_width_world_units=24,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def show(task: Callable[..., TaskConfig], snapshot: Snap, battle: list[raw_pb2.Unit]) -> Show:
-    """Return the pictures of the agent of 2s3z, whose teams are Zealot-1, Zealot-2 and Stalker-1, for these specifications."""
+    """Return the pictures of the agent of 2s3z, with the teams Zealot-1, Zealot-2 and Stalker-1."""
 
     def see(*specs: dict[str, Any], shown: Snapshot | None = None, name: str = "2s3z") -> tuple[Picture, ...]:
         config = task(name)

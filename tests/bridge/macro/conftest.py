@@ -101,7 +101,7 @@ class Game:
     # --- rules ------------------------------------------------------------------------------------------------
 
     def say(self, action: str, **given: Any) -> list[RuleOrder]:
-        """Return what the rule of an action answers; given are `units`, `tag` and `point`, as far as the words name them."""
+        """Return what the rule of an action answers; given are `units`, `tag` and `point`, if named."""
         found = catalogue()[action]
         assert found.rule is not None
         return RULES[found.rule](RuleRequest(found, self.snapshot, self.ledger, **given))

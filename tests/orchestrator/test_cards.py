@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.game.game import GameIdentity
 from khala_bridge.task.config import TaskConfig
-from khala_orchestrator.brief import briefing, run_card
+from khala_orchestrator.cards import briefing, run_card
 from khala_orchestrator.config import load_task
 from khala_protocol.messages import AgentCard, Clock, Contact, Frames, TeamSpec
 
