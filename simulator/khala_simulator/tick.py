@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
-    acquire.choose_targets,  # units choose targets by themselves
-    autocast.look_out,  # units use abilities by themselves
+    acquire.choose_targets,  # units choose their targets
+    autocast.look_out,  # units use abilities with autocast
     engagement.measure,  # which units are in reach of their target, and where each wants to walk
     power.run,  # which structures have power
     construction.run,  # what is being built

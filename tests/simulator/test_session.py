@@ -223,7 +223,7 @@ def _wide(width: float) -> sc.InterfaceOptions:
 @pytest.mark.parametrize(
     ("request_", "error", "details"),
     [
-        ({"options": interface()}, "MissingParticipation", "Say with which race to play, or whom to observe"),
+        ({"options": interface()}, "MissingParticipation", "Name the race to play, or the player to observe"),
         ({"race": 1}, "MissingOptions", "Say what to observe"),
         ({"observed_player_id": 1, "options": interface()}, "GameFull", "No place for an observer is free"),
         ({"observed_player_id": 3, "options": interface()}, "InvalidObservedPlayerId", "There is no player 3"),

@@ -54,7 +54,7 @@ def as_is(world: World, slot: int, ability: Ability) -> Ability:
 
 
 def prep_loops(world: World, slot: int, ability: Ability) -> float:
-    """Loops between a unit's readiness to use an ability and its effect; a morph takes its time before it."""
+    """Return the loops between a unit's readiness to use an ability and its effect; a morph's time comes before it."""
     ability = as_is(world, slot, ability)
     loops = ability.intro_loops + ability.prep_loops
     if ability.effect not in MORPHS:

@@ -120,7 +120,7 @@ def _turning(world: World, slot: int, unit: UnitType) -> None:
 
 
 def _braking(unit: UnitType) -> float:
-    """Speed lost per loop; a type without a deceleration of its own brakes as it accelerates (an estimate)."""
+    """Return the speed lost per loop; a type without its own deceleration brakes as it accelerates (an estimate)."""
     rate_n = unit.deceleration_n or unit.acceleration_n
     return math.inf if not 0.0 < rate_n < INSTANT_ACCELERATION_N else rate_n / LOOPS_PER_NORMAL_SECOND**2
 

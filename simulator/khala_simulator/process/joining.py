@@ -95,7 +95,7 @@ def _failure(error: _JoinError.ValueType, details: str) -> Failure:
 
 def _check(request: sc.RequestJoinGame) -> None:
     if request.WhichOneof("participation") is None:
-        raise _failure(_JoinError.MissingParticipation, "Say with which race to play, or whom to observe")
+        raise _failure(_JoinError.MissingParticipation, "Name the race to play, or the player to observe")
     if not request.HasField("options"):
         raise _failure(_JoinError.MissingOptions, "Say what to observe")
     if problem := size_problem(request.options):

@@ -71,7 +71,7 @@ def decode(data: bytes, members: frozenset[int]) -> Commit | Leave:
     try:
         fields: dict[str, Any] = json.loads(head)
         if (member := int(fields["member"])) not in members:
-            raise LockstepError(f"somebody speaks in the name of member {member}")
+            raise LockstepError(f"another process sends as member {member}")
         if "leaves" in fields:
             return Leave(member, int(fields["leaves"]))
         digests = {int(loop): str(digest) for loop, digest in fields["digests"].items()}

@@ -168,7 +168,7 @@ def _can_stand(world: World, unit: UnitType, point: Point) -> bool:
 
 
 def _gap_to(world: World, name: str, point: Point) -> float:
-    """Distance from a point to the nearest unit of a type, centre to centre; infinite without one."""
+    """Return the distance from a point to the nearest unit of a type, centre to centre; infinite without one."""
     others = world.live[world.type[world.live] == world.catalog.unit(name).row]
     if not others.size:
         return math.inf

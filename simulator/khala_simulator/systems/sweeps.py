@@ -77,7 +77,7 @@ def _draw(world: World, sweep: Sweep) -> None:
 
 
 def _delay(line: records.SweepRecord, point: int) -> float:
-    """Loops from the damage point until a point of the line touches."""
+    """Return the loops from the damage point until a point of the line touches."""
     return line.points[point][0] - line.lag_loops
 
 

@@ -73,7 +73,7 @@ class Damage:
     bonus: tuple[tuple[int, float], ...]
 
     def against(self, attributes: int) -> float:
-        """Damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
+        """Return the damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
         return self.amount + max((value for bit, value in self.bonus if attributes & bit), default=0.0)
 
 

@@ -47,7 +47,7 @@ class Spread:
 
 @lru_cache(maxsize=4)
 def spreads(version: str) -> dict[str, Spread]:
-    """Return unit type's name -> how creep spreads from it, in a game version."""
+    """Return how creep spreads in a game version, by the unit type's name."""
     path = resources.files("khala_simulator.data") / "tables" / version / "creep.json"
     table = json.loads(path.read_text(encoding="utf-8"))
     masks = {row["id"]: _cells(row["area"], row["rows"]) for row in table["masks"]}
@@ -104,7 +104,7 @@ class Creep:
         self._count: NDArray[np.int32] = np.zeros(terrain.walk.shape, dtype=np.int32)
 
     def add(self, tag: int, unit: str, cell: tuple[int, int], loop: int, *, grown: bool) -> None:
-        """Add a source from which creep spreads, or one that has all its creep already."""
+        """Add a new source of creep, or one that already has all its creep."""
         spread = self.spreads[unit]
         source = CreepSource(tag, unit, cell, 0, loop + spread.period_loops)
         self.sources.append(source)
@@ -141,5 +141,5 @@ class Creep:
         return bool(self.covered[row, column])
 
     def content(self) -> bytes:
-        """Everything that decides the future, for the digest of the world."""
+        """Return everything that decides the future, for the digest of the world."""
         return repr((self.sources, self.waiting, self.looked_at, self.due)).encode()

@@ -61,8 +61,8 @@ def test_a_message_survives_the_wire(message: Commit | Leave) -> None:
         (b"[]\n", "not a message of a game over several processes: "),
         (b'{"member": 1}\n', "not a message of a game over several processes: "),
         (b'{"member": 1, "through": 8, "digests": {}}\nxyz', "not a message of a game over several processes: "),
-        (Commit(4, 8).encode(), "somebody speaks in the name of member 4"),
-        (Leave(4, 8).encode(), "somebody speaks in the name of member 4"),
+        (Commit(4, 8).encode(), "another process sends as member 4"),
+        (Leave(4, 8).encode(), "another process sends as member 4"),
     ],
 )
 def test_what_is_no_message_says_so(data: bytes, text: str) -> None:

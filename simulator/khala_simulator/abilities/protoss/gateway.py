@@ -191,7 +191,7 @@ SKILLS: Final = {
         _charge,
         refuse=_cant_charge,
         pick=_prey,
-        estimates=("A Zealot that is told to charge somebody farther away than 4 is refused.",),
+        estimates=("An order to charge a unit farther away than 4 is refused.",),
     ),
     "adept_phase_shift": Skill(
         _phase_shift, estimates=("The shade shows the Adept's life and shields of the moment at which it came.",)

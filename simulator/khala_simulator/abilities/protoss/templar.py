@@ -131,9 +131,7 @@ def _cant_merge(world: World, cast: Cast) -> ActionResult:
 SKILLS: Final = {
     "psi_storm": Skill(_psi_storm),
     "feedback": Skill(_feedback, refuse=_cant_feed_back),
-    "merge": Skill(
-        _pair, estimates=("Of several Templars told to merge each takes the nearest other one as its partner.",)
-    ),
+    "merge": Skill(_pair, estimates=("If several Templars merge, each takes the nearest other one as its partner.",)),
     "merge_with": Skill(
         _fuse,
         refuse=_cant_merge,

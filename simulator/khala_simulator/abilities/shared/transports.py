@@ -318,8 +318,8 @@ SKILLS: Final = {
         give=_told_to_load,
         refuse=_cant_load,
         estimates=(
-            "Somebody who walks to a carrier gets in when he is within 1.1 of it, or within its pickup range.",
-            "What is loaded does so at once, and the first passenger comes out at once; then one per period.",
+            "A unit that walks to a carrier gets in when it is within 1.1 of it, or within its pickup range.",
+            "Loading takes no time, and the first passenger comes out at once; then one per period.",
         ),
     ),
     "load_all": Skill(_load_all, refuse=_nobody_to_load),

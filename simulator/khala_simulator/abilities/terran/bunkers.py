@@ -103,7 +103,7 @@ SKILLS: Final = {
         give=_told_to_shoot,
         refuse=_nobody_reaches,
         ready=_anybody_armed,
-        estimates=("A Bunker is refused a target that nobody in it reaches.",),
+        estimates=("A Bunker refuses a target that no unit in it reaches.",),
     ),
     "redirect_stop": Skill(_cease, ready=_anybody_armed),
     "redirect_stim": Skill(_stim, ready=_anybody_fit),

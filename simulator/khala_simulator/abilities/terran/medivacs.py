@@ -92,7 +92,7 @@ SKILLS: Final = {
         pick=_pick,
         estimates=(
             "Healing is given evenly in every loop.",
-            "A Medivac follows whom it heals at half the range at which it begins.",
+            "A Medivac follows the unit that it heals at half the range at which it begins.",
         ),
     ),
     "medivac_speed_boost": Skill(_ignite),
