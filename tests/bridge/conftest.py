@@ -27,7 +27,7 @@ TASKS = Path(__file__).resolve().parents[2] / "configs" / "tasks"
 
 
 def make_unit(tag: int, name: str, x: float, y: float, **fields: Any) -> raw_pb2.Unit:
-    """Return a unit of one's own at full health, except for what is given."""
+    """Return an own unit at full health, with the given changes."""
     known = knowledge().get(name)
     alliance = {"own": raw_pb2.Self, "ally": raw_pb2.Ally, "enemy": raw_pb2.Enemy, "neutral": raw_pb2.Neutral}
     unit = raw_pb2.Unit(
@@ -66,7 +66,7 @@ def make_snapshot(
     change: Change | None = None,
     **fields: Any,
 ) -> Snapshot:
-    """Return what a player sees: these units on a map of this size; `change` may add to the messages first."""
+    """Return a snapshot: these units on a map of this size; `change` may edit the messages before they are read."""
     response = sc_pb.ResponseObservation()
     observation = response.observation
     observation.game_loop = loop
@@ -101,7 +101,7 @@ def snapshot() -> Callable[..., Snapshot]:
 
 @pytest.fixture
 def task() -> Callable[..., TaskConfig]:
-    """Return a shipped task by name, or the one that is made for a map, with other fields where some are given."""
+    """Return a shipped task by name, or the standard task of a map, with the given changes."""
 
     def get(name: str = "2s3z", **changed: Any) -> TaskConfig:
         file = TASKS / "llm_smac" / f"{name}.yaml"
@@ -126,7 +126,7 @@ def golden() -> Callable[[str, str], None]:
 
 @pytest.fixture
 def battle() -> list[raw_pb2.Unit]:
-    """Return a 2s3z in the middle of its fight: every kind of line that a text can have is in it."""
+    """Return a snapshot of 2s3z in the middle of its fight, which leads to every kind of line in a text."""
     return [
         make_unit(0x100040001, "Stalker", 10, 16, weapon_cooldown=14.0, orders=(3674,)),
         make_unit(0x100080001, "Stalker", 11.5, 17, health=61, shield=0, energy=0),
@@ -160,5 +160,5 @@ TEAMS = {  # table D3 of the paper: how many units each team has to begin with
 
 @pytest.fixture
 def paper_teams() -> dict[str, dict[str, int]]:
-    """Return by task and team: how many units the team has to begin with."""
+    """Return the initial number of units of each team, by task and team."""
     return TEAMS

@@ -1,4 +1,4 @@
-"""Words → commands: what is understood, what is refused and in which words."""
+"""Words → commands: calls that are understood, calls that are refused, and the words of refusals."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_only_the_units_that_can_do_it_are_told_to(act: Callable[..., JointActio
             ["<Select_Unit_Move_Screen(0x100040001, [12, 12])>", "<Select_Unit_Move_Screen(0x100080001, [12, 12])>"],
             [((S1,), False), ((S2,), False)],
         ),
-        (  # who has an order already waits, the rest of the team begins at once
+        (  # a unit with an order waits, the rest of the team begins at once
             ["<Select_Unit_Move_Screen(0x100040001, [12, 12])>", "<Attack_Unit(0x100180001)>"],
             [((S1,), False), ((S2,), False), ((S1,), True)],
         ),

@@ -1,4 +1,4 @@
-"""Whom a call speaks to, and what becomes of actions whose orders a rule of the host finds."""
+"""The addressee of a call, and the results of actions whose orders a rule of the host finds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The catalogue is checked while it is read, and whoever writes an action is told what is wrong, and where."""
+"""Reading checks the catalogue; errors say what is wrong with an action, and where."""
 
 from __future__ import annotations
 

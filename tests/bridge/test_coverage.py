@@ -26,7 +26,7 @@ def in_pysc2(name: str | None) -> Any:
 
 
 def raw_kinds(ability: int) -> set[str]:
-    """Return what PySC2's raw functions of an ability take: `pt`, `unit`, `quick`, `autocast`."""
+    """Return the kinds of PySC2's raw functions of an ability: `pt`, `unit`, `quick`, `autocast`."""
     kinds = {each.function_type.__name__ for each in pysc2.RAW_FUNCTIONS if each.ability_id == ability}
     return {kind.removeprefix("raw_").removeprefix("cmd_").replace("cmd", "quick") for kind in kinds}
 

@@ -40,7 +40,7 @@ Team Stalker-1:
 
 
 class Table:
-    """A game on a table: it shows where the camera is and who is selected, and nothing moves."""
+    """A game on a table: it has a camera and a selection, and nothing moves."""
 
     def __init__(self, unit: Make, snapshot: Snap, **fields: Any) -> None:
         self._unit, self._snapshot, self._fields = unit, snapshot, fields
@@ -55,7 +55,7 @@ class Table:
         """Whether the camera stays where it is, as at the edge of a map."""
 
     def put(self, tag: int, kind: str, x: float, y: float, **traits: Any) -> int:
-        """Return one more unit."""
+        """Add a unit, and return its tag."""
         self.places[tag], self.types[tag], self.traits[tag] = (x, y), kind, traits
         return tag
 

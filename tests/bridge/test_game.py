@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class FakeGame:
-    """A game that lets loops pass, or hangs until it is killed."""
+    """A game that counts loops, or hangs until it is killed."""
 
     def __init__(self, snapshot: Callable[..., Snapshot], *, hangs: bool = False) -> None:
         self._snapshot = snapshot
@@ -138,7 +138,7 @@ class StubEnv:
 
 
 def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[StepResult, ...]]:
-    """Play plans of two players that return how many steps they took."""
+    """Play plans of two players, which return their numbers of steps."""
 
     def plan(steps: list[PlanStep]) -> Plan:
         for step in steps:

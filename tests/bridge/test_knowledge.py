@@ -1,4 +1,4 @@
-"""What is known of the game: names and numbers are PySC2's, facts those of the game's tables."""
+"""Knowledge of the game: names and numbers are PySC2's, facts those of the game's tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written about the game: complete, with its numbers filled in, and without contradictions."""
+"""The words about the game: complete, with their numbers filled in, and without contradictions."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ ENEMY = re.compile(r"\| tag (0x[0-9a-f]+) \| screen \S+ \S+ \| distance \S+ \| h
 
 
 def focus_fire(text: str) -> str:
-    """Return every team attacks the weakest enemy on its screen."""
+    """Return a reply in which every team attacks the weakest enemy on its screen."""
     lines = ["Actions:"]
     for name, block in TEAM.findall(text):
         enemies = [(int(health) + int(shield), tag) for tag, health, shield in ENEMY.findall(block)]

@@ -1,8 +1,8 @@
 """Every text action of the paper is there, with its arguments, unit types and function.
 
 `golden/paper_actions.tsv` holds the 161 names of the paper's tables B1 to B10 and of its first implementation: name,
-arguments, function, unit types, other spellings; the tables' slips corrected as bridge/khala_bridge/data/SOURCES.md
-tells.
+arguments, function, unit types, other spellings; bridge/khala_bridge/data/SOURCES.md lists the corrected slips of the
+tables.
 """
 
 from __future__ import annotations

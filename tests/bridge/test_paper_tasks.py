@@ -1,4 +1,4 @@
-"""The shipped tasks of the paper: who plays the 33 maps and the full games, and who may talk to whom."""
+"""The shipped tasks of the paper: the agents of the 33 maps and the full games, and which of them may talk."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from khala_bridge.task.maps import known_maps
 from khala_orchestrator.config import load_task
 
-CASTS = {  # of each task: agents, and the types of units that they lead, besides what later levels of a game bring
+CASTS = {  # of each task: agents, and the types of units that they lead, without those of later levels of a game
     1: {"CombatGroup7": {"Adept"}},
     2: {"CombatGroup8": {"Phoenix"}},
     3: {"CombatGroup1": {"Stalker"}},

@@ -1,4 +1,4 @@
-"""What a team sees: positions, who is on its screen, what it may do, what happened."""
+"""What a team sees: positions, the units on its screen, its possible actions, events."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_an_agent_without_units_sees_nothing(snapshot: Snap, task: Task) -> None
     [
         ({}, {"health": 60}, [("hurt", "own", 20)]),
         ({"shield": 10}, {"shield": 13.5}, [("healed", "own", 3.5)]),
-        ({"shield": 10}, {"shield": 10.9}, []),  # less than one point is no event
+        ({"shield": 10}, {"shield": 10.9}, []),  # a change of less than one point makes no event
         ({}, {}, []),
     ],
 )

@@ -1,4 +1,4 @@
-"""Task files: the shipped ones are right, and a wrong one is told where and why."""
+"""Task files: the shipped ones are right, and errors in a wrong one say where and why."""
 
 from __future__ import annotations
 

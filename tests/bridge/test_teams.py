@@ -1,4 +1,4 @@
-"""Which unit answers to which agent and team."""
+"""The agent and the team of each unit."""
 
 from __future__ import annotations
 
@@ -159,13 +159,13 @@ def test_a_side_team_has_no_units_and_is_always_there() -> None:
 NUMBERS = {
     member.name: int(member) for race in (pysc2_units.Protoss, pysc2_units.Terran, pysc2_units.Zerg) for member in race
 }
-"""Unit types as the game counts them, forms among them that `knowledge` need not know."""
+"""Unit types as the game counts them, with forms that `knowledge` need not have."""
 
 
 def followed(
     agents: list[AgentConfig], *moments: dict[int, str], at: dict[int, float] | None = None
 ) -> list[dict[int, str]]:
-    """Return agent and team of every unit at each moment; a moment says of what type the units are then."""
+    """Return the agent and team of every unit at each moment; a moment holds the present types of the units."""
     roster = TeamRoster(agents)
     found: list[dict[int, str]] = []
     for moment in moments:

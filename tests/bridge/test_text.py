@@ -44,7 +44,7 @@ FEEDBACK = Feedback(
 
 @pytest.fixture
 def page(task: Task, snapshot: Snap) -> Callable[..., str]:
-    """Return the text that one agent of a task gets for the last of some armies."""
+    """Return the text of one agent of a task for the last of some armies."""
 
     def write(name: str, agent: str, *armies: list[raw_pb2.Unit], feedback: Feedback | None = None, **info: Any) -> str:
         observer = Observer(task(name))

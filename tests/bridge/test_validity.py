@@ -1,4 +1,4 @@
-"""What the game allows whom, and the words for why it does not: one row for each reason."""
+"""Which units the game allows an action, and the words for its reasons against it: one row for each reason."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BLINK, STORM = 87, 52
 
 @dataclass
 class Scene:
-    """Three units of one type that may be told everything that fits it, enemies, and what the game says of them."""
+    """Three units of one type with every action that fits it, enemies, and the game's answers about the units."""
 
     unit_type: str
     able: tuple[str, ...] = ()
@@ -215,7 +215,7 @@ def test_a_place_has_to_be_in_sight_where_the_game_wants_it(
     assert [message for _, message in told(joint)] == [words] * len(refused)
 
 
-# --- who of a team does it ---------------------------------------------------------------------------------------
+# --- which unit of a team does it --------------------------------------------------------------------------------
 
 
 def test_only_those_that_can_do_it_now_are_told_to(

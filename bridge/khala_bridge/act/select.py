@@ -78,7 +78,7 @@ class Hand:
             yield from self._tour.function("select_control_group", "set", group)
             self._groups[group] = selected
 
-    # --- the state -------------------------------------------------------------------------------------------
+    # --- the state --------------------------------------------------------------------------------------------
 
     @property
     def _selected(self) -> frozenset[int]:

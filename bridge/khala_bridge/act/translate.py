@@ -161,7 +161,7 @@ class Translator:
             case _:
                 return [RuleOrder(function, able, self._targets.place(said))]
 
-    # --- units --------------------------------------------------------------------------------------------------
+    # --- units ------------------------------------------------------------------------------------------------
 
     def _units(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that a call means, as far as they exist."""

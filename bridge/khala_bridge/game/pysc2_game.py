@@ -75,7 +75,7 @@ class PySC2Game:
         return self._info
 
     def reset(self) -> tuple[Snapshot, ...]:
-        """Begin an episode, and waits for the map's script to place its units."""
+        """Begin an episode, and wait for the map's script to place its units."""
         with _explained("a new episode could not be begun"):
             if self._config.seed is not None:
                 # `SC2Env` would begin every episode with the same seed, and has no parameter for another one

@@ -1,4 +1,4 @@
-"""One case for each text action: on which stage, and which words a model could say there."""
+"""One case for each text action: its stage, and the words that a model could say there."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 AGENT = "Agent"
 ANYBODY = ("Stalker",)
-"""Who is told what every type can be told."""
+"""Type that gets the actions of every type."""
 SUCCESS = 1
 CASTERS = {
     "Cancel": "VoidRay",
@@ -43,16 +43,16 @@ CASTERS = {
     "Rally_Units": "Barracks",
     "Scan_Move": "Medivac",
 }
-"""Who is told what too many could be told for the first of them to be the right one; by the stem of the function."""
+"""Type for actions that many types have and the first of them does not fit; by the stem of the function."""
 BASE_PLACE = (46.0, 46.0)
 """Beside resources where nobody has a base."""
 NEARBY = ((0.0, 0.0), (0.1, 0.1), (-0.1, -0.1))
-"""A click may be off by half a pixel; what stands on a grid is to stand on the same cells then."""
+"""A click may be off by half a pixel; structures on a grid must then stand on the same cells."""
 TOWN_HALLS = frozenset({"Nexus", "CommandCenter", "Hatchery"})
 
 
 class Case(NamedTuple):
-    """A text action, and who is told it where and after what."""
+    """A text action, with the type that gets it, its place and its preparation."""
 
     action: Action
     caster: str
@@ -62,24 +62,24 @@ class Case(NamedTuple):
 
     @property
     def stage(self) -> tuple[object, ...]:
-        """What the stage is made of: cases with the same can share it."""
+        """The parameters of the stage: cases with the same ones can share it."""
         return self.caster, self.prepare, self.race, self.place
 
 
 @functools.cache
 def cases() -> dict[str, Case]:
-    """Return by name of the action, those of one stage side by side."""
+    """Return the cases by the name of the action, those of one stage side by side."""
     found = [case_of(action) for action in catalogue().values()]
     found.sort(key=lambda case: (case.caster, case.race, case.place or (), getattr(case.prepare, "__qualname__", "")))
     return {case.action.name: case for case in found}
 
 
 def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> list[ParameterSet]:
-    """Return cases in lists by who carries them out: the first of each kind now, all others in the long tests.
+    """Return cases in lists by caster, for tests with subtests: the first of each kind now, all others in long tests.
 
     Args:
         chosen: whether the action of this name may stand for others.
-        first: what is its kind.
+        first: returns its kind.
     """
     now: dict[str, list[Case]] = {}
     later: dict[str, list[Case]] = {}
@@ -95,7 +95,7 @@ def by_caster(chosen: Callable[[str], bool], first: Callable[[str], object]) -> 
 
 
 def case_of(action: Action) -> Case:
-    """Return who is told it: the first of its types that has the ability on the simulator."""
+    """Return the case of an action, for the first of its types that has the ability on the simulator."""
     race = action.race or "protoss"
     place = BASE_PLACE if action.rule in {"build_near", "lock_base"} and action.produces in TOWN_HALLS else None
     place = BASE_PLACE if action.rule == "lock_base" else place
@@ -122,7 +122,7 @@ def _ability(action: Action, unit: str) -> Ability | None:
 
 
 def task_of(case: Case) -> TaskConfig:
-    """Return a task of one agent whose units may be told this one thing."""
+    """Return a task of one agent whose units have this one action."""
     name = case.action.name
     if case.action.subject == "side":
         teams = (TeamConfig(name="Side", kind="side", actions=(name,)),)
@@ -170,7 +170,7 @@ def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObs
 
 
 def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
-    """Return units around the one that is told: first those at which the simulator lets it aim, then the others."""
+    """Return the units around the caster: first those that the simulator accepts as targets, then the others."""
     here = snapshot.units[stage.caster].pos
     whose = {"enemy": (Alliance.ENEMY,), "own": (Alliance.OWN,)}.get(action.target or "", tuple(Alliance))
     near = [
@@ -185,7 +185,7 @@ def _tags(action: Action, stage: Stage, snapshot: Snapshot) -> list[int]:
 
 
 def _points(action: Action, stage: Stage) -> Iterator[WorldPoint]:
-    """Yield places around the one that is told at which the simulator lets it aim, in steps of half a unit."""
+    """Yield the places around the caster that the simulator accepts as targets, in steps of half a unit."""
     x, y = stage.world.pos[stage.world.slot_of(stage.caster)].tolist()
     steps = range(-22, 23)
     points = [WorldPoint(math.floor(x) + dx / 2, math.floor(y) + dy / 2) for dx in steps for dy in steps]
@@ -215,7 +215,7 @@ def _may(action: Action, stage: Stage, *, target: int = 0, point: WorldPoint | N
 
 
 def its_own(words: frozenset[str], action: Action) -> frozenset[str]:
-    """Return the words that speak of this action: its order and what came of it, not where somebody walks meanwhile."""
+    """Return the words about this action: its order and its effects, not the walks of units meanwhile."""
     own = order_name(action.pysc2.ability_id) if action.pysc2 else ""
     if own == "Smart":  # becomes whatever a right click would
         return words

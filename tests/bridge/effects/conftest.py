@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .cases import Case
 
 KEPT = 8
-"""Stages that are kept at a time; the cases are in the order of their stages."""
+"""Number of stages in the cache; the cases are in the order of their stages."""
 
 
 @pytest.fixture(scope="session")

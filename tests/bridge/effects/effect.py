@@ -1,4 +1,4 @@
-"""What an order changed: two observations of the same moment, one of a game in which it was given, compared in words.
+"""The effect of an order: compares, in words, observations of the same moment in games with and without the order.
 
 A word names a kind of change and no amount, so that two ways to play the same decision can be compared: `Stalker
 order Effect_Blink`, `new Zealot`, `Ghost buff GhostCloak`, `minerals`.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
 
 MOVED = 0.3
-"""World units that a unit has to be off its place to count as moved."""
+"""World units from its place at which a unit counts as moved."""
 _GAUGES = {"health": 0.5, "shield": 0.5, "energy": 0.5, "build_progress": 0.0005, "mineral_contents": 0.5,
            "vespene_contents": 0.5, "cargo_space_taken": 0.5, "assigned_harvesters": 0.5}  # fmt: skip
 _TRAITS: dict[str, Callable[[raw_pb2.Unit], object]] = {
@@ -54,13 +54,13 @@ class Seen(NamedTuple):
 
     snapshot: Snapshot
     response: sc.ResponseObservation
-    """What the snapshot was read from; it tells more of a unit than anybody else wants to know."""
+    """The message of the snapshot; it has more about a unit than other code needs."""
     autocast: Mapping[int, frozenset[int]]
-    """By tag of a unit, what it does without being told; the API does not show it, the simulator's world does."""
+    """By tag of a unit, what it does without orders; the API does not show it, the simulator's world does."""
 
 
 def changes(idle: Seen, told: Seen) -> frozenset[str]:
-    """Return what is another in a game in which an order was given than in the same game without it."""
+    """Return the differences between a game with an order and the same game without it."""
     before, after = _units(idle), _units(told)
     both = sorted(before.keys() & after.keys())
     found = {word for tag in both for word in _of_unit(before[tag], after[tag])}
@@ -71,7 +71,7 @@ def changes(idle: Seen, told: Seen) -> frozenset[str]:
 
 
 def kinds(words: frozenset[str]) -> frozenset[str]:
-    """Return the words that do not depend on the very moment: orders, types, buffs, traits, who comes and who goes."""
+    """Return the words that do not depend on the exact moment: orders, types, buffs, traits, new and lost units."""
     return frozenset(word for word in words if not (word in _PURSE or any(g in word for g in _OF_THE_MOMENT)))
 
 
@@ -86,7 +86,7 @@ def _name(unit: raw_pb2.Unit) -> str:
 
 
 def _more(some: Mapping[int, raw_pb2.Unit], others: Mapping[int, raw_pb2.Unit]) -> Iterable[str]:
-    """Return names of units of which there are more."""
+    """Return the names of units whose number has grown."""
     return Counter(map(_name, some.values())) - Counter(map(_name, others.values()))
 
 
@@ -117,7 +117,7 @@ def _rounded(point: common_pb2.Point) -> tuple[int, int]:
 
 
 def _of_card(name: str, tag: int, idle: Seen, told: Seen) -> Iterator[str]:
-    """Yield what it does without being told, and what it can be told, where nothing else shows a change."""
+    """Yield changes of what it does without orders and of its possible orders, if nothing else shows a change."""
     for ability in idle.autocast.get(tag, frozenset()) ^ told.autocast.get(tag, frozenset()):
         yield f"{name} autocast {order_name(ability)}"
     can = (seen.snapshot.abilities or {} for seen in (idle, told))

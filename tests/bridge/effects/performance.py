@@ -1,4 +1,4 @@
-"""A text action performed: from a model's words to what they changed in the game."""
+"""The performance of a text action: from a model's words to their effect in the game."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
 LOOPS, LONGER = 8, 40
 """Loops after the order when an effect is looked for, and after which it is looked for again if there is none."""
 SAID, PLAYED = 60, 4
-"""How many replies are tried until one is taken, and how many that are taken until one has an effect."""
+"""Number of replies to try until one is accepted, and of accepted ones until one has an effect."""
 
 
 class Performance(NamedTuple):
-    """What came of the words."""
+    """The result of the words."""
 
     text: str
     """The last reply that was tried."""
     words: frozenset[str]
-    """What it changed; nothing if it had no effect of its own."""
+    """Its changes; empty if it had no effect of its own."""
     refusals: tuple[str, ...]
-    """Why others were not taken."""
+    """Why others were refused."""
     accepted: bool
-    """Whether the last reply was an action of the catalogue that may be done."""
+    """Whether the last reply was a possible action of the catalogue."""
 
 
 def perform(case: Case, stage: Stage, executor: Executor, said: str | None = None) -> Performance:
-    """Say it in the ways that the stage offers, until one of them has an effect; or only as it was `said` before."""
+    """Try the replies that the stage offers until one has an effect; or only the one that was `said` before."""
     task, seen = task_of(case), stage.again()
     sight = Observer(task).observe(seen.snapshot)
     refusals: list[str] = []
@@ -63,7 +63,7 @@ def perform(case: Case, stage: Stage, executor: Executor, said: str | None = Non
 
 
 def _play(case: Case, stage: Stage, plan: Plan) -> tuple[frozenset[str], list[str]]:
-    """Return what a plan changed, if something of it is the action's own doing, and what was refused."""
+    """Return the changes of a plan, if some are the action's own, and the refusals."""
     played, loops = stage.play(plan)
     for more in (LOOPS, LONGER):
         seen, loops = stage.look(stage.client.step(more)), loops + more

@@ -1,6 +1,6 @@
-"""What has to be the case before a unit can use an ability: by the rule of the simulator that carries the ability out.
+"""Preparations for the use of an ability: by the rule of the simulator that carries the ability out.
 
-Each preparation is a function of the world and of the unit's slot, and lets some loops pass where it has to.
+Each preparation is a function of the world and of the unit's slot, and advances the world by some loops if it must.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     Preparation = Callable[[World, int], None]
 
 FOE = "Roach"
-"""What is fought and aimed at, where it has to be an enemy."""
+"""Type of the enemy for attacks and other uses against enemies."""
 LONG = 1.0e6
 
 
 def prepare_for(caster: str, ability: Ability) -> Preparation | None:
-    """Return what has to happen before a unit of this type can use an ability; None for nothing."""
+    """Return the preparation of a unit of this type for an ability; None if it needs none."""
     if ability.effect in {"cancel", "cancel_growth", "cancel_morph"}:
         return _begin(ability.link, ability.effect)
     if (caster, ability.effect) in OF_UNIT:
@@ -39,23 +39,23 @@ def prepare_for(caster: str, ability: Ability) -> Preparation | None:
     return PREPARE.get(ability.effect)
 
 
-# --- what the unit does already -----------------------------------------------------------------------------------
+# --- the unit's own state -----------------------------------------------------------------------------------------
 
 
 def _walk(world: World, slot: int) -> None:
-    """On its way somewhere."""
+    """Send it on its way somewhere."""
     x, y = world.pos[slot].tolist()
     commands.move(world, [slot], (x, y + 9.0))
     advance(world, 4)
 
 
 def _bear(*names: str) -> Preparation:
-    """Return under the first of these buffs that the version has."""
+    """Return a preparation that applies the first of these buffs that the version has."""
     return lambda world, slot: buffs.apply(world, slot, next(n for n in names if n in world.catalog.buff_of_name))
 
 
 def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
-    """Return just after another ability, at an enemy or beside itself."""
+    """Return a preparation that uses another ability, at an enemy or beside the unit."""
 
     def prepare(world: World, slot: int) -> None:
         ability = world.catalog.ability(number)
@@ -70,7 +70,7 @@ def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
 
 @functools.cache
 def _begin(link: str, does: str) -> Preparation:
-    """Return in the middle of the morph or add-on that an ability calls off, or else in the making itself."""
+    """Return a preparation that begins the morph or add-on that an ability cancels, or else the unit's construction."""
 
     def prepare(world: World, slot: int) -> None:
         name = world.unit_type(slot).name
@@ -100,7 +100,7 @@ def _in_the_making(world: World, slot: int) -> None:
 
 
 def _at_work(world: World, slot: int) -> None:
-    """An SCV that builds something, or a structure that an SCV builds."""
+    """Make it an SCV that builds something, or a structure that an SCV builds."""
     x, y = world.pos[slot].tolist()
     site = slot
     if world.unit_type(slot).worker:
@@ -113,7 +113,7 @@ def _at_work(world: World, slot: int) -> None:
 
 
 def _queue(world: World, slot: int) -> None:
-    """Something in the queue, twice."""
+    """Put something into its queue, twice."""
     for _ in range(2):
         production.enqueue(world, slot, world.catalog.ability(1006), makes="Probe", loops=2000.0)
 
@@ -126,7 +126,7 @@ def _hungry(world: World, slot: int) -> None:
     world.energy[slot] = 10.0
 
 
-# --- who else is there --------------------------------------------------------------------------------------------
+# --- other units --------------------------------------------------------------------------------------------------
 
 
 def _foe(world: World, point: Point) -> int:
@@ -136,13 +136,13 @@ def _foe(world: World, point: Point) -> int:
 
 
 def _fill(world: World, slot: int) -> None:
-    """A passenger in the carrier."""
+    """Put a passenger into the carrier."""
     passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, tuple(world.pos[slot].tolist()))
     world.stow(passenger, slot)
 
 
 def _man(world: World, slot: int) -> None:
-    """Soldiers with stimpacks in a Bunker, and an enemy before it whom they fight."""
+    """Put soldiers with stimpacks into a Bunker, and an enemy before it that they fight."""
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     x, y = world.pos[slot].tolist()
     for name in ("Marine", "Marauder"):
@@ -154,7 +154,7 @@ def _man(world: World, slot: int) -> None:
 
 
 def _split(world: World, slot: int) -> None:
-    """An Adept in its phase shift, or the shade of one."""
+    """Start the phase shift of an Adept, or make it the shade of one."""
     x, y = world.pos[slot].tolist()
     adept = (
         slot
@@ -168,13 +168,13 @@ def _split(world: World, slot: int) -> None:
 
 
 def _worker(world: World, slot: int) -> None:
-    """A worker beside a structure that takes workers in."""
+    """Put a worker beside a structure that takes workers in."""
     x, y = world.pos[slot].tolist()
     lifecycle.spawn(world, world.catalog.unit("SCV"), 1, (x, y - 4.0))
 
 
 def _drained(world: World, slot: int) -> None:
-    """A Stalker without shields beside a battery."""
+    """Put a Stalker without shields beside a battery."""
     x, y = world.pos[slot].tolist()
     stalker = lifecycle.spawn(world, world.catalog.unit("Stalker"), 1, (x - 1.5, y + 3.0))
     world.shields[stalker] = 5.0
@@ -183,13 +183,13 @@ def _drained(world: World, slot: int) -> None:
 
 
 def _recharge(world: World, slot: int) -> None:
-    """A battery that recharges somebody."""
+    """Make a battery recharge a unit."""
     _drained(world, slot)
     advance(world, 4)
 
 
 def _battery(world: World, slot: int) -> None:
-    """A Shield Battery with power beside a Nexus."""
+    """Put a Shield Battery with power beside a Nexus."""
     x, y = world.pos[slot].tolist()
     lifecycle.spawn(world, world.catalog.unit("Pylon"), 1, (x - 4.0, y - 4.0))
     lifecycle.spawn(world, world.catalog.unit("ShieldBattery"), 1, (x - 4.0, y))
@@ -197,18 +197,18 @@ def _battery(world: World, slot: int) -> None:
 
 
 def _with_tech_lab(world: World, slot: int) -> None:
-    """A structure with a TechLab at its side."""
+    """Put a TechLab at the structure's side."""
     lab = world.catalog.unit(f"{world.unit_type(slot).name}TechLab")
     world.addon[slot] = lifecycle.spawn(world, lab, 1, addons.place_of(world, slot))
 
 
 def _know(upgrade: str) -> Preparation:
-    """Return a player who has an upgrade."""
+    """Return a preparation that grants the player an upgrade."""
     return lambda world, _: commands.grant_upgrade(world, 1, world.catalog.upgrade(upgrade).id)
 
 
 def _at_it(producer: str, ability: int, makes: str) -> Preparation:
-    """Return a structure of another type that makes something."""
+    """Return a preparation that adds a structure of another type with something in production."""
 
     def prepare(world: World, slot: int) -> None:
         x, y = world.pos[slot].tolist()
@@ -248,7 +248,7 @@ PREPARE: dict[str, Preparation] = {
     **dict.fromkeys(("redirect_attack", "redirect_stop", "redirect_stim"), _man),
     **dict.fromkeys(("unload_all", "unload_all_at", "unload_unit"), _fill),
 }
-"""By a skill's name: what has to be the case before a unit can use it."""
+"""Preparations by the name of a skill."""
 OF_UNIT: dict[tuple[str, str], Preparation] = {
     **dict.fromkeys([(name, "train") for name in ("Barracks", "Factory", "Starport")], _with_tech_lab),
     ("Gateway", "structure_morph"): _know("WarpGateResearch"),
@@ -260,4 +260,4 @@ BY_RULE: dict[str, Preparation] = {
     "chrono_research": _at_it("CyberneticsCore", 1568, "WarpGateResearch"),
     "morph_warpgates": _know("WarpGateResearch"),
 }
-"""By the rule of a text action: what has to be the case before it finds anything."""
+"""Preparations by the rule of a text action, without which it finds nothing."""

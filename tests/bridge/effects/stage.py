@@ -1,7 +1,7 @@
-"""Small stages on the simulator, on which one unit can do one thing: who stands around, and what has happened before.
+"""Small stages on the simulator for one action of one unit: the units around it, and what happened before.
 
-A stage is a game of its own in this process, without socket or PySC2's processes, kept as it is at the moment of the
-order; from there it is played on any number of times, with an order and without.
+A stage is a game of its own in this process, without socket or PySC2's processes, saved at the moment of the order;
+tests play it on from there any number of times, with an order and without.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ OWN = (
     ("Zergling", 31.5, 28), ("HighTemplar", 34, 37), ("Roach", 28, 36.5), ("Medivac", 29, 28), ("Queen", 27, 27),
     ("Overlord", 26, 33),
 )  # fmt: skip
-"""What the player has around the unit that is told to do something."""
+"""Structures of the player around the acting unit."""
 FOES = (
     ("Marine", 38.5, 33), ("Roach", 39, 31), ("SiegeTank", 40, 34), ("Zealot", 36, 33), ("VikingFighter", 39, 30),
     ("HighTemplar", 40, 32), ("SupplyDepot", 42, 31), ("SpawningPool", 42.5, 35.5), ("Stalker", 38.5, 34.5),
@@ -57,7 +57,7 @@ PURSE = 5000
 
 
 class Stage:
-    """A game with one unit of a type in the middle, ready to do what it is told."""
+    """A game with one unit of a type in the middle, ready for an order."""
 
     def __init__(
         self,
@@ -71,8 +71,8 @@ class Stage:
         """Set the stage.
 
         Args:
-            caster: type of the unit that is told to do something, as PySC2 names it.
-            prepare: what has to happen to it first, as a function of the simulator's world and the unit's slot.
+            caster: type of the acting unit, as PySC2 names it.
+            prepare: prepares it, as a function of the simulator's world and the unit's slot.
             race: whose base the player has in a corner of the map.
             place: where it stands, if not in the middle.
             layers: whether the game has a screen, as PySC2 asks for it.
@@ -112,7 +112,7 @@ class Stage:
                     world.shields[slot] *= 0.5
 
     def _put(self, caster: str, place: Point | None) -> int:
-        """Return the unit in the middle, calm and full of energy; its tag."""
+        """Put the unit in the middle, calm and full of energy; return its tag."""
         world = self.world
         unit = world.catalog.unit(knowledge()[caster].id)
         if place is None:
@@ -127,13 +127,13 @@ class Stage:
 
     @property
     def world(self) -> World:
-        """The simulator's world, of the moment."""
+        """The simulator's present world."""
         playing = self.client.session._process.playing
         assert playing is not None
         return playing.game.world
 
     def _keep(self) -> tuple[bytes, dict[int, object]]:
-        """Return the game as it is now; what never changes is shared. Like a quick save, but faster to go back to."""
+        """Return the present game, with constant parts shared. Like a quick save, but faster to restore."""
         playing = self.client.session._process.playing
         assert playing is not None
         shared = {id(part): part for part in bookmark._unchanging(playing)}
@@ -151,7 +151,7 @@ class Stage:
         return self._first
 
     def look(self, response: sc.ResponseObservation | None = None) -> Seen:
-        """Return what the player sees now, and what his units can do and do by themselves."""
+        """Return what the player sees now, and what its units can do and do by themselves."""
         response, world = response or self.client.observe(), self.world
         answer = self.client.ask(query=question(read_snapshot(response, self.info))).query
         functions = self._eyes.available_actions(response.observation) if self._eyes else ()
@@ -173,7 +173,7 @@ class Stage:
         return self._idle[loops]
 
     def play(self, plan: Plan) -> tuple[Played, int]:
-        """Play a plan from now on; what was played, and how many loops it took."""
+        """Play a plan from now on; return what was played, and its number of loops."""
         step, loops = next(plan), 0
         while True:
             self._enter(step.actions)
@@ -185,7 +185,7 @@ class Stage:
                 return done.value, loops
 
     def _enter(self, actions: Sequence[Any]) -> None:
-        """Let actions enter the game; calls of functions are translated by PySC2, which refuses what it should."""
+        """Play actions in the game; PySC2 translates calls of functions, and refuses what it should."""
         seen = self.client.observe().observation if self._eyes else None
         for action in actions:
             if isinstance(action, sc.Action):
@@ -196,7 +196,7 @@ class Stage:
 
 
 class _Keeper(pickle.Pickler):
-    """Keeps everything but the parts that are shared."""
+    """Pickles everything except the shared parts."""
 
     def __init__(self, file: io.BytesIO, shared: dict[int, object]) -> None:
         super().__init__(file)
@@ -207,7 +207,7 @@ class _Keeper(pickle.Pickler):
 
 
 class _Opener(pickle.Unpickler):
-    """Puts the shared parts back in their places."""
+    """Unpickles, with the shared parts in their places."""
 
     def __init__(self, file: io.BytesIO, shared: dict[int, object]) -> None:
         super().__init__(file)
@@ -227,7 +227,7 @@ def _grant_all(world: World) -> None:
 
 
 def _usual_place(unit: UnitType) -> Point:
-    """Return in the middle; what needs creep stands on it."""
+    """Return the place in the middle, or on creep for units that need it."""
     if unit.name.endswith("CrawlerUprooted"):
         return 26.5, 30.0
     if unit.structure and unit.needs_creep:
@@ -236,7 +236,7 @@ def _usual_place(unit: UnitType) -> Point:
 
 
 def _eyes() -> Any:
-    """Return the part of PySC2 that reads observations and translates functions, as the game asks for it."""
+    """Return PySC2's reader of observations and functions, with the settings of the bridge's game."""
     interface_format = features.AgentInterfaceFormat(
         feature_dimensions=features.Dimensions(screen=128, minimap=64),
         camera_width_world_units=24,

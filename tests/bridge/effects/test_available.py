@@ -1,4 +1,4 @@
-"""What own units can do now, asked of the simulator in the way in which a game asks it."""
+"""What own units can do now, by the same query to the simulator as in a game."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_what_is_not_finished_can_only_be_called_off(gateway: Stage) -> None:
 def test_a_cooldown_takes_an_ability_away_until_it_is_over() -> None:
     stage = Stage("Stalker")
     stage.again()
-    commands.debug_switch(stage.world, 1, "cooldown")  # off, which lets cooldowns count
+    commands.debug_switch(stage.world, 1, "cooldown")  # off, so that cooldowns count
     slot = stage.world.slot_of(stage.caster)
     blink = stage.world.catalog.ability(BLINK_OF_STALKERS)
     stage.world.timers[slot] = {blink.timer: stage.world.loop + 5.0}

@@ -35,7 +35,7 @@ OWN, FOE = 1, 2
 
 
 class Play(NamedTuple):
-    """Units beside the own base, words for them, and what is to come of it."""
+    """Units beside the own base, words for them, and the expected result."""
 
     units: tuple[tuple[str, int, float, float], ...]
     """Type, owner, and place as seen from the base, towards the middle of the map."""
@@ -169,7 +169,7 @@ def test_what_units_can_do_is_asked_once_an_observation_and_not_after_the_end(ga
 
 
 def _set_up(game: PySC2Game, play: Play) -> Snapshot:
-    """Return a new episode with some units more than it begins with, and money."""
+    """Return a new episode with additional units, and money."""
     (now,) = game.reset()
     base = next(unit for unit in now.own if unit_name(unit.unit_type) == "Nexus").pos
     x0, y0, x1, y1 = now.info.playable
@@ -188,7 +188,7 @@ def _set_up(game: PySC2Game, play: Play) -> Snapshot:
 def _say(
     game: PySC2Game, play: Play, executor: Executor, now: Snapshot, control_group: int | None = None
 ) -> tuple[Played, Snapshot]:
-    """Let an agent say it, and some loops pass."""
+    """Play a reply of an agent and some loops."""
     kinds = tuple(dict.fromkeys(kind for kind, owner, _, _ in play.units if owner == OWN))
     if play.action.startswith(("Warp_", "Train_")):
         team = TeamConfig(name="Team", kind="side", actions=(play.action,))
@@ -208,6 +208,6 @@ def _say(
 
 
 def _seen(now: Snapshot) -> set[str]:
-    """Return names of the orders of own units, and of the types of all units."""
+    """Return the names of own units' orders, and of all units' types."""
     orders = {order_name(order.ability_id) for unit in now.own for order in unit.orders}
     return orders | {unit_name(unit.unit_type) for unit in now.units.values()}

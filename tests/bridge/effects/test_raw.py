@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """Return one of each kind of function, of subject, of rule and of target stands for the others."""
+    """Return the kind of an action: one action of each function, subject, rule and target stands for the others."""
     action = cases()[name].action
     return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule, action.target_kind
 
 
 def stands_for_others(name: str) -> bool:
-    """Return those that are made by rule for one unit of a team do not."""
+    """Return False for the generated actions for one unit of a team, which stand for no others."""
     return not (name.startswith(SINGLE) and cases()[name].action.group == "generated")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """Return one of each kind of function and of subject, with a rule and without, stands for the others."""
+    """Return the kind of an action: one of each function and subject, with and without rule, stands for the others."""
     action = cases()[name].action
     return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind
 
@@ -45,7 +45,7 @@ def do_the_same(case: Case, stage_of: Stages) -> None:
     else:
         same, other = kinds(screen.words) & kinds(raw.words), kinds(screen.words) ^ kinds(raw.words)
         assert all(" buff " in word for word in other), f"{screen.text}; refused: {screen.refusals}"
-        assert same or not other  # who stands at the edge of an area may be in it or not
+        assert same or not other  # a unit at the edge of an area may be in it or not
         assert bool(screen.words) == bool(raw.words)
 
 

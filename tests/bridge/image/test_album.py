@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def show(task: Callable[..., TaskConfig], snapshot: Snap, battle: list[raw_pb2.Unit]) -> Show:
-    """Return the pictures of the agent of 2s3z, with the teams Zealot-1, Zealot-2 and Stalker-1."""
+    """Return the pictures of the agent of 2s3z, with its three teams, for these specifications."""
 
     def see(*specs: dict[str, Any], shown: Snapshot | None = None, name: str = "2s3z") -> tuple[Picture, ...]:
         config = task(name)
@@ -196,7 +196,7 @@ def test_who_orders_the_whole_side_sees_all_of_it_as_its_own(snapshot: Snap, bat
         return sight.agents[agent.name].pictures[0].title
 
     assert "blue: your units, red: enemies;" in title("simple64_eceb")  # a Commander with a team of the kind side
-    assert "green: your side's other units" in title("pvz_task6_level1")  # one who only talks
+    assert "green: your side's other units" in title("pvz_task6_level1")  # an agent that only talks
 
 
 def test_the_game_renders_only_for_those_who_ask_for_it(task: Callable[..., TaskConfig]) -> None:

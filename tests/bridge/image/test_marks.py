@@ -82,7 +82,7 @@ def test_those_without_room_are_left_out() -> None:
     crowd = [Marked(f"{k:03x}", "enemy", 30, 30, 4) for k in range(40)]
     placed = place(image, crowd, crowd, 8)
     assert 0 < len(placed) < 40
-    assert placed == crowd[: len(placed)]  # who comes first has the room
+    assert placed == crowd[: len(placed)]  # the first one has the room
 
 
 def test_each_type_has_a_code_of_its_own() -> None:

@@ -41,7 +41,7 @@ def draw(
 
 
 def middle_of(image: NDArray[np.uint8], colour: Colour) -> tuple[float, float]:
-    """Return column and row in the middle of what has a colour."""
+    """Return the column and row in the middle of the pixels of a colour."""
     rows, columns = np.nonzero((image == np.array(colour)).all(axis=2))
     return (columns.min() + columns.max()) / 2, (rows.min() + rows.max()) / 2
 

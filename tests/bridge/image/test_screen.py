@@ -31,14 +31,14 @@ SIZE = 512
 
 
 def found(image: NDArray[np.uint8], colour: Colour, near: int = 6) -> NDArray[np.intp]:
-    """Return (n, 2) columns and rows of the pixels of a colour."""
+    """Return the columns and rows, (n, 2), of the pixels of a colour."""
     off = np.abs(image.astype(np.int16) - np.array(colour)).max(axis=2)
     rows, columns = np.nonzero(off <= near)
     return np.stack([columns, rows], axis=1)
 
 
 def pixel_of(x: float, y: float, size_px: int, extent: float = 24.0) -> tuple[float, float]:
-    """Return where a point of the screen frame is in a picture, worked out by hand."""
+    """Return the pixel of a point of the screen frame, worked out by hand."""
     margin = margin_of(size_px, extent)
     scale = (size_px - margin) / extent
     return margin + x * scale - 0.5, margin + y * scale - 0.5

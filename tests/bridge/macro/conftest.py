@@ -1,4 +1,4 @@
-"""Games of the simulator to try rules in: what a rule says is done, and the game is asked what came of it."""
+"""Games of the simulator to try rules in: a rule's orders are carried out, and the game shows the result."""
 
 from __future__ import annotations
 
@@ -50,29 +50,29 @@ class Game:
         self.see()
 
     def see(self) -> Snapshot:
-        """Look at the game, and begins a new turn with a new ledger."""
+        """Look at the game, and begin a new turn with a new ledger."""
         self.response = response = self.client.observe()
         blind = read_snapshot(response, self.info)
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = dataclasses.replace(blind, abilities=available(answer))
         self.ledger = ledger_of(self.snapshot)
-        if self.fed:  # the game's cheat does not show in the supply that it tells
+        if self.fed:  # the game's cheat does not show in its supply
             self.ledger.supply = 100.0
         return self.snapshot
 
     def play(self, loops: int) -> Snapshot:
-        """Let loops pass."""
+        """Play some loops."""
         self.client.step(loops)
         return self.see()
 
     def cheat(self, *states: debug_pb2.DebugGameState.ValueType) -> Snapshot:
-        """Have the game's own cheats on: resources, tech, supply, fast building."""
+        """Switch on the game's own cheats: resources, tech, supply, fast building."""
         self.client.debug(*(debug_pb2.DebugCommand(game_state=state) for state in states or FREE))
         self.fed = self.fed or debug_pb2.food in (states or FREE)
         return self.play(1)
 
     def put(self, name: str, x: float, y: float, *, owner: int = 1, count: int = 1) -> int:
-        """Put a unit somewhere, and gives the tag of the newest of its type."""
+        """Put a unit somewhere, and return the tag of the newest of its type."""
         create = debug_pb2.DebugCommand(create_unit=debug_pb2.DebugCreateUnit(
             unit_type=knowledge()[name].id, owner=owner, pos=common_pb2.Point2D(x=x, y=y), quantity=count
         ))  # fmt: skip
@@ -91,29 +91,29 @@ class Game:
         return self.play(1)
 
     def units(self, name: str) -> list[Unit]:
-        """Return units of a type that are there, everybody's."""
+        """Return the present units of a type, of all players."""
         return [unit for unit in self.snapshot.units.values() if unit_name(unit.unit_type) == name]
 
     def own(self, name: str) -> list[Unit]:
-        """Return own units of a type."""
+        """Return the own units of a type."""
         return [unit for unit in self.snapshot.own if unit_name(unit.unit_type) == name]
 
     # --- rules ------------------------------------------------------------------------------------------------
 
     def say(self, action: str, **given: Any) -> list[RuleOrder]:
-        """Return what the rule of an action answers; given are `units`, `tag` and `point`, if named."""
+        """Return the answer of an action's rule; `units`, `tag` and `point` are given as far as the call names them."""
         found = catalogue()[action]
         assert found.rule is not None
         return RULES[found.rule](RuleRequest(found, self.snapshot, self.ledger, **given))
 
     def refusal(self, action: str, **given: Any) -> NotAvailable:
-        """Return what the rule of an action says that finds nothing."""
+        """Return the sentence of an action's rule that finds nothing."""
         with pytest.raises(NotAvailable) as raised:
             self.say(action, **given)
         return raised.value
 
     def do(self, orders: Sequence[RuleOrder]) -> list[str]:
-        """Carry orders out; what the game says of each."""
+        """Carry orders out; return the game's result of each."""
         actions = [
             command(
                 order.function.ability_id, order.units, queue=order.queued,
@@ -124,7 +124,7 @@ class Game:
         return [error_pb2.ActionResult.Name(result) for result in self.client.act(*actions)]
 
     def may_stand(self, function: str, point: WorldPoint) -> str:
-        """Return what the game says of a place for what a function builds or warps in."""
+        """Return the game's verdict on a place for the product of a function."""
         asked = query_pb2.RequestQueryBuildingPlacement(
             ability_id=functions()[function].ability_id, target_pos=common_pb2.Point2D(x=point.x, y=point.y)
         )

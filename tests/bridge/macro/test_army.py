@@ -1,4 +1,4 @@
-"""Orders to the whole army and scouts: who goes, and where to."""
+"""Orders to the whole army and scouts: which units go, and where to."""
 
 from __future__ import annotations
 

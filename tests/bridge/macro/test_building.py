@@ -1,4 +1,4 @@
-"""Building: the places that rules find are accepted by the game, and what is asked for comes to stand there."""
+"""Building: the game accepts the places that rules find, and the structure comes to stand there."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def race_of(structure: str) -> str:
 
 @pytest.fixture(scope="module")
 def rich(make_game: Callable[..., Game]) -> Callable[[str, str], Game]:
-    """Return games in which everything is allowed and paid for, one for each map and race; they are looked at only."""
+    """Return read-only games in which everything is allowed and paid for, one for each map and race."""
     games: dict[tuple[str, str], Game] = {}
 
     def get(name: str, race: str) -> Game:
@@ -116,7 +116,7 @@ def standing(game: Game, structure: str) -> list[Unit]:
 
 
 def walkable_pieces(game: Game) -> int:
-    """Return in how many pieces the ground falls on which units walk, tiny pockets aside."""
+    """Return the number of connected pieces of walkable ground, without tiny pockets."""
     count, _, stats, _ = cv2.connectedComponentsWithStats(
         np.ascontiguousarray(land_of(game.snapshot).open, np.uint8), connectivity=4
     )

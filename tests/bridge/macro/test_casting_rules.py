@@ -1,4 +1,4 @@
-"""Chrono Boost, recall, MULEs, larvae, creep: which unit uses it and what at, and that the game then does it."""
+"""Chrono Boost, recall, MULEs, larvae, creep: which unit uses it, on what target, and that the game then does it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ground as arrays: what the API's images say, footprints, ways, and what stands where at a moment."""
+"""The ground as arrays: the API's images, footprints, ways, and the land at a moment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever is asked on whatever map: rules answer with orders or say why not, and raise nothing else."""
+"""For any action on any map: rules answer with orders or say why not, and raise nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training, morphing and research: who does it, and that the game then does it."""
+"""Training, morphing and research: which unit does it, and that the game then does it."""
 
 from __future__ import annotations
 

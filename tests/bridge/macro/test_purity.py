@@ -42,7 +42,7 @@ GIVEN = {
 
 
 def shuffled(game: Game, seed: int) -> Snapshot:
-    """Return the same moment, its units told in another order."""
+    """Return the same moment, with its units in another order."""
     response = sc.ResponseObservation()
     response.CopyFrom(game.response)
     units = list(response.observation.raw_data.units)
@@ -53,7 +53,7 @@ def shuffled(game: Game, seed: int) -> Snapshot:
 
 
 def answers(snapshot: Snapshot, race: str) -> list[str]:
-    """Return what the rules say to every action of a side that leaves all open, each in a turn of its own."""
+    """Return the rules' answers to every action of a side that leaves all open, each in a turn of its own."""
     said = []
     for action in SIDES[race]:
         assert action.rule is not None

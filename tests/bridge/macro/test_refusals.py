@@ -19,7 +19,7 @@ RICH = (debug_pb2.all_resources, debug_pb2.food)
 
 
 def nothing(_: Game) -> None:
-    """The game as it begins."""
+    """Play nothing: the game is at its beginning."""
 
 
 def no_minerals(game: Game) -> None:

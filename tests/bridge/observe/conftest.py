@@ -1,4 +1,4 @@
-"""A Protoss base and a fight before it, made by hand, and agents of every kind who see them."""
+"""A Protoss base and a fight before it, made by hand, and agents of every kind that see them."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def base_task() -> TaskConfig:
 
 
 def able(*names: str) -> frozenset[int]:
-    """Return the abilities of some of PySC2's functions, as a snapshot has them."""
+    """Return the abilities of some functions of PySC2, as a snapshot has them."""
     numbers = [functions()[name].ability_id for name in names]
     return frozenset((*numbers, *map(general, numbers)))
 
@@ -210,7 +210,7 @@ def _plain(bits: int, value: bytes) -> common_pb2.ImageData:
 
 @pytest.fixture
 def pages(base: Any, look: Any, base_task: TaskConfig) -> Callable[..., dict[str, str]]:
-    """Return what the agents of the base are told at its second observation, by agent."""
+    """Return the pages of the base's agents at its second observation, by agent."""
 
     def write(feedback: Mapping[str, Feedback] | None = None, **limits: int) -> dict[str, str]:
         agents = tuple(a.model_copy(update={"text_tokens": limits.get(a.name)}) for a in base_task.agents)

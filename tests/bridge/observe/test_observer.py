@@ -1,4 +1,4 @@
-"""One observation as a value: whatever is asked of it, and whenever, it says what was seen at its moment."""
+"""One observation as a value: each of its parts shows its own moment, at any later time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PAIR = ["Stalkers", "Zealots"]
 
 
 def moments(unit: Make, snapshot: Snap) -> list[Snapshot]:
-    """Return three moments of a fight: somebody is hurt, then somebody dies."""
+    """Return three moments of a fight: a unit is hurt, then a unit dies."""
     stalker, zealot = unit(1, "Stalker", 10, 16), unit(2, "Zealot", 14, 16)
     foe, hurt = unit(9, "Zealot", 15, 16, alliance="enemy"), unit(2, "Zealot", 14, 16, health=20)
     return [

@@ -1,4 +1,4 @@
-"""Whole pages, one for each kind of agent: what stands in a golden file is what a model reads."""
+"""Whole pages, one for each kind of agent: a golden file holds exactly what a model reads."""
 
 from __future__ import annotations
 

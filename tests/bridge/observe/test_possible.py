@@ -1,4 +1,4 @@
-"""What may be told now, at what price, and why the rest may not: by the game's word and by what is known."""
+"""The possible actions with their prices, and why the others are not possible: by the game and by its facts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ACTIONS = {
 
 @pytest.fixture
 def team(snapshot: Any) -> Callable[..., TeamView]:
-    """Return what a team of all types is told, or a team of the side that may do some things."""
+    """Return the view of a team of all types, or of a side team with some actions."""
 
     def see(units: list[Any], *side: str, **fields: Any) -> TeamView:
         kinds = tuple(ACTIONS)

@@ -1,4 +1,4 @@
-"""Sections are found by name, replaced and added; what an agent is told is up to its configuration."""
+"""Sections are found by name, replaced and added; an agent's configuration decides on its page."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever is registered is forgotten after the test."""
+    """Restore the registered sections after the test."""
     monkeypatch.setattr("khala_bridge.observe.text.page.SECTIONS", dict(SECTIONS))
 
 
 @pytest.fixture
 def told(base: Any, look: Any, base_task: TaskConfig) -> Any:
-    """Return what the agent at the front is told, by sections of these names."""
+    """Return the text of the agent at the front, with sections of these names."""
 
     def write(*names: str, text_tokens: int | None = None) -> str:
         changed = {"sections": names, "text_tokens": text_tokens}

@@ -1,4 +1,4 @@
-"""The line of time of a task: which stage a team is at."""
+"""The stages of a task: which one a team is at."""
 
 from __future__ import annotations
 

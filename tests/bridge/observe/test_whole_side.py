@@ -1,4 +1,4 @@
-"""What those who lead or build a side are told of it: counts, alerts, events, other agents' teams, landmarks."""
+"""Text for agents that lead or build a side: counts, alerts, events, other agents' teams, landmarks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def views(base_task: Any) -> Callable[..., list[View]]:
-    """Return what an agent sees, snapshot after snapshot."""
+    """Return the views of an agent, snapshot after snapshot."""
 
     def see(agent: str, *snapshots: Snapshot) -> list[View]:
         observer = Observer(base_task)

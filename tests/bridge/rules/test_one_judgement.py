@@ -1,7 +1,7 @@
 """What is offered is accepted, what is barred is refused for the same reason, and a price is taken once.
 
-Observation, agents' calls and the host's rules ask one judge. Here they are asked about random states of the three
-races, and compared by what an agent reads: both sentences about an action have to mean the same.
+Observation, agents' calls and the host's rules ask one judge. These tests ask them about random states of the three
+races, and compare what an agent reads: both sentences about an action must mean the same.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ FOE, FIELD, GEYSER, PYLON = 0x200040001, 0x200080001, 0x2000C0001, 0x200100001
 ABOUT_THE_TARGET = frozenset(
     {"stop_building", "cancel_building", "army_attack", "army_defend", "army_retreat", "scout"}
 )
-"""Rules that are about what is named or about the whole army: whether there is any is not judged beforehand."""
+"""Rules about named units or the whole army: whether there are any is not judged beforehand."""
 ADDONS = ("Barracks", "Factory", "Starport")
 
 
@@ -65,7 +65,7 @@ class Own(NamedTuple):
 
 
 class State(NamedTuple):
-    """What a side has."""
+    """The means of a side."""
 
     units: tuple[Own, ...]
     player: dict[str, int]
@@ -101,7 +101,7 @@ AMOUNTS = st.sampled_from((0, 20, 24, 25, 49, 50, 75, 99, 100, 149, 150, 175, 22
 
 @st.composite
 def states(draw: st.DrawFn, race: str) -> State:
-    """Return random means of a side: a few units and structures, accounts, upgrades, and what the game allows."""
+    """Return random means of a side: a few units and structures, accounts, upgrades, and the game's answers."""
     pools = (MAKERS[race], NEEDED[race], types(race))
     names = draw(st.lists(st.one_of(*map(st.sampled_from, pools)), min_size=1, max_size=7))
     known = [upgrade.id for upgrade in upgrades().values() if upgrade.race == race and upgrade.melee]
@@ -161,7 +161,7 @@ def vocabulary(race: str) -> Vocabulary:
 
 
 def open_ground(_: Any, info: Any) -> None:
-    """Make the whole map one plain that can be walked and built on."""
+    """Make the whole map one walkable and buildable plain."""
     ground = info.start_raw
     for grid, bits, value in (
         (ground.placement_grid, 1, b"\xff"),
@@ -175,7 +175,7 @@ def open_ground(_: Any, info: Any) -> None:
 
 @pytest.fixture
 def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callable[[str, State], SideObservation]:
-    """Return what the agent of a race sees in a state."""
+    """Return the observation of the agent of a race in a state."""
 
     def see(race: str, state: State) -> SideObservation:
         made: list[Any] = []
@@ -208,7 +208,7 @@ def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callabl
 
 
 def judged(names: list[str], chance: Any, most: int) -> list[Action]:
-    """Return some actions of a team on which a word is passed before they are called."""
+    """Return some actions of a team that are judged before they are called."""
     found = [catalogue()[name] for name in names]
     found = [a for a in found if a.rule not in ABOUT_THE_TARGET and a.subject != "two_units"]
     chosen: list[Action] = chance.sample(found, min(most, len(found)))
@@ -230,11 +230,11 @@ def calls(sight: SideObservation, action: Action) -> list[str]:
 
 
 class Answer(NamedTuple):
-    """What became of a call."""
+    """The result of a call."""
 
     commands: list[Command]
     why: str | None
-    """Why nobody can do it now; None if it is done, or if only its target or place will not do."""
+    """Why no unit can do it now; None if it is done, or if only its target or place is wrong."""
     spent: tuple[float, float, float]
 
 

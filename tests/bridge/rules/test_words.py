@@ -1,4 +1,4 @@
-"""Every reason in its three forms: in the list of what is not possible, in a team's refusal, in a side's."""
+"""Every reason in its three forms: in the list of impossible actions, in a team's refusal, in a side's."""
 
 from __future__ import annotations
 

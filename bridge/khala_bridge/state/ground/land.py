@@ -75,7 +75,7 @@ class Land:
         wanted = set(cells)
         return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
 
-    # --- things on the ground ------------------------------------------------------------------------------------
+    # --- things on the ground ---------------------------------------------------------------------------------
 
     @functools.cached_property
     def taken(self) -> Bools:
@@ -159,7 +159,7 @@ class Land:
                 mark(clear, footprint.near, cells, value=False)
         return clear
 
-    # --- creep, sight, power --------------------------------------------------------------------------------------
+    # --- creep, sight, power ----------------------------------------------------------------------------------
 
     @functools.cached_property
     def creep(self) -> Bools:
@@ -240,7 +240,7 @@ class Land:
         """The player's own town halls, finished or not, by ascending tags."""
         return tuple(unit for unit in self.halls if unit.is_own)
 
-    # --- cells that stay free --------------------------------------------------------------------------------
+    # --- cells that stay free ---------------------------------------------------------------------------------
 
     @functools.cached_property
     def kept(self) -> Bools:
