@@ -43,7 +43,7 @@ RUN, SIDE, AGENT = "test", "blue", "Stalkers"
 
 
 class _JumpingSelector(selectors.DefaultSelector):
-    """Never wait: where a loop would, the clock jumps ahead. Only threads are waited for, for real."""
+    """A selector that never waits: where a loop would, the clock jumps ahead. Only threads are waited for, for real."""
 
     def __init__(self) -> None:
         super().__init__()
