@@ -131,7 +131,7 @@ def barrier(count: int) -> Any:
 
 
 class Host(Protocol):
-    """Play rounds with its agents; `endpoint` is where they connect to."""
+    """The side that plays rounds with its agents; `endpoint` is where they connect to."""
 
     endpoint: str
 

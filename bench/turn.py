@@ -188,7 +188,7 @@ class Bench:
 
 
 class Everybodys(TeamRoster):
-    """Give the first agent's units to every agent: any number of agents, each with a whole battle to see."""
+    """The first agent's units for every agent: any number of agents, each with a whole battle to see."""
 
     def __init__(self, agents: Sequence[AgentConfig]) -> None:
         super().__init__(agents[:1])

@@ -10,7 +10,7 @@ FOLDERS = ("agents", "models", "tasks")
 
 
 class ConfigFiles(BuildHookInterface):
-    """Add the folders next to the package to the package in the wheel."""
+    """A build hook that adds the folders next to the package to the package in the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Name the folders that a wheel carries, by their places in it."""

@@ -114,7 +114,7 @@ def _note_reply(moment: Moment, reply: Reply) -> None:
 
 
 class Painter:
-    """Turn moments into pictures."""
+    """The painter that turns moments into pictures."""
 
     def __init__(self, battle: Battle) -> None:
         self._battle = battle

@@ -89,11 +89,11 @@ SCENES = {
 
 
 class Stop(Exception):  # no error
-    """Stop at the chosen step."""
+    """The chosen step is reached."""
 
 
 class Played:
-    """Answer at once, by a script; keep the questions of a chosen step."""
+    """Agents that answer at once, by a script, and keep the questions of a chosen step."""
 
     def __init__(self, step: int) -> None:
         self.questions: dict[str, Question] = {}

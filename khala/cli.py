@@ -33,7 +33,6 @@ from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 
-
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells expect it."""
 

@@ -13,7 +13,7 @@ GRACE_S = 0.25
 
 
 class Briefings:
-    """Hold one agent's newest briefing."""
+    """The newest briefing of one agent."""
 
     def __init__(self) -> None:
         self._newest: Briefing | None = None

@@ -68,7 +68,7 @@ def client_for(config: ModelConfig) -> LLMClient:
 
 
 class Workshop:
-    """Make the policies of one process.
+    """The maker of the policies of one process.
 
     Args:
         budget_usd: what all agents of the process may spend together.

@@ -30,7 +30,7 @@ MAX_REPLY_CHARACTERS = 65_536
 
 
 class Guard:
-    """Stand between a worker and the policy of one agent.
+    """The guard between a worker and the policy of one agent.
 
     Args:
         agent: name of the agent, for the log.

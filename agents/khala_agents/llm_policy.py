@@ -41,7 +41,7 @@ UNKNOWN = Usage(requests=1, unknown_requests=1)
 
 
 class LLMPolicy(Policy):
-    """Decide by asking a language model.
+    """A policy that decides by asking a language model.
 
     One request of at most `try_timeout_s`, repeated as `retry` says, never past the deadline.
 

@@ -32,7 +32,7 @@ class Memory(Protocol):
 
 
 class NoMemory:
-    """Remember nothing."""
+    """A memory that remembers nothing."""
 
     def remember(self, observation: Observation, reply: str) -> None:
         """Do nothing."""
@@ -46,7 +46,7 @@ class NoMemory:
 
 
 class LastSteps:
-    """Remember observations and replies of the last `count` steps unchanged, without their pictures."""
+    """A memory of the last `count` observations and replies, unchanged, without their pictures."""
 
     def __init__(self, count: int) -> None:
         self._steps: deque[tuple[str, str]] = deque(maxlen=count)

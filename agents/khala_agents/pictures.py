@@ -24,7 +24,7 @@ PATIENCE_S = 0.5
 
 
 class PictureStore:
-    """Hold the newest pictures of one agent."""
+    """The newest pictures of one agent."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes

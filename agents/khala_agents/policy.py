@@ -57,7 +57,7 @@ Said: TypeAlias = str | Decision
 
 
 def _untraced(exchange: ModelCall) -> None:
-    """Drop an exchange that nobody wants."""
+    """Drop an exchange that is not traced."""
 
 
 def _now() -> float:
@@ -100,7 +100,7 @@ class Context:
 
 
 class Policy(ABC):
-    """Decide for one agent: the base class of policies. Only `decide` is required."""
+    """The base class of policies, which decide for one agent. Only `decide` is required."""
 
     async def check(self) -> None:  # noqa: B027  # a hook, not a duty
         """Look for what is wrong, before the agent joins a run.
@@ -124,7 +124,7 @@ class Policy(ABC):
 
 
 class FunctionPolicy(Policy):
-    """Decide with a function of briefing and observation.
+    """A policy that decides with a function of briefing and observation.
 
     A function that is not `async` runs in a thread, where it may block. A thread cannot be cancelled: its result after
     the deadline is discarded. An `async` function runs on the loop of all agents of the process, and must not block.
@@ -144,7 +144,7 @@ class FunctionPolicy(Policy):
 
 
 class ObjectPolicy(FunctionPolicy):
-    """Decide with any object that has `decide(briefing, observation)`; call its `prepare` and `close` if it has them.
+    """A policy around any object with `decide(briefing, observation)`; calls its `prepare` and `close` if it has them.
 
     Attributes:
         thing: the object.

@@ -42,7 +42,7 @@ OR_NULL = " or null"
 
 
 class Describer:
-    """Describe what a field holds.
+    """The descriptions of what a field holds.
 
     Args:
         names: words for types that a reader knows by another name, such as an annotated string.

@@ -160,7 +160,7 @@ def _blow(hit: Hit) -> dict[str, Any]:
 
 
 def _launched(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
-    """What all that a unit can hold and launch do together, at the distance from which it launches them."""
+    """Yield the joint weapon of all that a unit can hold and launch, at the distance from which it launches them."""
     for hangar in catalog.abilities_of(unit.row):
         if hangar.effect == "arm" and hangar.unit == weapon.launches:
             for other in _weapons(catalog.unit(weapon.launches), catalog):
@@ -169,7 +169,7 @@ def _launched(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict
 
 
 def _burst(weapon: Weapon) -> Iterator[dict[str, Any]]:
-    """A burst around the unit: what it does to units, and as a bonus what more it does to structures."""
+    """Yield a burst around the unit: its damage to units, and as a bonus the extra damage to structures."""
     hits = [hit for hit in weapon.hits if hit.damage and not hit.when]
     razes = sum(hit.damage for hit in hits if hit.area_affects.only == "structure")
     for hit in hits:

@@ -88,7 +88,7 @@ def assemble(config: MatchConfig, game: OneSide, agents: AgentPool, match_observ
 
 
 class _PublishingObserver:
-    """Publish what happens, call `watch`, and flush the recording after each step."""
+    """An observer that publishes what happens, calls `watch`, and flushes the recording after each step."""
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
         self._announcer = announcer

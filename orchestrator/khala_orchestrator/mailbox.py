@@ -30,7 +30,7 @@ class Post:
 
 
 class Mailbox:
-    """Sort messages into boxes; know which agent listens to which channel."""
+    """The boxes of all agents, and the listeners of each channel."""
 
     def __init__(self, reach: Mapping[Seat, Sequence[Seat]], channels: Iterable[str] = ()) -> None:
         """Set the seats that each seat may write to, and the channels that every seat may write to."""

@@ -50,7 +50,7 @@ class RecordingBus:
 
 
 class Listener:
-    """Subscribe to the topics that the host itself does not need, so that they are recorded. A context manager."""
+    """A subscription to topics that the host itself does not need, so that they are recorded. A context manager."""
 
     def __init__(self, bus: Bus, run: str) -> None:
         self._bus = bus

@@ -33,7 +33,7 @@ ATTACK = "Analysis: fire.\nActions:\n    Team Stalker-1:\n        <Attack_Unit(0
 
 
 class Players:
-    """Start workers, each on its own session, and end what is still running."""
+    """Workers, each on its own session; those that still run are ended."""
 
     def __init__(self, broker: MemoryBroker) -> None:
         self._broker = broker

@@ -110,7 +110,7 @@ def test_no_name_can_widen_an_expression(name: str) -> None:
 @settings(deadline=None)
 @given(NAMES, NAMES, NAMES, NAMES)
 def test_expressions_match_what_they_say_and_nothing_else(run: str, other: str, side: str, agent: str) -> None:
-    """By the bus's own rules."""
+    """Check expressions by the bus's own rules."""
     replies = zenoh.KeyExpr(every_agent(run, Topic.REPLY))
     whole = zenoh.KeyExpr(everything(run))
     mine = agent_key(run, side, agent, Topic.REPLY)

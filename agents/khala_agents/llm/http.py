@@ -54,7 +54,7 @@ _LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 class HttpEndpoint:
-    """POST JSON to an endpoint over its own connection.
+    """An endpoint that accepts JSON by POST, over its own connection.
 
     Args:
         base_url: `https://host/v1`; paths are appended to it.

@@ -21,7 +21,7 @@ _OURS = frozenset({"Accept", "Accept-Encoding", "User-Agent", "Content-Type"})
 
 
 class AiohttpTransport(httpx.AsyncBaseTransport):
-    """Carry the requests of one `httpx.AsyncClient`; may be cancelled at any moment, limits no connections.
+    """The transport of one `httpx.AsyncClient`; may be cancelled at any moment, limits no connections.
 
     Args:
         tls: which certificates to trust.

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Fixed(Policy):
-    """Give the same reply to every observation."""
+    """A policy that gives the same reply to every observation."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -23,7 +23,7 @@ class Fixed(Policy):
 
 
 class Silent(Fixed):
-    """Answer, and order nothing."""
+    """A policy that answers, and orders nothing."""
 
     def __init__(self) -> None:
         super().__init__("Analysis: I watch.\nActions:\n")

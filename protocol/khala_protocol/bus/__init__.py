@@ -70,7 +70,7 @@ class Liveness:
 
 
 class Publisher(Protocol):
-    """Put bytes under one key."""
+    """A publisher of bytes under one key."""
 
     @property
     def key(self) -> str:

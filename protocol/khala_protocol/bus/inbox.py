@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 class Doorbell:
-    """Wake the loop that it was made on, for any number of mailboxes."""
+    """A bell that wakes the loop that it was made on, for any number of mailboxes."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()

@@ -28,7 +28,7 @@ SLOW_S = 0.002
 
 
 class Gate(Protocol):
-    """Decide whether a put may run on the loop."""
+    """The decision whether a put may run on the loop."""
 
     def fits(self, size: int) -> bool:
         """Return whether a put of `size` bytes cannot block now."""
@@ -40,7 +40,7 @@ class Gate(Protocol):
 
 
 class Lane:
-    """Run puts in the order in which they are given, each on the loop or on a thread.
+    """A queue that runs puts in the order in which they are given, each on the loop or on a thread.
 
     Args:
         thread: an executor with one worker; several lanes may share it.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class MemoryBroker:
-    """Join the sessions that it opens. It is made, used and discarded on one loop."""
+    """A broker that joins the sessions that it opens. It is made, used and discarded on one loop."""
 
     def __init__(self) -> None:
         self._hub = _Hub()

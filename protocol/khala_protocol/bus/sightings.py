@@ -19,7 +19,7 @@ PATIENCE_S = 0.02
 
 
 class Sightings:
-    """Fill the mailbox of one `watch`; everything here runs on the loop.
+    """The source of one `watch`: it fills a mailbox; everything here runs on the loop.
 
     Args:
         mailbox: where the reports go.

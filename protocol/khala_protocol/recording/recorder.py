@@ -31,7 +31,7 @@ METADATA = "khala"
 
 
 class Recorder:
-    """Write one recording. A context manager; a file without `close` is readable up to the last flush.
+    """The writer of one recording. A context manager; a file without `close` is readable up to the last flush.
 
     Args:
         path: the file, which must not exist yet; missing directories are created.

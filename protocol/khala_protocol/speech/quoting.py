@@ -54,7 +54,7 @@ class Addressed:
 
 
 class MessageReader:
-    """Read the messages of one reply.
+    """A reader of the messages of one reply.
 
     It remembers which quotes are no longer closed in the rest of the text, so that a reply full of
     openings costs one search in total, not one per opening.

@@ -46,7 +46,7 @@ PROMPT = (
 
 
 class Server:
-    """Note the bodies of requests."""
+    """A server that notes the bodies of requests."""
 
     def __init__(self) -> None:
         self.bodies: list[Any] = []

@@ -105,7 +105,7 @@ def test_a_mailbox_outlives_its_loop() -> None:
 
 
 class Inline(Executor):
-    """Count what it is given, and run it at once."""
+    """An executor that counts its calls, and runs them at once."""
 
     def __init__(self) -> None:
         self.given = 0
@@ -118,7 +118,7 @@ class Inline(Executor):
 
 
 class Peer:
-    """Take puts and answer questions on demand."""
+    """A peer that takes puts and answers questions on demand."""
 
     def __init__(self) -> None:
         self.taken: list[bytes] = []

@@ -23,7 +23,7 @@ NEW_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-d
 
 
 class Authority:
-    """Make certificates in its own directory."""
+    """A maker of certificates in its own directory."""
 
     def __init__(self, directory: Path) -> None:
         directory.mkdir()
