@@ -25,7 +25,7 @@ def write_target(
     *,
     minimap: bool,
 ) -> None:
-    """Write the click at a world point: on the screen, if it is off screen on the minimap, or else at the edge."""
+    """Write the click at a world point: on the screen, else on the minimap, else at the screen's edge."""
     column, row = (math.floor(v) for v in view.screen.to_pixels(*point, camera))
     inside = 0 <= column < view.screen.columns and 0 <= row < view.screen.rows
     if minimap and not inside:

@@ -3,7 +3,7 @@
 Where the map has a score of its own, or scores gathered resources, that is the score, and its type is Curriculum.
 
 The names are the API's. How the game computes its own total was never published; here it is the value of the player's
-units plus the value of their kills, which is an estimate. Values are the catalog's `score_make`.
+units and structures plus that of their kills, which is an estimate. Values are the catalog's `score_make`.
 """
 
 from __future__ import annotations
