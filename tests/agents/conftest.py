@@ -38,48 +38,6 @@ if TYPE_CHECKING:
 RUN, SIDE, AGENT = "test", "blue", "Stalkers"
 
 
-<<<<<<< HEAD
-=======
-# --- a clock that jumps -------------------------------------------------------------------------------
-
-
-class _JumpingSelector(selectors.DefaultSelector):
-    """A selector that never waits: where a loop would, the clock jumps ahead. Only threads are waited for, for real."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.now_s = 0.0
-
-    def select(self, timeout: float | None = None) -> list[Any]:
-        ready = super().select(0)
-        if ready or timeout == 0:
-            return list(ready)
-        if timeout is None:
-            ready = super().select(5.0)
-            assert ready, "nothing is going on that could ever end this wait"
-            return list(ready)
-        self.now_s += timeout
-        return []
-
-
-class JumpingLoop(asyncio.SelectorEventLoop):
-    def __init__(self) -> None:
-        self._jumping = _JumpingSelector()
-        super().__init__(self._jumping)
-
-    def time(self) -> float:
-        return self._jumping.now_s
-
-
-def pytest_asyncio_loop_factories(
-    config: pytest.Config, item: pytest.Item
-) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
-    """Return a clock that starts at 0 and never waits, for modules that say `CLOCK = "jumps"`."""
-    jumps = getattr(item.getparent(pytest.Module).obj, "CLOCK", "real") == "jumps"  # type: ignore[union-attr]  # in one
-    return {"jumps": JumpingLoop} if jumps else {"real": asyncio.new_event_loop}
-
-
->>>>>>> w-rest
 # --- messages -----------------------------------------------------------------------------------------
 
 
