@@ -110,20 +110,20 @@ def reply(calls: tuple[str, ...]) -> str:
 
 def measure(calls: tuple[str, ...]) -> dict[str, Any]:
     """Return the figures of one kind of reply."""
-    actor, sight = scene()
+    actor, observation = scene()
     text = reply(calls)
     read_ms, check_ms = [], []
-    joint = actor.joint(sight, {AGENT: parse(text)})
+    joint = actor.joint(observation, {AGENT: parse(text)})
     for _ in range(ROUNDS):
         began = time.process_time()
         speech = parse(text)
         read = time.process_time()
-        joint = actor.joint(sight, {AGENT: speech})
+        joint = actor.joint(observation, {AGENT: speech})
         check_ms.append(1000 * (time.process_time() - read))
         read_ms.append(1000 * (read - began))
     both = [read + check for read, check in zip(read_ms, check_ms, strict=True)]
     return {
-        "actions": len(sight.agents[AGENT].agent.catalogue()),
+        "actions": len(observation.agents[AGENT].agent.catalogue()),
         "kB": round(len(text) / 1000, 1),
         "calls": len(joint.accepted[AGENT]),
         "refused": len(joint.rejections[AGENT]),

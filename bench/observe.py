@@ -138,16 +138,16 @@ def measure_full_game(places: int) -> dict[str, Any]:
     """Return the cost of one observation of all twelve agents."""
     observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
     observe_ms = []
-    sight = observer.observe(snapshots[1])
+    observation = observer.observe(snapshots[1])
     gc.freeze()  # as a host does when a match begins
     for round_ in range(ROUNDS):
         began = time.perf_counter()
-        sight = observer.observe(snapshots[round_ % 2])
+        observation = observer.observe(snapshots[round_ % 2])
         observe_ms.append(1000 * (time.perf_counter() - began))
     return {
         "units": len(snapshots[0].units),
-        "teams": sum(len(agent.teams) for agent in sight.agents.values()),
-        "text_kB": round(sum(len(agent.text) for agent in sight.agents.values()) / 1000, 1),
+        "teams": sum(len(agent.teams) for agent in observation.agents.values()),
+        "text_kB": round(sum(len(agent.text) for agent in observation.agents.values()) / 1000, 1),
         "observe_ms": round(statistics.median(observe_ms), 2),
         "observe_p95_ms": round(statistics.quantiles(observe_ms, n=20)[-1], 2),
         "act_ms": "",
@@ -159,19 +159,19 @@ def measure(name: str) -> dict[str, Any]:
     observer, actor = Observer(task), Actor(task)
     snapshots = [snapshot(*BATTLES[name], loop) for loop in (0, 1)]
     observe_ms, act_ms = [], []
-    sight = observer.observe(snapshots[1])
-    (agent,) = sight.agents.values()
+    observation = observer.observe(snapshots[1])
+    (agent,) = observation.agents.values()
     for round_ in range(ROUNDS):
         began = time.perf_counter()
-        sight = observer.observe(snapshots[round_ % 2])
+        observation = observer.observe(snapshots[round_ % 2])
         seen = time.perf_counter()
-        (agent,) = sight.agents.values()
+        (agent,) = observation.agents.values()
         reply = "Actions:\n" + "\n".join(
             f"Team {team.name}:\n" + f"<Attack_Unit({team.enemies[0].tag})>\n" * task.max_actions
             for team in agent.view.teams
         )
         said = time.perf_counter()
-        joint = actor.joint(sight, {agent.agent.name: parse(reply)})
+        joint = actor.joint(observation, {agent.agent.name: parse(reply)})
         act_ms.append(1000 * (time.perf_counter() - said))
         observe_ms.append(1000 * (seen - began))
         assert len(joint.commands) == task.max_actions * len(agent.teams)

@@ -135,9 +135,9 @@ def corpus() -> dict[str, list[Entry]]:
 
 def read(entry: Entry) -> Reading:
     """Return the reader's result for a reply."""
-    actor, sight = _scene(entry.roster)
+    actor, observation = _scene(entry.roster)
     speech = parse(entry.reply)
-    joint = actor.joint(sight, {AGENT: speech})
+    joint = actor.joint(observation, {AGENT: speech})
     return Reading(
         calls=list(joint.accepted[AGENT]),
         messages=[f"{message.recipient}: {message.text}" for message in speech.messages],

@@ -8,8 +8,8 @@
 
 A turn goes through it like this (`khala_orchestrator.match` has the loop):
 
-    sight = observer.observe(snapshot, feedback)
-    joint = actor.joint(sight, {agent: parse(reply) for agent, reply in replies.items()})
+    observation = observer.observe(snapshot, feedback)
+    joint = actor.joint(observation, {agent: parse(reply) for agent, reply in replies.items()})
     turn = await game.act(joint.commands)
 
 Synchronous and pure, except `game`, which blocks. Above it: `orchestrator`. Below it: `protocol`. It knows no bus, no

@@ -80,8 +80,8 @@ def act(task: Callable[..., TaskConfig], world: Callable[..., Snapshot]) -> Call
     def play(reply: str, *, teams: slice = slice(None), max_actions: int = 9, **fields: Any) -> JointAction:
         agent = AGENT.model_copy(update={"teams": AGENT.teams[teams]})
         config = task("2s3z", agents=(agent,), max_actions=max_actions)
-        sight = Observer(config).observe(world(**fields))
-        return Actor(config).joint(sight, {"A": parse(reply)})
+        observation = Observer(config).observe(world(**fields))
+        return Actor(config).joint(observation, {"A": parse(reply)})
 
     return play
 

@@ -194,7 +194,7 @@ def test_a_game_is_found_by_name_by_sc2path_or_by_directory(tmp_path: Path) -> N
 def test_a_missing_game_is_told_with_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     cases: list[tuple[str, dict[str, Any], str]] = [
-        ("simulator", {}, "the simulator is not installed: `khala sc2 install DIR` lays it out"),
+        ("simulator", {}, "the simulator is not installed: `khala sc2 install DIR` installs it"),
         (
             "starcraft2",
             {"environ": {"SC2PATH": "/no/where"}},

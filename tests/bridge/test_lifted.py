@@ -48,6 +48,6 @@ def test_what_is_lifted_is_hit_in_the_air(
     )
     config = task("2s3z", agents=(agent,))
     queen = unit(0x100180001, "Queen", 12, 10, alliance="enemy", buff_ids=buffs)
-    sight = Observer(config).observe(snapshot([unit(0x100040001, attacker, 10, 10), queen]))
-    joint = Actor(config).joint(sight, {"A": parse("<Attack_Unit(0x100180001)>")})
+    observation = Observer(config).observe(snapshot([unit(0x100040001, attacker, 10, 10), queen]))
+    joint = Actor(config).joint(observation, {"A": parse("<Attack_Unit(0x100180001)>")})
     assert [rejection.reason for rejection in joint.rejections["A"]] == refused

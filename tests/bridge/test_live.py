@@ -53,9 +53,11 @@ class Battle:
         (self.now,) = game.reset()
 
     def turn(self, policy: Callable[[str], str]) -> Snapshot:
-        sight = self.observer.observe(self.now, self._feedback)
-        self.texts += [agent.text for agent in sight.agents.values()]
-        joint = self.actor.joint(sight, {name: parse(policy(agent.text)) for name, agent in sight.agents.items()})
+        observation = self.observer.observe(self.now, self._feedback)
+        self.texts += [agent.text for agent in observation.agents.values()]
+        joint = self.actor.joint(
+            observation, {name: parse(policy(agent.text)) for name, agent in observation.agents.items()}
+        )
         (turn,) = self.game.act([self.executor.plan(joint.commands, self.now, self.task.clock.step_loops)])
         self.turns.append(turn)
         refused = {

@@ -31,8 +31,8 @@ def first_team(task: Task) -> Callable[..., TeamObservation]:
 
     def see(*snapshots: Snapshot, **changed: Any) -> TeamObservation:
         observer = Observer(task("3s_vs_3z", **changed))
-        sights = [observer.observe(snapshot) for snapshot in snapshots]
-        return sights[-1].agents[AGENT].teams[0]
+        observations = [observer.observe(snapshot) for snapshot in snapshots]
+        return observations[-1].agents[AGENT].teams[0]
 
     return see
 
@@ -122,10 +122,10 @@ def test_an_action_is_valid_when_its_upgrade_is_researched(
     config = task("3s_vs_3z")
     agent = config.agents[0].model_copy(update={"actions": {"Stalker": ("Ability_Blink_Screen", "Stop")}})
     observer = Observer(config.model_copy(update={"agents": (agent,)}))
-    sight = observer.observe(snapshot([unit(1, "Stalker", 10, 10)], upgrades=upgrades)).agents[AGENT]
-    names = [action.name for action in sight.teams[0].view.actions]
+    observation = observer.observe(snapshot([unit(1, "Stalker", 10, 10)], upgrades=upgrades)).agents[AGENT]
+    names = [action.name for action in observation.teams[0].view.actions]
     assert names == (["Ability_Blink_Screen", "Stop"] if blinks else ["Stop"])
-    assert sight.view.upgrades == (("Blink",) if blinks else ())
+    assert observation.view.upgrades == (("Blink",) if blinks else ())
 
 
 def test_the_part_of_the_screen_on_the_map_is_told(unit: Make, snapshot: Snap, first_team: Any) -> None:
@@ -140,17 +140,17 @@ def test_a_task_may_count_the_screen_in_pixels(unit: Make, snapshot: Snap, first
 
 def test_time_and_resources_are_told(unit: Make, snapshot: Snap, task: Task) -> None:
     player = {"minerals": 50, "vespene": 25, "food_used": 10, "food_cap": 15}
-    sight = Observer(task("2s3z")).observe(snapshot([unit(1, "Stalker", 10, 10)], loop=1344, player=player))
-    view = sight.agents[AGENT].view
+    observation = Observer(task("2s3z")).observe(snapshot([unit(1, "Stalker", 10, 10)], loop=1344, player=player))
+    view = observation.agents[AGENT].view
     assert view.time_s == 60
     assert view.resources == Resources(minerals=50, vespene=25, supply_used=10, supply_cap=15)
 
 
 def test_an_agent_without_units_sees_nothing(snapshot: Snap, task: Task) -> None:
-    sight = Observer(task("2s3z")).observe(snapshot([])).agents[AGENT]
-    assert sight.teams == ()
-    assert sight.idle_teams == ("Zealot-1", "Zealot-2", "Stalker-1")
-    assert "Teams without units: Zealot-1, Zealot-2, Stalker-1" in sight.text
+    observation = Observer(task("2s3z")).observe(snapshot([])).agents[AGENT]
+    assert observation.teams == ()
+    assert observation.idle_teams == ("Zealot-1", "Zealot-2", "Stalker-1")
+    assert "Teams without units: Zealot-1, Zealot-2, Stalker-1" in observation.text
 
 
 # --- events -------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """From the replies of a side to one joint action: the second half of a turn.
 
-    joint = Actor(task).joint(sight, {"Zealots": parse(text), …})      what every agent wants, checked
-    plan = executor.plan(joint.commands, sight.snapshot, loops)        played by khala_bridge.game.game
+    joint = Actor(task).joint(observation, {"Zealots": parse(text), …})      what every agent wants, checked
+    plan = executor.plan(joint.commands, observation.snapshot, loops)        played by khala_bridge.game.game
 
 All calls of a turn share the same minerals, vespene, supply and workers, in the order of the agents in the task and
 of their words. The host's own orders come last, for units that no agent ordered. An actor keeps nothing between two
@@ -52,18 +52,20 @@ class Actor:
         self._task = task
         self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
 
-    def joint(self, sight: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
+    def joint(self, observation: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
         """Return the joint action of a turn.
 
         Args:
-            sight: what the agents see at the moment when their replies take effect.
+            observation: what the agents see at the moment when their replies take effect.
             replies: by agent; the units of an agent without a reply continue.
         """
-        translator = Translator(sight, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
+        translator = Translator(
+            observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents}
+        )
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}
-        for name, agent in sight.agents.items():
+        for name, agent in observation.agents.items():
             speech = replies.get(name)
             if speech is None:
                 continue
@@ -71,7 +73,7 @@ class Actor:
             commands += ordered
             accepted[name] = tuple(said)
             rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
-        for order in automatic(self._task.auto, sight.snapshot, translator.ledger, frozenset(translator.ordered)):
+        for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections)
 

@@ -42,9 +42,9 @@ SHORTEST = 6
 class Targets:
     """The possible targets at the moment of an observation."""
 
-    def __init__(self, sight: SideObservation) -> None:
-        self._sight = sight
-        self._units = sight.snapshot.units
+    def __init__(self, observation: SideObservation) -> None:
+        self._observation = observation
+        self._units = observation.snapshot.units
 
     def named(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that the first arguments name.
@@ -100,14 +100,14 @@ class Targets:
             x, y = camera.screen(place.x, place.y)
             if 0 <= x < camera.size and 0 <= y < camera.size:
                 return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
-        x, y = self._sight.map.minimap(place.x, place.y)
+        x, y = self._observation.map.minimap(place.x, place.y)
         return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
 
     def _is_seen(self, point: WorldPoint) -> bool:
         """Return True if the player sees a place now, or if the game sent no map."""
-        if not self._sight.snapshot.visibility.data:
+        if not self._observation.snapshot.visibility.data:
             return True
-        cells = land_of(self._sight.snapshot).sight  # (w, h)
+        cells = land_of(self._observation.snapshot).sight  # (w, h)
         x, y = min(int(point.x), cells.shape[0] - 1), min(int(point.y), cells.shape[1] - 1)
         return bool(cells[x, y] == SEEN_NOW)
 
@@ -117,9 +117,9 @@ class Targets:
         name, camera = said.team.view.name, said.team.camera
         if camera is None:
             raise CallRejected("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
-        x, y = self._in_frame(said, "screen", camera.size, "minimap", self._sight.map.minimap_size)
+        x, y = self._in_frame(said, "screen", camera.size, "minimap", self._observation.map.minimap_size)
         point = camera.world(ScreenPoint(x, y))
-        if not self._sight.map.holds(point):
+        if not self._observation.map.holds(point):
             x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
             inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
             raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
@@ -127,9 +127,9 @@ class Targets:
 
     def _minimap_point(self, said: Recognised) -> WorldPoint:
         screen = 0.0 if said.team.camera is None else said.team.camera.size
-        x, y = self._in_frame(said, "minimap", self._sight.map.minimap_size, "screen", screen)
-        point = self._sight.map.world(MinimapPoint(x, y))
-        if not self._sight.map.holds(point):
+        x, y = self._in_frame(said, "minimap", self._observation.map.minimap_size, "screen", screen)
+        point = self._observation.map.world(MinimapPoint(x, y))
+        if not self._observation.map.holds(point):
             raise CallRejected(
                 "out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map."
             )
@@ -145,7 +145,7 @@ class Targets:
                 "out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}."
             )
         sister = said.action.name.replace(frame.capitalize(), other.capitalize())
-        agent = self._sight.agents[said.team.team.agent].agent
+        agent = self._observation.agents[said.team.team.agent].agent
         has_sister = sister in {action.name for action in agent.catalogue()}
         hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
         where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
@@ -156,10 +156,10 @@ class Targets:
     @functools.cached_property
     def _remembered(self) -> dict[int, Unit]:
         """What the side remembers under the fog: resources and structures that it saw once."""
-        return self._sight.snapshot.known
+        return self._observation.snapshot.known
 
     def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
-        if tag in self._sight.snapshot.dead:
+        if tag in self._observation.snapshot.dead:
             return CallRejected("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
         wanted = said.action.target
         fits = [unit.tag for unit in self._units.values() if self._may_be_meant(said, unit, wanted)]
@@ -173,7 +173,7 @@ class Targets:
 
     def _not_of_team(self, said: Recognised, tag: int) -> CallRejected:
         name, own = said.team.view.name, said.team.team.tags
-        if tag in self._sight.snapshot.dead:
+        if tag in self._observation.snapshot.dead:
             return CallRejected("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
         units = f"units of team {name} are {', '.join(map(hex, own))}"
         unit = self._units.get(tag)
@@ -189,7 +189,7 @@ class Targets:
         return CallRejected("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
 
     def _team_of(self, tag: int) -> str | None:
-        teams = (team for agent in self._sight.agents.values() for team in agent.teams)
+        teams = (team for agent in self._observation.agents.values() for team in agent.teams)
         return next((team.view.name for team in teams if tag in team.team.tags), None)
 
     def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
@@ -202,7 +202,7 @@ class Targets:
         return f"did you mean {hex(meant)} ({self._units[meant].name})?"
 
     def _out_of_sight(self, said: Recognised, unit: Unit) -> CallRejected:
-        x, y = self._sight.map.minimap(unit.pos.x, unit.pos.y)
+        x, y = self._observation.map.minimap(unit.pos.x, unit.pos.y)
         what = f"{_SIDES[unit.alliance]} {unit.name} {hex(unit.tag)}"
         away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
         return CallRejected("unknown_target", f"The {what} {away}; move there first.")

@@ -60,16 +60,16 @@ class Command:
 class Translator:
     """Translates the calls of one turn, of all agents of a side, one after the other."""
 
-    def __init__(self, sight: SideObservation, max_actions: Mapping[str, int]) -> None:
+    def __init__(self, observation: SideObservation, max_actions: Mapping[str, int]) -> None:
         """Take the present observation, and by agent the number of actions that one team may have in a turn."""
-        self._sight = sight
-        self._snapshot = sight.snapshot
+        self._observation = observation
+        self._snapshot = observation.snapshot
         self._max_actions = max_actions
-        self.ledger = ledger_of(sight.snapshot)
-        self._side = side_of(sight.snapshot)
+        self.ledger = ledger_of(observation.snapshot)
+        self._side = side_of(observation.snapshot)
         self.ordered: set[int] = set()
         """Tags of the units that were told something in this turn."""
-        self._targets = Targets(sight)
+        self._targets = Targets(observation)
         self._count: dict[tuple[str, str], int] = {}
 
     def translate(self, said: Recognised) -> list[Command] | Rejection:
@@ -173,7 +173,7 @@ class Translator:
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
         """Return the units that have the action by the task."""
-        listed = self._sight.agents[said.team.team.agent].agent.actions
+        listed = self._observation.agents[said.team.team.agent].agent.actions
         types = {tag: self._snapshot.units[tag].name for tag in tags}
         found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
         if not found:

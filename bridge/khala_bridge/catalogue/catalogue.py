@@ -44,8 +44,8 @@ DIRECTORY = "actions"
 GROUPS = {
     "basic": "What every unit has.",
     "orders": "Orders of every race that the paper leaves out.",
-    "skill": "What units can do besides moving and fighting.",
-    "build": "Standard build: a worker of the team builds where it is told.",
+    "skill": "What units can do apart from moving and fighting.",
+    "build": "Standard build: a worker of the team builds at the named place.",
     "easy-build": "Easy build: the host finds the place, and for names without an argument the worker too. "
     "Structures that grow are here as well.",
     "train": "The host chooses a free producer.",

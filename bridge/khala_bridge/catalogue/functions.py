@@ -78,7 +78,7 @@ def check_against_pysc2() -> None:
         if mine != its:
             raise CatalogueError(
                 f"{FILE} says {' '.join(mine)!r} where PySC2 has {' '.join(its)!r}: "
-                "another PySC2 than 4.0.0? `python -m khala_bridge.catalogue.functions` writes the table anew"
+                "another PySC2 than 4.0.0? `python -m khala_bridge.catalogue.functions` writes the table again"
             )
     if len(here) != len(there):
         raise CatalogueError(

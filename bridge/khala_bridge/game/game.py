@@ -224,7 +224,7 @@ def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str
     """
     if source == "simulator":
         if simulator is None:
-            raise GameMissing("the simulator is not installed: `khala sc2 install DIR` lays it out")
+            raise GameMissing("the simulator is not installed: `khala sc2 install DIR` installs it")
         return check_install(simulator)
     if source == "starcraft2":
         if "SC2PATH" in environ:

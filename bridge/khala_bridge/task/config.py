@@ -130,7 +130,7 @@ class TeamConfig(Frozen):
             if self.unit_types or not self.actions:
                 raise ValueError(f"team {self.name} is of the kind side: it has actions and no unit_types")
         elif self.actions or not self.unit_types:
-            raise ValueError(f"team {self.name} needs unit_types; what they may be told is listed by type of unit")
+            raise ValueError(f"team {self.name} needs unit_types; their actions are listed by type of unit")
         return self
 
 

@@ -137,9 +137,9 @@ def task_of(case: Case) -> TaskConfig:
 # --- words ------------------------------------------------------------------------------------------------------------
 
 
-def replies(case: Case, stage: Stage, sight: SideObservation) -> Iterator[str]:
+def replies(case: Case, stage: Stage, observation: SideObservation) -> Iterator[str]:
     """Yield what a model could say so that the action is done, the most promising first."""
-    teams = (t for t in sight.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
+    teams = (t for t in observation.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
     team = next(teams, None)
     if team is None:
         return
@@ -147,16 +147,16 @@ def replies(case: Case, stage: Stage, sight: SideObservation) -> Iterator[str]:
     if case.action.subject == "two_units":
         named.append(hex(next(tag for tag in team.team.tags if tag != stage.caster)))
     named = named[: case.action.named]
-    for target in _targets(case.action, stage, team, sight):
+    for target in _targets(case.action, stage, team, observation):
         yield f"Actions:\n    Team {team.view.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
 
 
-def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObservation) -> Iterator[list[str]]:
+def _targets(action: Action, stage: Stage, team: TeamObservation, observation: SideObservation) -> Iterator[list[str]]:
     match action.target_kind:
         case None:
             yield []
         case "tag":
-            yield from ([hex(tag)] for tag in _tags(action, stage, sight.snapshot))
+            yield from ([hex(tag)] for tag in _tags(action, stage, observation.snapshot))
         case "screen":
             assert team.camera is not None
             for point in _points(action, stage):
@@ -165,7 +165,7 @@ def _targets(action: Action, stage: Stage, team: TeamObservation, sight: SideObs
                     yield [f"[{x:g}, {y:g}]"]
         case "minimap":
             for point in _points(action, stage):
-                x, y = sight.map.minimap(*point)
+                x, y = observation.map.minimap(*point)
                 yield [f"[{x:g}, {y:g}]"]
 
 

@@ -41,11 +41,11 @@ class Performance(NamedTuple):
 def perform(case: Case, stage: Stage, executor: Executor, said: str | None = None) -> Performance:
     """Try the replies that the stage offers until one has an effect; or only the one that was `said` before."""
     task, seen = task_of(case), stage.again()
-    sight = Observer(task).observe(seen.snapshot)
+    observation = Observer(task).observe(seen.snapshot)
     refusals: list[str] = []
     text, accepted, played = "", False, 0
-    for text in islice(replies(case, stage, sight), SAID) if said is None else (said,):
-        joint = Actor(task).joint(sight, {AGENT: parse(text)})
+    for text in islice(replies(case, stage, observation), SAID) if said is None else (said,):
+        joint = Actor(task).joint(observation, {AGENT: parse(text)})
         refusals += [rejection.message for rejection in joint.rejections[AGENT]]
         accepted = bool(joint.accepted[AGENT])
         if not joint.commands:

@@ -39,8 +39,8 @@ def show(task: Callable[..., TaskConfig], snapshot: Snap, battle: list[raw_pb2.U
         config = task(name)
         agent = config.agents[0].model_copy(update={"images": tuple(ImageSpec(**spec) for spec in specs)})
         config = config.model_copy(update={"agents": (agent,)})
-        sight = Observer(config).observe(shown if shown is not None else snapshot(battle))
-        return sight.agents[agent.name].pictures
+        observation = Observer(config).observe(shown if shown is not None else snapshot(battle))
+        return observation.agents[agent.name].pictures
 
     return see
 
@@ -192,8 +192,8 @@ def test_who_orders_the_whole_side_sees_all_of_it_as_its_own(snapshot: Snap, bat
     def title(name: str) -> str:
         config = load_task(name)
         agent = config.agents[0].model_copy(update={"images": (ImageSpec(what="minimap"),)})
-        sight = Observer(config.model_copy(update={"agents": (agent,)})).observe(snapshot(battle))
-        return sight.agents[agent.name].pictures[0].title
+        observation = Observer(config.model_copy(update={"agents": (agent,)})).observe(snapshot(battle))
+        return observation.agents[agent.name].pictures[0].title
 
     assert "blue: your units, red: enemies;" in title("simple64_eceb")  # a Commander with a team of the kind side
     assert "green: your side's other units" in title("pvz_task6_level1")  # an agent that only talks

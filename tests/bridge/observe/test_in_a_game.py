@@ -60,16 +60,16 @@ def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservati
     )
     client.ask(join_game=sc_pb.RequestJoinGame(race=RACES[request.param], options=interface(screen=0)))
     info = client.ask(game_info=sc_pb.RequestGameInfo()).game_info
-    observer, sights = Observer(task), []
+    observer, observations = Observer(task), []
     for _ in range(2):
         response = client.observe()
         blind = read_snapshot(response, read_info(info))
         answer = client.ask(query=question(blind)).query
         snapshot = read_snapshot(response, blind.info, abilities=available(answer))
-        sights.append(observer.observe(snapshot))
+        observations.append(observer.observe(snapshot))
         _train_a_worker(client, snapshot)
         client.step(LOOPS)
-    return task, sights
+    return task, observations
 
 
 def _train_a_worker(client: Client, snapshot: Snapshot) -> None:
@@ -83,10 +83,10 @@ def _train_a_worker(client: Client, snapshot: Snapshot) -> None:
 
 
 def test_every_kind_of_agent_reads_a_page(game: Any) -> None:
-    task, sights = game
+    task, observations = game
     assert {agent.kind for agent in task.agents} == SECTIONS_OF.keys()
-    for sight in sights:
-        for agent in sight.agents.values():
+    for observation in observations:
+        for agent in observation.agents.values():
             headings = re.findall(r"^\S.*$", agent.text, re.MULTILINE)
             assert headings[0] == "Game"
             assert headings[-1] == "Answer"
@@ -94,8 +94,8 @@ def test_every_kind_of_agent_reads_a_page(game: Any) -> None:
 
 
 def test_a_program_reads_of_it_what_the_view_says(game: Any) -> None:
-    _, sights = game
-    for agent in sights[-1].agents.values():
+    _, observations = game
+    for agent in observations[-1].agents.values():
         situation = read(agent.text)
         for team in agent.view.teams:
             seen = situation.teams[team.name]
@@ -104,29 +104,29 @@ def test_a_program_reads_of_it_what_the_view_says(game: Any) -> None:
 
 
 def test_what_is_trained_is_told(game: Any) -> None:
-    task, sights = game
+    task, observations = game
     worker = WORKERS[task.name]
-    text = sights[-1].agents["Developer"].text
+    text = observations[-1].agents["Developer"].text
     assert re.search(rf"(?m)^    In production: .*Train_{worker} \(1 at \d+%", text) or f"Finished: 1 {worker}" in text
 
 
 def test_workers_and_structures_are_counted(game: Any) -> None:
-    task, sights = game
-    counts = sights[0].agents["Commander"].view.counts
+    task, observations = game
+    counts = observations[0].agents["Commander"].view.counts
     units = {count.type: count.ready for count in counts.units}
     assert units[WORKERS[task.name]] == 12
     assert [count.ready for count in counts.structures] == [1]
 
 
 def test_a_builder_is_told_where_a_base_could_stand(game: Any) -> None:
-    _, sights = game
-    marks = sights[0].agents["Builder"].view.landmarks
+    _, observations = game
+    marks = observations[0].agents["Builder"].view.landmarks
     assert sum(mark.what == "base place" for mark in marks) >= 1
     assert sum(mark.what == "geyser" for mark in marks) == 2
 
 
 def test_a_page_keeps_to_its_budget_in_a_game(game: Any) -> None:
-    _, sights = game
-    text = sights[-1].agents["Fighter"].text
+    _, observations = game
+    text = observations[-1].agents["Fighter"].text
     assert tokens(text) <= 700 or "only the nearest enemies are told one by one" in text
     assert "Left out to keep this short" in text

@@ -40,14 +40,14 @@ def test_the_order_in_which_the_game_lists_units_does_not_matter(base: Any, look
     units = base()
     texts = []
     for listed in (units, units[::-1]):
-        sight = Observer(base_task).observe(look(listed))
-        texts.append({name: agent.text for name, agent in sight.agents.items()})
+        observation = Observer(base_task).observe(look(listed))
+        texts.append({name: agent.text for name, agent in observation.agents.items()})
     assert texts[0] == texts[1]
 
 
 def test_a_side_that_has_lost_everything_has_pages_still(base_task: Any, look: Any) -> None:
-    sight = Observer(base_task).observe(look([], abilities={}))
-    texts = {name: agent.text for name, agent in sight.agents.items()}
+    observation = Observer(base_task).observe(look([], abilities={}))
+    texts = {name: agent.text for name, agent in observation.agents.items()}
     assert "Teams without units: Stalker-1, Sentry-1" in texts["CombatGroup1"]
     assert "You have no team to order now" in texts["CombatGroup1"]
     assert "no Nexus: Train_Probe" in texts["Developer"]

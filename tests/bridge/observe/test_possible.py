@@ -32,8 +32,8 @@ def team(snapshot: Any) -> Callable[..., TeamView]:
         teams = [{"name": "T", "kind": "side", "actions": side} if side else {"name": "T", "unit_types": kinds}]
         agent = {"name": "A", "role": "", "teams": teams, "actions": {} if side else ACTIONS}
         config = {"name": "t", "map": "2s3z", "task": "", "agents": [agent]}
-        sight = Observer(TaskConfig.model_validate(config)).observe(snapshot(units, **fields))
-        view: TeamView = sight.agents["A"].view.teams[0]
+        observation = Observer(TaskConfig.model_validate(config)).observe(snapshot(units, **fields))
+        view: TeamView = observation.agents["A"].view.teams[0]
         return view
 
     return see
@@ -201,8 +201,8 @@ def test_what_a_worker_is_on_its_way_to_build_is_promised(unit: Any, look: Any, 
     place.x, place.y = 40.5, 40.5
     nexus = unit(2, "Nexus", 30.5, 16.5, is_powered=True)
     given = {2: able("Train_Probe_quick")}
-    sight = Observer(base_task).observe(look([probe, nexus], abilities=given))
-    developer = sight.agents["Developer"]
+    observation = Observer(base_task).observe(look([probe, nexus], abilities=given))
+    developer = observation.agents["Developer"]
     price = round(abilities()[functions()["Build_Gateway_screen"].ability_id].minerals)
     assert price == 150
     assert developer.view.resources.promised == (150, 0)

@@ -30,8 +30,8 @@ def told(base: Any, look: Any, base_task: TaskConfig) -> Any:
     def write(*names: str, text_tokens: int | None = None) -> str:
         changed = {"sections": names, "text_tokens": text_tokens}
         agents = tuple(a.model_copy(update=changed if a.name == "CombatGroup1" else {}) for a in base_task.agents)
-        sight = Observer(base_task.model_copy(update={"agents": agents})).observe(look(base()))
-        return str(sight.agents["CombatGroup1"].text)
+        observation = Observer(base_task.model_copy(update={"agents": agents})).observe(look(base()))
+        return str(observation.agents["CombatGroup1"].text)
 
     return write
 
@@ -83,12 +83,12 @@ def test_a_section_of_ones_own_can_be_shortened(told: Any) -> None:
     @section("epos")
     def epos(page: Page) -> Iterator[str]:
         yield "Epos"
-        yield "    " + f"Sing of {page.sight.agent.name}. " * 100
+        yield "    " + f"Sing of {page.observation.agent.name}. " * 100
 
     @shorter("epos", rank=5, says="most of the epos")
     def verse(page: Page) -> Iterator[str]:
         yield "Epos"
-        yield f"    Sing of {page.sight.agent.name}."
+        yield f"    Sing of {page.observation.agent.name}."
 
     assert told("epos", "answer", text_tokens=100) == (
         "Epos\n    Sing of CombatGroup1.\n\nLeft out to keep this short\n    most of the epos\n\n"

@@ -215,10 +215,10 @@ def judged(names: list[str], chance: Any, most: int) -> list[Action]:
     return chosen
 
 
-def calls(sight: SideObservation, action: Action) -> list[str]:
+def calls(observation: SideObservation, action: Action) -> list[str]:
     """Return an action as it may be written: by each unit that it may name, at each target that there is."""
-    tags = sight.agents["A"].teams[0].team.tags
-    listed, units = sight.agents["A"].agent.actions, sight.agents["A"].teams[0].view.units
+    tags = observation.agents["A"].teams[0].team.tags
+    listed, units = observation.agents["A"].agent.actions, observation.agents["A"].teams[0].view.units
     named = [unit.tag for unit in units if action.name in listed[unit.type]] if action.named else [""]
     targets = {
         None: [""],
@@ -238,12 +238,12 @@ class Answer(NamedTuple):
     spent: tuple[float, float, float]
 
 
-def answer(race: str, sight: SideObservation, team: int, call: str) -> Answer:
+def answer(race: str, observation: SideObservation, team: int, call: str) -> Answer:
     """Say a call in a turn of its own."""
-    translator = Translator(sight, {"A": 9})
+    translator = Translator(observation, {"A": 9})
     ledger = translator.ledger
     before = ledger.minerals, ledger.vespene, ledger.supply
-    seen = sight.agents["A"]
+    seen = observation.agents["A"]
     text = f"Actions:\n    Team {seen.teams[team].view.name}:\n        {call}"
     recognised = recognise(parse(text).calls[0], vocabulary(race), Addressees(seen, vocabulary(race)))
     assert not isinstance(recognised, Rejection), recognised
@@ -326,22 +326,22 @@ def over_states() -> Callable[[Any], Any]:
 @over_states()
 def test_what_is_offered_is_accepted(race: str, look: Any, data: st.DataObject) -> None:
     state = data.draw(states(race))
-    sight = look(race, state)
-    for number, team in enumerate(sight.agents["A"].teams):
+    observation = look(race, state)
+    for number, team in enumerate(observation.agents["A"].teams):
         names = [spec.name for spec in team.view.actions]
         for action in judged(names, state.chance, 12):
-            tried = [answer(race, sight, number, call).why for call in calls(sight, action)]
+            tried = [answer(race, observation, number, call).why for call in calls(observation, action)]
             assert None in tried, f"{action.name} is offered, and refused: {tried[0]}"
 
 
 @over_states()
 def test_what_is_barred_is_refused_for_the_same_reason(race: str, look: Any, data: st.DataObject) -> None:
     state = data.draw(states(race))
-    sight = look(race, state)
-    for number, team in enumerate(sight.agents["A"].teams):
+    observation = look(race, state)
+    for number, team in enumerate(observation.agents["A"].teams):
         reasons = {barred.action: barred.reason for barred in team.view.barred}
         for action in judged(list(reasons), state.chance, 12):
-            tried = [answer(race, sight, number, call) for call in calls(sight, action)]
+            tried = [answer(race, observation, number, call) for call in calls(observation, action)]
             done = [one.commands for one in tried if one.commands]
             assert not done, f"{action.name} is barred ({reasons[action.name]}), and done: {done}"
             told = {meaning(one.why) for one in tried if one.why is not None}
@@ -354,14 +354,14 @@ def test_what_is_barred_is_refused_for_the_same_reason(race: str, look: Any, dat
 @over_states()
 def test_a_price_is_taken_once(race: str, look: Any, data: st.DataObject) -> None:
     state = data.draw(states(race))
-    sight = look(race, state)
-    for number, team in enumerate(sight.agents["A"].teams):
+    observation = look(race, state)
+    for number, team in enumerate(observation.agents["A"].teams):
         prices = {offer.action: (offer.minerals, offer.vespene, offer.supply) for offer in team.view.offers}
         free = [spec.name for spec in team.view.actions if spec.name not in prices]
         asked = [*judged(list(prices), state.chance, 9), *judged(free, state.chance, 3)]
         for action in asked:
-            for call in calls(sight, action):
-                said = answer(race, sight, number, call)
+            for call in calls(observation, action):
+                said = answer(race, observation, number, call)
                 paid = sum(len(command.units) for command in said.commands if command.function == action.pysc2)
                 price = tuple(paid * one for one in prices.get(action.name, (0, 0, 0)))
                 assert said.spent == price, f"{call} is offered for {price} in all and takes {said.spent}"
@@ -379,10 +379,10 @@ def test_a_morph_takes_the_supply_that_it_is_offered_for(
     unit = Own(kind, 1.0, 0.0, 0, True, "", 1.0 if left >= supply else 0.0)
     player = {"minerals": 999, "vespene": 999, "food_cap": 50, "food_used": 50 - left}
     state = State((unit, unit, Own(needs, 1.0, 0.0, 0, True, "", 0.0)), player, (), True, random.Random(1))
-    sight = look("zerg", state)
-    side = sight.agents["A"].teams[1].view
+    observation = look("zerg", state)
+    side = observation.agents["A"].teams[1].view
     offers = {offer.action: (offer.supply, offer.times) for offer in side.offers}
-    said = answer("zerg", sight, 1, f"<{action}()>")
+    said = answer("zerg", observation, 1, f"<{action}()>")
     if left < supply:
         assert action not in offers
         assert said.why is not None

@@ -21,13 +21,13 @@ def game(page: Page) -> Iterator[str]:
     yield "Game"
     minutes, seconds = divmod(int(view.time_s), 60)
     yield f"{INDENT}Time: {minutes}:{seconds:02}"
-    if used.minerals or used.vespene or page.sight.agent.kind != "combat_group":
+    if used.minerals or used.vespene or page.observation.agent.kind != "combat_group":
         yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promised(used)}"
         yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
     if view.upgrades:
         yield f"{INDENT}Upgrades: {', '.join(view.upgrades)}"
-    if page.sight.idle_teams:
-        yield f"{INDENT}Teams without units: {', '.join(page.sight.idle_teams)}"
+    if page.observation.idle_teams:
+        yield f"{INDENT}Teams without units: {', '.join(page.observation.idle_teams)}"
 
 
 def _promised(resources: Resources) -> str:
@@ -41,9 +41,9 @@ def task(page: Page) -> Iterator[str]:
     """Show the tasks of all, of this agent, and of its teams at this time."""
     yield "Task"
     yield f"{INDENT}{one_line(page.task.task)}"
-    if page.sight.agent.task:
-        yield f"{INDENT}{one_line(page.sight.agent.task)}"
-    always = {team.team.config.name: team.team.config.task for team in page.sight.teams}
+    if page.observation.agent.task:
+        yield f"{INDENT}{one_line(page.observation.agent.task)}"
+    always = {team.team.config.name: team.team.config.task for team in page.observation.teams}
     yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
     yield from (f"{INDENT}Team {team.name}: {one_line(team.task)}" for team in page.teams if team.task)
 
@@ -54,8 +54,8 @@ def answer(page: Page) -> Iterator[str]:
     parts = ['"Analysis:"']
     yield "Answer"
     if page.teams:
-        limit = page.task.max_actions_of(page.sight.agent)
-        fights = page.sight.agent.kind == "combat_group"
+        limit = page.task.max_actions_of(page.observation.agent)
+        fights = page.observation.agent.kind == "combat_group"
         advice = "; use abilities before moving or attacking." if fights else "."
         yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team{advice}"
         yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'

@@ -46,7 +46,7 @@ class Feedback:
 class Page:
     """The data for the sections."""
 
-    sight: AgentObservation
+    observation: AgentObservation
     task: TaskConfig
     feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)
@@ -55,17 +55,17 @@ class Page:
     @property
     def view(self) -> View:
         """The agent's view."""
-        return self.sight.view
+        return self.observation.view
 
     @property
     def teams(self) -> Sequence[TeamView]:
         """The agent's teams that have units, or need none."""
-        return self.sight.view.teams
+        return self.observation.view.teams
 
     @property
     def correspondents(self) -> list[tuple[str, str]]:
         """Names and roles of all that this agent may write to."""
-        return [(agent.name, agent.role) for agent in self.task.correspondents(self.sight.agent)]
+        return [(agent.name, agent.role) for agent in self.task.correspondents(self.observation.agent)]
 
     @property
     def channels(self) -> Sequence[str]:

@@ -38,7 +38,7 @@ def messages(page: Page) -> Iterator[str]:
     """Show the messages of others."""
     if page.feedback.messages:
         yield "Messages"
-    yield from (f"{INDENT}{_message(message, page.sight.agent.name)}" for message in page.feedback.messages)
+    yield from (f"{INDENT}{_message(message, page.observation.agent.name)}" for message in page.feedback.messages)
 
 
 @section("communication")

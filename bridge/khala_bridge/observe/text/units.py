@@ -80,7 +80,7 @@ def _listed(heading: str, lines: list[str]) -> list[str]:
 
 
 def _all_units(page: Page, team: TeamView) -> list[str]:
-    if page.sight.agent.kind == "builder":
+    if page.observation.agent.kind == "builder":
         return _near(page, team, team.enemies)
     workers = [unit for unit in team.allies if is_worker(unit.type)]
     return [
@@ -93,7 +93,7 @@ def _all_units(page: Page, team: TeamView) -> list[str]:
 
 def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
     """Return own units and some enemies one by one, others by type; builders also get structures one by one."""
-    standing = [unit for unit in team.allies if is_structure(unit.type) and page.sight.agent.kind == "builder"]
+    standing = [unit for unit in team.allies if is_structure(unit.type) and page.observation.agent.kind == "builder"]
     return [
         *_listed("Your units:", _own_lines(page, team)),
         *_listed("Allied structures:", _lines(page, standing)),
