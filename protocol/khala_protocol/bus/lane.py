@@ -16,7 +16,7 @@ from khala_protocol.bus.config import BATCH_BYTES, TX_SLOTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from concurrent.futures import Executor
+    from concurrent.futures import Executor, Future
 
     Ask = Callable[[Callable[[bool], None]], None]
 
@@ -50,20 +50,24 @@ class Lane:
     def __init__(self, thread: Executor, gate: Gate) -> None:
         self._thread = thread
         self._gate = gate
-        self._waiting = 0
+        self._under_way: set[Future[float]] = set()
 
     async def put(self, put: Callable[[bytes], None], payload: bytes) -> None:
         """Call `put(payload)` and return when it has returned. If cancelled while waiting, the put may still happen."""
         size = len(payload) + HEADER_BYTES
-        if self._waiting or not self._gate.fits(size):
-            self._waiting += 1
-            try:
-                took_s = await asyncio.get_running_loop().run_in_executor(self._thread, _timed, put, payload)
-            finally:
-                self._waiting -= 1
+        if self._under_way or not self._gate.fits(size):
+            future = self._thread.submit(_timed, put, payload)
+            self._under_way.add(future)
+            future.add_done_callback(self._under_way.discard)
+            took_s = await asyncio.wrap_future(future)
         else:
             took_s = _timed(put, payload)
         self._gate.sent(size, took_s)
+
+    async def settle(self) -> None:
+        """Return when no put is under way, those whose callers were cancelled included."""
+        if under_way := [asyncio.wrap_future(future) for future in tuple(self._under_way)]:
+            await asyncio.wait(under_way)
 
 
 class Window:

@@ -345,8 +345,9 @@ class _Publisher:
 
     async def close(self) -> None:
         if not self._closed:
+            self._closed = True
+            await self._lane.settle()  # Zenoh refuses to undeclare what a put on a thread still uses
             self._held.take_back(*self._declared)
-        self._closed = True
 
 
 class _Token:

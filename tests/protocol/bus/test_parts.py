@@ -166,6 +166,28 @@ async def test_what_is_larger_than_the_window_never_runs_on_the_loop() -> None:
     assert thread.given == 3
 
 
+async def test_a_put_whose_caller_was_cancelled_is_waited_for_before_its_publisher_goes() -> None:
+    begun, goes_on, done = threading.Event(), threading.Event(), list[bytes]()
+
+    def slow(payload: bytes) -> None:
+        begun.set()
+        goes_on.wait()
+        done.append(payload)
+
+    with ThreadPoolExecutor(1) as thread:
+        lane = Lane(thread, Shut())
+        caller = asyncio.create_task(lane.put(slow, b"1"))
+        await asyncio.to_thread(begun.wait)
+        caller.cancel()
+        await asyncio.wait({caller})
+        settled = asyncio.create_task(lane.settle())
+        assert not (await asyncio.wait({settled}, timeout=0))[0]
+        goes_on.set()
+        await settled
+        assert done == [b"1"]
+    await lane.settle()
+
+
 async def test_a_put_that_was_slow_sends_the_next_to_the_thread_until_one_is_quick() -> None:
     peer, thread = Peer(), Inline()
     gate = DropGate()
