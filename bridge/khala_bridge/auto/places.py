@@ -15,10 +15,10 @@ from khala_bridge.state.side import finished, place
 
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import RuleRequest
+    from khala_bridge.auto.sites import Costs
     from khala_bridge.rules import Ledger
     from khala_bridge.state import Unit
     from khala_bridge.state.ground import Land
-    from khala_bridge.state.ground.terrain import Floats
 
 OWN_GAS: Final = 10.0
 """A geyser within this distance of a town hall belongs to it; farther ones are not worth the way."""
@@ -59,11 +59,11 @@ def _own(units: list[Unit]) -> list[Unit]:
     return [unit for unit in units if unit.is_own]
 
 
-def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Floats:
+def _for_pylon(land: Land, ledger: Ledger, halls: list[WorldPoint]) -> Costs:
     """Return the cost (w, h) of a place for a Pylon: high for few new places in its field, or a wrong distance."""
     away = near(land, halls, reach=BASE_REACH, corner=True)
     power = np.minimum(new_power(land, ledger), PYLON_WISH)
-    cost: Floats = np.abs(away - PYLON_AWAY) + (PYLON_WISH - power) / 2
+    cost: Costs = np.abs(away - PYLON_AWAY) + (PYLON_WISH - power) / 2
     return cost
 
 

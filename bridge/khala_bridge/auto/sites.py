@@ -7,7 +7,7 @@ computed for the whole map at once, on grids `[x, y]` of the cells that `Footpri
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
@@ -20,10 +20,14 @@ from khala_bridge.state.ground.resources import coordinates, everywhere
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from numpy.typing import NDArray
+
     from khala_bridge.rules import Ledger
     from khala_bridge.state.ground import Footprint, Land
     from khala_bridge.state.ground.footprints import Cells
     from khala_bridge.state.ground.terrain import Bools, Floats
+
+    Costs: TypeAlias = NDArray[np.floating[Any]]
 
 PYLON_REACH: Final = 4
 """A structure of 3 x 3 whose middle is at most this many cells away on both axes is in the field of a Pylon (6.5)."""
@@ -80,7 +84,7 @@ def good(land: Land, ledger: Ledger, structure: str) -> Bools:
     return result
 
 
-def best(grid: Bools, cost: Floats) -> tuple[int, int] | None:
+def best(grid: Bools, cost: Costs) -> tuple[int, int] | None:
     """Return the marked cell with the least cost; among equal ones the one with the least coordinates."""
     costs = np.where(grid, np.round(cost, 3), np.inf)
     place = int(np.argmin(costs))
