@@ -219,9 +219,9 @@ async def battle(task: TaskConfig) -> Snapshot:
     """Return a snapshot from the middle of a battle."""
     sc2path, _ = games.find("simulator")
     async with one_side(MatchConfig(task=task, run="bench"), sc2path) as game:
-        snapshot = await game.reset()
+        (snapshot,) = await game.reset()
         for _ in range(BATTLE_STEPS):
-            snapshot = (await game.act([])).snapshot
+            snapshot = (await game.act([[]], task.clock.step_loops))[0].snapshot
     return snapshot
 
 

@@ -16,7 +16,7 @@ from khala.children import Children
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_bridge.act import executor_of
-from khala_bridge.game.game import GameConfig, GameThread, OneSide
+from khala_bridge.game.game import GameConfig, GameThread, Sides
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.host import host
 from khala_protocol.bus.config import BusConfig
@@ -112,11 +112,11 @@ async def play_hosted(
         return await host(config, side, session, watch=watch)
 
 
-def one_side(config: MatchConfig, sc2path: Path) -> OneSide:
+def one_side(config: MatchConfig, sc2path: Path) -> Sides:
     """Return the game of a match, not started yet."""
     task = config.task
     started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed, render_px=task.render_px)
-    return OneSide(GameThread(lambda: PySC2Game(started)), executor_of(task), step_loops=task.clock.step_loops)
+    return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(task)])
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:

@@ -10,7 +10,7 @@ A turn goes through it like this (`khala_orchestrator.match` has the loop):
 
     observation = observer.observe(snapshot, feedback)
     joint = actor.joint(observation, {agent: parse(reply) for agent, reply in replies.items()})
-    turn = await game.act(joint.commands)
+    (turn,) = await game.act([joint.commands], loops)
 
 Synchronous and pure, except `game`, which blocks. Above it: `orchestrator`. Below it: `protocol`. It knows no bus, no
 deadline, and not which program the game is.

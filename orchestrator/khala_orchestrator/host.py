@@ -24,7 +24,7 @@ from khala_protocol.recording import Recorder
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_bridge.game.game import OneSide
+    from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match import MatchObserver
     from khala_orchestrator.turn import AgentPool
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 async def host(
-    config: MatchConfig, game: OneSide, bus: Bus, *, watch: Callable[[Wire], None] = lambda _: None
+    config: MatchConfig, game: Sides, bus: Bus, *, watch: Callable[[Wire], None] = lambda _: None
 ) -> list[Result]:
     """Wait for the agents, play the match with them, and return its results.
 
@@ -68,7 +68,7 @@ async def host(
         return [result async for result in match.play()]
 
 
-def assemble(config: MatchConfig, game: OneSide, agents: AgentPool, match_observer: MatchObserver) -> Match:
+def assemble(config: MatchConfig, game: Sides, agents: AgentPool, match_observer: MatchObserver) -> Match:
     """Return a match with everything between the game and the agents."""
     task = config.task
     reach = {

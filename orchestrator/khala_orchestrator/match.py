@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 
     from khala_bridge.act import Actor, JointAction
-    from khala_bridge.game.game import OneSide, StepResult
+    from khala_bridge.game.game import Sides, StepResult
     from khala_bridge.observe import AgentObservation, Observer, SideObservation
     from khala_bridge.state import Snapshot
     from khala_orchestrator.config import MatchConfig
@@ -94,7 +94,7 @@ class Match:
     """One side's agents in one game, for a number of episodes."""
 
     config: MatchConfig
-    game: OneSide
+    game: Sides
     observer: Observer
     actor: Actor
     agents: AgentPool
@@ -109,7 +109,7 @@ class Match:
     async def _episode(self, episode: int) -> Result:
         began = time.perf_counter()
         await self._begin(episode)
-        snapshot = await self.game.reset()
+        (snapshot,) = await self.game.reset()
         tally, step = Tally(snapshot), 0
         feedback: Mapping[str, Feedback] = {}
         while not snapshot.ended and step != self.config.task.max_steps:
@@ -132,7 +132,7 @@ class Match:
             messages = self._messages(at, speeches)
             post = await self._deliver(messages, speeches)
         with watch.phase("game"):
-            result = await self.game.act(joint.commands)
+            (result,) = await self.game.act([joint.commands], self.config.task.clock.step_loops)
         heard = self._feedback(joint, result, post)
         report = self._report(at, answers, messages, heard, result, watch.timings(answers))
         return StepOutcome(report, result.snapshot, heard)

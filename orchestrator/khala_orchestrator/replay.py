@@ -22,7 +22,7 @@ from khala_protocol.recording.difference import Difference
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from khala_bridge.game.game import OneSide
+    from khala_bridge.game.game import Sides
     from khala_orchestrator.turn import Question
     from khala_protocol.messages import AgentReport
     from khala_protocol.recording import RecordedStep, Recording
@@ -41,7 +41,7 @@ def recorded_config(recording: Recording) -> MatchConfig:
     return MatchConfig(task=task, run=run.run, seed=run.seed, episodes=run.episodes)
 
 
-async def replay(recording: Recording, game: OneSide) -> list[Difference]:
+async def replay(recording: Recording, game: Sides) -> list[Difference]:
     """Play a recording again, up to its last complete step.
 
     Args:

@@ -14,7 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.act import JointAction, PlanStep, Played
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
-from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, OneSide, StepResult, find_sc2
+from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.task.maps import known_maps
@@ -76,9 +76,9 @@ class FakeGame:
 
 async def test_a_side_plays_commands_and_gets_snapshots(snapshot: Callable[..., Snapshot]) -> None:
     fake = FakeGame(snapshot)
-    async with OneSide(GameThread(lambda: fake), RawExecutor(), step_loops=11) as game:
-        first = await game.reset()
-        turn = await game.act(JointAction().commands)
+    async with Sides(GameThread(lambda: fake), [RawExecutor()]) as game:
+        (first,) = await game.reset()
+        (turn,) = await game.act([JointAction().commands], 11)
         assert (first.game_loop, turn.snapshot.game_loop) == (0, 11)
         assert (turn.played, turn.env_steps) == (Played(), 1)
         assert game.info.version == "4.10.0.75689"

@@ -11,7 +11,7 @@ import pytest_asyncio
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.act.raw import RawExecutor
-from khala_bridge.game.game import GameConfig, GameThread, OneSide
+from khala_bridge.game.game import GameConfig, GameThread, Sides
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
@@ -38,17 +38,17 @@ WAIT_S = 0.4
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def game(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[OneSide]:
+async def game(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Sides]:
     sc2path = install(tmp_path_factory.mktemp("sc2"))
     config = GameConfig(sc2path=sc2path, map=load_task("2s3z_pair").map_spec, seed=1)
-    async with OneSide(GameThread(lambda: PySC2Game(config)), RawExecutor(), step_loops=11) as side:
+    async with Sides(GameThread(lambda: PySC2Game(config)), [RawExecutor()]) as side:
         yield side
 
 
 class Table:
     """A match of two agents, the Zealots well-behaved."""
 
-    def __init__(self, game: OneSide, steps: int, record: Path | None = None, **changes: Any) -> None:
+    def __init__(self, game: Sides, steps: int, record: Path | None = None, **changes: Any) -> None:
         task = change(load_task("2s3z_pair"), max_wait_s=WAIT_S, max_steps=steps, **changes)
         self.config = MatchConfig(task=task, run=RUN, assemble_s=5, record=record)
         self.game = game
@@ -87,7 +87,7 @@ def attack(_: Briefing, seen: Observation) -> str:
     return "Actions:\n" + "\n".join(teams)
 
 
-async def test_both_agents_play_and_their_calls_are_executed_in_one_step(game: OneSide) -> None:
+async def test_both_agents_play_and_their_calls_are_executed_in_one_step(game: Sides) -> None:
     table = Table(game, steps=10)
     result = await table.play(attack)
     assert result.statuses == {"Stalkers": {"ok": 10}, "Zealots": {"ok": 10}}
@@ -97,7 +97,7 @@ async def test_both_agents_play_and_their_calls_are_executed_in_one_step(game: O
     assert max(len(report.functions) for report in table.reports) == 3
 
 
-async def test_an_agent_that_stalls_is_late_and_the_game_goes_on(game: OneSide) -> None:
+async def test_an_agent_that_stalls_is_late_and_the_game_goes_on(game: Sides) -> None:
     async def stall(_: Briefing, seen: Observation) -> str:
         if seen.step >= 2:
             await asyncio.Event().wait()
@@ -111,7 +111,7 @@ async def test_an_agent_that_stalls_is_late_and_the_game_goes_on(game: OneSide) 
     assert result.steps == 4
 
 
-async def test_an_agent_that_dies_in_a_step_is_gone_and_not_waited_for(game: OneSide) -> None:
+async def test_an_agent_that_dies_in_a_step_is_gone_and_not_waited_for(game: Sides) -> None:
     table = Table(game, steps=5)
 
     async def die(_: Briefing, seen: Observation) -> str:
@@ -127,7 +127,7 @@ async def test_an_agent_that_dies_in_a_step_is_gone_and_not_waited_for(game: One
     assert result.statuses["Stalkers"] == {"ok": 2, "gone": 3}
 
 
-async def test_an_agent_that_sends_garbage_is_named_and_the_others_play(game: OneSide) -> None:
+async def test_an_agent_that_sends_garbage_is_named_and_the_others_play(game: Sides) -> None:
     table = Table(game, steps=3)
     liar = table.broker.session()
 
@@ -142,7 +142,7 @@ async def test_an_agent_that_sends_garbage_is_named_and_the_others_play(game: On
     assert "no JSON object" in table.reports[0].agents[0].detail
 
 
-async def test_a_reply_that_comes_late_is_counted_and_never_executed(game: OneSide, tmp_path: Path) -> None:
+async def test_a_reply_that_comes_late_is_counted_and_never_executed(game: Sides, tmp_path: Path) -> None:
     table = Table(game, steps=4, record=tmp_path / "late.mcap")
     liar = table.broker.session()
     replies: list[bytes] = []
@@ -165,7 +165,7 @@ async def test_a_reply_that_comes_late_is_counted_and_never_executed(game: OneSi
     assert sorted(recorded) == [0, 0, 0, 0, 1, 1, 1, 2, 2, 3]  # ignored replies are recorded as well
 
 
-async def test_an_action_said_twice_is_executed_once(game: OneSide) -> None:
+async def test_an_action_said_twice_is_executed_once(game: Sides) -> None:
     table = Table(game, steps=3)
     liar = table.broker.session()
 
@@ -182,7 +182,7 @@ async def test_an_action_said_twice_is_executed_once(game: OneSide) -> None:
     assert sum(report.agents[0].ignored for report in table.reports) >= 2
 
 
-async def test_what_one_agent_says_the_other_reads_in_the_next_step(game: OneSide) -> None:
+async def test_what_one_agent_says_the_other_reads_in_the_next_step(game: Sides) -> None:
     table = Table(game, steps=2)
     heard: list[str] = []
 
@@ -197,7 +197,7 @@ async def test_what_one_agent_says_the_other_reads_in_the_next_step(game: OneSid
 
 
 async def test_what_agents_write_to_each_other_is_on_the_bus_and_recorded_in_its_step(
-    game: OneSide, tmp_path: Path
+    game: Sides, tmp_path: Path
 ) -> None:
     table = Table(game, steps=2, record=tmp_path / "said.mcap")
     heard = await table.broker.session().subscribe(agent_key(RUN, "blue", "Stalkers", Topic.MESSAGE), Delivery.LOG)
@@ -221,7 +221,7 @@ async def test_what_agents_write_to_each_other_is_on_the_bus_and_recorded_in_its
     assert [[m.text for m in seen.messages] for seen in recording.observations("Zealots")] == [[], ["go 0"]]
 
 
-async def test_the_default_reply_of_the_task_counts_for_an_agent_that_says_nothing(game: OneSide) -> None:
+async def test_the_default_reply_of_the_task_counts_for_an_agent_that_says_nothing(game: Sides) -> None:
     async def stall(_: Briefing, seen: Observation) -> str:
         if seen.step == 1:
             await asyncio.Event().wait()
@@ -234,7 +234,7 @@ async def test_the_default_reply_of_the_task_counts_for_an_agent_that_says_nothi
     assert [[m.text for m in report.messages] for report in table.reports] == [[], ["I am late"]]
 
 
-async def test_the_phases_of_a_step_take_all_of_its_time(game: OneSide) -> None:
+async def test_the_phases_of_a_step_take_all_of_its_time(game: Sides) -> None:
     table = Table(game, steps=20)
     result = await table.play(attack)
     phases = [sum(report.timings.model_dump().values()) for report in table.reports]

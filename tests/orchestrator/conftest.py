@@ -15,7 +15,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError
-from khala_bridge.game.game import GameIdentity, GameThread, OneSide, StepResult
+from khala_bridge.game.game import GameIdentity, GameThread, Sides, StepResult
 from khala_bridge.knowledge import knowledge
 from khala_bridge.state import read_info, read_snapshot
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -233,13 +233,13 @@ class _Here(ThreadPoolExecutor):
 
 
 @pytest.fixture
-def start() -> Callable[[StillGame], Awaitable[OneSide]]:
+def start() -> Callable[[StillGame], Awaitable[Sides]]:
     """Starts a game in the loop's own thread."""
 
-    async def started(game: StillGame) -> OneSide:
+    async def started(game: StillGame) -> Sides:
         thread = GameThread(lambda: game, hang_s=None)
         thread._threads = _Here()
-        return await OneSide(thread, RawExecutor(), step_loops=11).__aenter__()
+        return await Sides(thread, [RawExecutor()]).__aenter__()
 
     return started
 
@@ -334,7 +334,7 @@ class Hall:
 
     broker: MemoryBroker
     game: StillGame
-    side: OneSide
+    side: Sides
     watched: list[Wire] = field(default_factory=list)
 
     async def play(
@@ -376,6 +376,6 @@ class Hall:
 
 
 @pytest.fixture
-async def hall(broker: MemoryBroker, start: Callable[[StillGame], Awaitable[OneSide]]) -> Hall:
+async def hall(broker: MemoryBroker, start: Callable[[StillGame], Awaitable[Sides]]) -> Hall:
     game = StillGame()
     return Hall(broker, game, await start(game))

@@ -17,7 +17,7 @@ from khala_protocol.messages import Briefing, Message, Received, Reply, Report, 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable
 
-    from khala_bridge.game.game import OneSide
+    from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.turn import Question
     from khala_protocol.messages import Observation
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     MakeConfig = Callable[..., MatchConfig]
     MakeGame = Callable[..., StillGame]
-    Start = Callable[[StillGame], Awaitable[OneSide]]
+    Start = Callable[[StillGame], Awaitable[Sides]]
     Play = Callable[..., Awaitable["Played"]]
 
 CLOCK = "jumps"

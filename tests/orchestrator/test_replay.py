@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
     from pathlib import Path
 
-    from khala_bridge.game.game import OneSide
+    from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Wire
     from khala_protocol.recording.difference import Difference
@@ -65,7 +65,7 @@ async def recording(hall: Hall, config: Callable[..., MatchConfig], tmp_path: Pa
 
 @pytest.fixture
 def again(
-    start: Callable[[StillGame], Awaitable[OneSide]], still_game: Callable[..., StillGame]
+    start: Callable[[StillGame], Awaitable[Sides]], still_game: Callable[..., StillGame]
 ) -> Callable[..., Awaitable[list[Difference]]]:
     """Replays a recording in a game of its own; `after` is what happens there."""
 

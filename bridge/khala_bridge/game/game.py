@@ -4,8 +4,8 @@
 it, and ends it when it hangs. The implementation on PySC2 is `khala_bridge.game.pysc2_game`. No code above this module
 knows whether it uses StarCraft II or Khala's simulator: they differ only in the directory in `GameConfig`.
 
-Players are those that Khala plays, in the order of the configuration: one now, two later; so a game returns a tuple of
-snapshots and not one. `OneSide` is the game of a match with one side: commands in, one snapshot out.
+Players are those that Khala plays, in the order of the configuration; a game returns a snapshot for each. `Sides` is
+the game of a match: commands in, snapshots out.
 """
 
 from __future__ import annotations
@@ -171,15 +171,17 @@ class GameThread:
             ) from None
 
 
-class OneSide:
-    """A game in which Khala plays one side; an async context manager around its thread."""
+class Sides:
+    """A game in which Khala plays one side or more; an async context manager around its thread.
 
-    def __init__(self, thread: GameThread, executor: Executor, *, step_loops: int) -> None:
-        """Take a game that is not entered yet, an executor, and the number of loops between two decisions."""
+    Commands go in and snapshots come out by side, in the order of the executors.
+    """
+
+    def __init__(self, thread: GameThread, executors: Sequence[Executor]) -> None:
+        """Take a game that is not entered yet, and an executor for each side."""
         self._thread = thread
-        self._executor = executor
-        self._step_loops = step_loops
-        self._now: Snapshot | None = None
+        self._executors = tuple(executors)
+        self._now: tuple[Snapshot, ...] = ()
 
     async def __aenter__(self) -> Self:
         """Start the game."""
@@ -197,18 +199,20 @@ class OneSide:
         """What plays."""
         return self._thread.info
 
-    async def reset(self) -> Snapshot:
-        """Begin an episode; return its first snapshot."""
-        self._executor.begin()
-        (self._now,) = await self._thread.reset()
+    async def reset(self) -> tuple[Snapshot, ...]:
+        """Begin an episode; return its first snapshots."""
+        for executor in self._executors:
+            executor.begin()
+        self._now = await self._thread.reset()
         return self._now
 
-    async def act(self, commands: Sequence[Command]) -> StepResult:
-        """Play the commands of a joint action for the game loops of one step."""
-        assert self._now is not None, "the game is reset before it is played"
-        (result,) = await self._thread.act([self._executor.plan(commands, self._now, self._step_loops)])
-        self._now = result.snapshot
-        return result
+    async def act(self, commands: Sequence[Sequence[Command]], loops: int) -> tuple[StepResult, ...]:
+        """Play the commands of each side for a number of game loops."""
+        assert self._now, "the game is reset before it is played"
+        sides = zip(self._executors, commands, self._now, strict=True)
+        results = await self._thread.act([executor.plan(given, now, loops) for executor, given, now in sides])
+        self._now = tuple(result.snapshot for result in results)
+        return results
 
 
 def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str, str] = os.environ) -> Path:
