@@ -20,8 +20,8 @@ from khala_agents.llm.vision import ANTHROPIC, OPENAI
 from khala_agents.scripted.players import PLAYERS
 from khala_bridge.task.images import PAPER, ImageSpec
 from khala_orchestrator.config import MatchConfig, load_task
-from khala_orchestrator.host import assemble
-from khala_orchestrator.match import SilentObserver
+from khala_orchestrator.host import sides_of
+from khala_orchestrator.match import Match, SilentObserver
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Reply
@@ -125,7 +125,7 @@ async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Quest
     agents = Played(step)
     async with one_side(config, sc2path) as game:
         try:
-            async for _ in assemble(config, game, agents, SilentObserver()).play():
+            async for _ in Match(config, game, sides_of(config), agents, SilentObserver()).play():
                 pass
         except Stop:
             pass

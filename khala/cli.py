@@ -30,11 +30,13 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Result, Wire
+from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells expect it."""
+NOT_VALID = 3
+"""Exit code after a match with an episode that says nothing about its agents."""
 
 app = typer.Typer(
     name="khala",
@@ -73,6 +75,21 @@ RunName = Annotated[
 ]
 MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
 StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
+Rule = Annotated[
+    ClockRule | None,
+    typer.Option(
+        "--clock",
+        help="Time that thinking costs: frozen (none), budget (always the same), token (by tokens), realtime.",
+        show_default="as the task says",
+    ),
+]
+ThinkingLoops = Annotated[
+    int | None, typer.Option(min=0, help="Clock budget: game loops that each decision costs; 22.4 are a second.")
+]
+Speed = Annotated[float | None, typer.Option(min=0.01, help="Clock realtime: speed of the game; 1 is that of ladders.")]
+Grace = Annotated[
+    float | None, typer.Option(min=0, help="How long a required agent may be away before the match ends, in seconds.")
+]
 MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after this many steps.")]
 ExecutorName = Annotated[
     str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
@@ -109,8 +126,12 @@ def run(
     seed: Seed = 1,
     episodes: Episodes = 1,
     executor: ExecutorName = None,
+    clock: Rule = None,
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
+    thinking_loops: ThinkingLoops = None,
+    speed: Speed = None,
+    grace: Grace = None,
     max_steps: MaxSteps = None,
     images: Images = None,
     run: RunName = None,
@@ -127,7 +148,8 @@ def run(
 
     config = _config(
         task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps, images=images,
+        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
+        speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     minds = Minds(model, model_name, base_url, policy, budget_usd, latency)
     _until_interrupted(config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch))
@@ -146,8 +168,12 @@ def host(
     seed: Seed = 1,
     episodes: Episodes = 1,
     executor: ExecutorName = None,
+    clock: Rule = None,
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
+    thinking_loops: ThinkingLoops = None,
+    speed: Speed = None,
+    grace: Grace = None,
     max_steps: MaxSteps = None,
     images: Images = None,
     assemble: Assemble = 60.0,
@@ -162,7 +188,8 @@ def host(
 
     config = _config(
         task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, max_wait_s=max_wait, step_loops=step_loops, max_steps=max_steps, images=images,
+        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
+        speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     bus = _bus(connect, listen, insecure=insecure)
     _until_interrupted(
@@ -271,3 +298,6 @@ def _until_interrupted(
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
+    if reasons := dict.fromkeys(result.invalid_because for result in results if not result.valid):
+        screen.print(f"[bold red]not valid:[/] {escape('; '.join(reasons))}", soft_wrap=True)
+        raise typer.Exit(NOT_VALID)

@@ -99,6 +99,7 @@ class Workshop:
             limits=limits,
             try_timeout_s=config.try_timeout_s,
             vision=config.vision,
+            pace=config.pace,
         )
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:

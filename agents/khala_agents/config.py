@@ -23,7 +23,7 @@ from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Frozen
+from khala_protocol.messages import Frozen, Pace
 
 _VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
 _KEY_LIKE = re.compile(r"key|token$|secret|password|authorization", re.IGNORECASE)
@@ -53,6 +53,8 @@ class ModelConfig(Frozen):
     retry: RetryRule = RetryRule()
     limits: LimitRules = LimitRules()
     prices: Prices = Prices()
+    pace: Pace | None = None
+    """How fast it reads and writes: what its decisions cost with the clock `token`; None: the task says."""
     images: Vision | None = None
     """Whether the model sees: `true`, or how finely it looks and how its pictures are counted. A model that does not
     see is sent no pictures."""

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context
-    from khala_protocol.messages import Briefing, ChatMessage
+    from khala_protocol.messages import Briefing, ChatMessage, Pace
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +52,7 @@ class LLMPolicy(Policy):
         limits: shared with other agents of the process.
         try_timeout_s: time for one try; the time to the deadline if that is shorter.
         vision: how the model sees; None if it does not see, and pictures are left out.
+        pace: how fast the model is, for the clock `token`; None: the task says.
         rng: jitter of the waits between tries.
     """
 
@@ -64,12 +65,14 @@ class LLMPolicy(Policy):
         limits: Limits | None = None,
         try_timeout_s: float = 45.0,
         vision: Vision | None = None,
+        pace: Pace | None = None,
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
         self.limits = limits or Limits()
         self.try_timeout_s = try_timeout_s
         self.vision = vision
+        self.pace = pace
         self._warned_blind = False
         self._memory = memory or NoMemory()
         self._retry = retry or RetryRule()

@@ -28,7 +28,7 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_protocol.messages import Briefing, ModelCall, Observation
+    from khala_protocol.messages import Briefing, ModelCall, Observation, Pace
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -100,7 +100,13 @@ class Context:
 
 
 class Policy(ABC):
-    """The base class of policies, which decide for one agent. Only `decide` is required."""
+    """The base class of policies, which decide for one agent. Only `decide` is required.
+
+    Attributes:
+        pace: how fast its model is, for the clock `token`; None: the task says.
+    """
+
+    pace: Pace | None = None
 
     async def check(self) -> None:  # noqa: B027  # a hook, not a duty
         """Look for what is wrong, before the agent joins a run.

@@ -12,6 +12,7 @@ are `protocol` and a policy; above it are the command line, and tests.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections import Counter
 from contextlib import AsyncExitStack
@@ -120,6 +121,7 @@ class Worker:
         self._card: Run | None = None
         self._last_result: int | None = None
         self._newest: tuple[int, int] | None = None
+        self._last_reply: Reply | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
 
@@ -183,6 +185,7 @@ class Worker:
         async for observation in self._read(Observation, links.observations):
             at = (observation.episode, observation.step)
             if self._newest is not None and at <= self._newest:
+                await self._repeat(at, links)
                 continue
             self._newest = at
             self._supersede()
@@ -235,9 +238,17 @@ class Worker:
             latency_s=latency_s,
             attempts=attempts or decision.attempts,
             usage=usage if attempts else decision.usage,
+            pace=self._policy.pace,
         )
+        self._last_reply = reply
         await links.replies.put(encode(reply))
         self._count(reply)
+
+    async def _repeat(self, at: tuple[int, int], links: Links) -> None:
+        """Send the reply to an observation again that the host sent again: a link was down, and it may be lost."""
+        if self._last_reply is not None and (self._last_reply.episode, self._last_reply.step) == at:
+            with contextlib.suppress(BusError):
+                await links.replies.put(encode(self._last_reply))
 
     def _supersede(self) -> None:
         if self._deciding is not None:

@@ -50,7 +50,7 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         game=f"{config.game} {game.version}",
         executor=task.executor,
         clock=task.clock,
-        agents=task.cards(),
+        agents=tuple(card for side in task.per_side() for card in side.cards()),
         catalogue_sha256=catalogue_sha256(),
         versions={"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES},
         config=task.model_dump(mode="json"),

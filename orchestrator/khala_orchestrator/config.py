@@ -22,7 +22,7 @@ from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Frozen
+from khala_protocol.messages import Clock, Frozen
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,14 +78,15 @@ def load_task(name: str) -> TaskConfig:
 def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     """Return the task with fields replaced. None changes nothing.
 
-    `max_wait_s` and `step_loops` are those of its clock, `images` are the images of all agents, see `images_for`.
+    `rule`, `max_wait_s` and other fields of `Clock` are those of its clock, `images` are the images of all agents, see
+    `images_for`.
 
     Raises:
         ConfigError: a value does not fit.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     fields = task.model_dump()
-    for name in ("max_wait_s", "step_loops"):
+    for name in Clock.model_fields:
         if name in given:
             fields["clock"][name] = given.pop(name)
     try:

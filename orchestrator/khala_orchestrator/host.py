@@ -10,14 +10,13 @@ import contextlib
 import gc
 from typing import TYPE_CHECKING
 
-from khala_bridge.act import Actor
-from khala_bridge.observe import Observer
 from khala_orchestrator.announce import Announcer
 from khala_orchestrator.cards import run_card
-from khala_orchestrator.mailbox import Mailbox
 from khala_orchestrator.match import Match
+from khala_orchestrator.pacing import pacing_of
 from khala_orchestrator.record import Listener, RecordingBus
-from khala_orchestrator.roster import Roster, Seat
+from khala_orchestrator.roster import Roster
+from khala_orchestrator.side import Side
 from khala_orchestrator.turn import Turn
 from khala_protocol.recording import Recorder
 
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
-    from khala_orchestrator.match import MatchObserver
-    from khala_orchestrator.turn import AgentPool
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Briefing, Message, Report, Result, Wire
 
@@ -48,43 +45,32 @@ async def host(
         RecordingError: the recording cannot be written.
         GameError: the game died or hangs.
     """
-    seats = [Seat(config.task.side, agent.name) for agent in config.task.agents]
-    required = [seat for seat, agent in zip(seats, config.task.agents, strict=True) if agent.required]
+    sides = sides_of(config)
+    seats = [seat for side in sides for seat in side.seats]
+    required = [side.seat(agent) for side in sides for agent in side.required]
     card = run_card(config, game.info)
     async with contextlib.AsyncExitStack() as stack:
         flush = _nothing
         if config.record is not None:
             recorder = stack.enter_context(Recorder(config.record))
-            bus, flush = RecordingBus(bus, recorder), recorder.flush
+            bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
-        turn = await stack.enter_async_context(Turn(bus, config.run, roster))
+        grace_s = config.task.clock.grace_s
+        turn = await stack.enter_async_context(Turn(bus, config.run, roster, required=required, grace_s=grace_s))
         await announcer.run(card)
         watch(card)
         await roster.assemble(required, config.assemble_s)
         gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms
-        match = assemble(config, game, turn, _PublishingObserver(announcer, watch, flush))
+        observer = _PublishingObserver(announcer, watch, flush)
+        match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock))
         return [result async for result in match.play()]
 
 
-def assemble(config: MatchConfig, game: Sides, agents: AgentPool, match_observer: MatchObserver) -> Match:
-    """Return a match with everything between the game and the agents."""
-    task = config.task
-    reach = {
-        Seat(task.side, agent.name): [Seat(task.side, other.name) for other in task.correspondents(agent)]
-        for agent in task.agents
-    }
-    channels = task.channels if task.communication else ()
-    return Match(
-        config=config,
-        game=game,
-        observer=Observer(task),
-        actor=Actor(task),
-        agents=agents,
-        mailbox=Mailbox(reach, channels),
-        match_observer=match_observer,
-    )
+def sides_of(config: MatchConfig) -> list[Side]:
+    """Return the sides of a match, in the order of the game's players."""
+    return [Side(task, config.run) for task in config.task.per_side()]
 
 
 class _PublishingObserver:

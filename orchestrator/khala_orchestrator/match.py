@@ -1,9 +1,9 @@
 """The match: reset, observe, ask, act, until the episode is over.
 
-The loop reads like the turn in docs/design/turn.md. It owns only the order: `khala_bridge.observe` decides what agents
-see, `khala_orchestrator.turn` which replies are in time, `khala_bridge.act` what their words do, and
-`khala_orchestrator.mailbox` who hears which message. It needs no bus: a recording can stand in for the agents
-(`AgentPool`).
+The loop reads like the turn in docs/design/turn.md. It owns only the order: `khala_orchestrator.schedule` decides who
+is asked and when a decision takes effect, `khala_orchestrator.turn` which replies are in time, and
+`khala_orchestrator.side` what agents see, what their words do, and who hears which message. It needs no bus: a
+recording can stand in for the agents (`AgentPool`).
 """
 
 from __future__ import annotations
@@ -11,29 +11,26 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
-from khala_bridge.observe import Feedback
 from khala_orchestrator.cards import briefing
-from khala_orchestrator.roster import Seat
+from khala_orchestrator.pacing import AtOnce
+from khala_orchestrator.schedule import Cadence, Schedule, StepId
 from khala_orchestrator.tally import Tally
-from khala_orchestrator.turn import Question
-from khala_protocol.messages import AgentReport, Message, Observation, Received, Report, Timings
-from khala_protocol.speech import parse
+from khala_protocol.messages import Timings
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+    from collections.abc import AsyncIterator, Collection, Iterator, Sequence
 
-    from khala_bridge.act import Actor, JointAction
     from khala_bridge.game.game import Sides, StepResult
-    from khala_bridge.observe import AgentObservation, Observer, SideObservation
     from khala_bridge.state import Snapshot
     from khala_orchestrator.config import MatchConfig
-    from khala_orchestrator.mailbox import Mailbox, Post
-    from khala_orchestrator.turn import AgentPool, Answers
-    from khala_protocol.messages import Briefing, Rejection, Result
-    from khala_protocol.speech import Speech
+    from khala_orchestrator.pacing import Pacing
+    from khala_orchestrator.roster import Seat
+    from khala_orchestrator.side import Side
+    from khala_orchestrator.turn import AgentPool, Answers, Question
+    from khala_protocol.messages import Briefing, Message, Report, Result
 
 Phase = Literal["observe", "act", "game"]
 
@@ -74,183 +71,106 @@ class SilentObserver:
         """Do nothing."""
 
 
-class StepId(NamedTuple):
-    """One step of a run."""
-
-    episode: int
-    step: int
-
-
 class StepOutcome(NamedTuple):
-    """The outcome of a step: its report, and what the next step begins with."""
+    """The outcome of a step: a report and a snapshot for each side, and the agents that went away for good."""
 
-    report: Report
-    snapshot: Snapshot
-    feedback: Mapping[str, Feedback]
+    reports: Sequence[Report]
+    snapshots: Sequence[Snapshot]
+    lost: Collection[Seat]
 
 
 @dataclass
 class Match:
-    """One side's agents in one game, for a number of episodes."""
+    """The agents of one or two sides in one game, for a number of episodes."""
 
     config: MatchConfig
     game: Sides
-    observer: Observer
-    actor: Actor
+    sides: Sequence[Side]
+    """In the order of the game's players."""
     agents: AgentPool
-    mailbox: Mailbox
     match_observer: MatchObserver
+    pacing: Pacing = field(default_factory=AtOnce)
+    schedule: Schedule = field(init=False)
+
+    def __post_init__(self) -> None:
+        places = ((side, agent) for side in self.sides for agent in side.task.agents)
+        cadences = {side.seat(agent.name): Cadence(agent.every_loops, agent.when) for side, agent in places}
+        self.schedule = Schedule(self.config.task.clock, cadences)
 
     async def play(self) -> AsyncIterator[Result]:
-        """Play every episode and yield its result."""
+        """Play every episode and yield the result of each side; an episode that is not valid is the last."""
         for episode in range(self.config.episodes):
-            yield await self._episode(episode)
+            results = await self._episode(episode)
+            for result in results:
+                yield result
+            if any(result.outcome == "aborted" for result in results):
+                return
 
-    async def _episode(self, episode: int) -> Result:
+    async def _episode(self, episode: int) -> Sequence[Result]:
         began = time.perf_counter()
         await self._begin(episode)
-        (snapshot,) = await self.game.reset()
-        tally, step = Tally(snapshot), 0
-        feedback: Mapping[str, Feedback] = {}
-        while not snapshot.ended and step != self.config.task.max_steps:
-            report, snapshot, feedback = await self._step(StepId(episode, step), snapshot, feedback)
-            tally.add(report, snapshot)
-            await self.match_observer.report(report)
-            step += 1
-        result = tally.result(self.config.run, episode, wall_s=time.perf_counter() - began)
-        await self.match_observer.result(result)
-        return result
+        snapshots: Sequence[Snapshot] = await self.game.reset()
+        self.pacing.begin(snapshots[0].game_loop)
+        both = zip(self.sides, snapshots, strict=True)
+        tallies, at = [Tally(snapshot, side.name, side.required) for side, snapshot in both], StepId(episode, 0)
+        lost: Collection[Seat] = ()
+        while not (lost or any(snapshot.ended for snapshot in snapshots) or at.step == self.config.task.max_steps):
+            reports, snapshots, lost = await self._step(at, snapshots)
+            for tally, report, snapshot in zip(tallies, reports, snapshots, strict=True):
+                tally.add(report, snapshot)
+                await self.match_observer.report(report)
+            at = StepId(episode, at.step + 1)
+        wall_s = time.perf_counter() - began
+        results = [tally.result(self.config.run, episode, wall_s=wall_s, gone=lost) for tally in tallies]
+        for result in results:
+            await self.match_observer.result(result)
+        return results
 
-    async def _step(self, at: StepId, snapshot: Snapshot, feedback: Mapping[str, Feedback]) -> StepOutcome:
-        watch = Stopwatch()
+    async def _step(self, at: StepId, snapshots: Sequence[Snapshot]) -> StepOutcome:
+        watch, loop = Stopwatch(), snapshots[0].game_loop
+        lag_s = await self.pacing.until(loop)
         with watch.phase("observe"):
-            observation = self.observer.observe(snapshot, feedback)
-        answers = await self.agents.ask(self._questions(at, observation, feedback, watch))
+            for side, snapshot in zip(self.sides, snapshots, strict=True):
+                side.look(snapshot)
+            asked = self.schedule.ask(at, loop, lambda seat: self._side(seat).happened(seat.agent))
+        answers = await self.agents.ask(self._questions(at, asked, watch), wait=self.config.task.clock.waits)
+        self.schedule.decide(answers.by_seat, loop)
         with watch.phase("act"):
-            speeches = self._speeches(answers)
-            joint = self.actor.joint(observation, speeches)
-            messages = self._messages(at, speeches)
-            post = await self._deliver(messages, speeches)
+            due = self.schedule.due(loop)
+            played = [side.act(at, [one for one in due if one.seat.side == side.name]) for side in self.sides]
+            for message in (message for one in played for message in one.messages):
+                await self.match_observer.message(message)
         with watch.phase("game"):
-            (result,) = await self.game.act([joint.commands], self.config.task.clock.step_loops)
-        heard = self._feedback(joint, result, post)
-        report = self._report(at, answers, messages, heard, result, watch.timings(answers))
-        return StepOutcome(report, result.snapshot, heard)
+            results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
+        timings = watch.timings(answers, lag_s)
+        reports = [s.report(at, p, r, timings) for s, p, r in zip(self.sides, played, results, strict=True)]
+        return StepOutcome(self._whole(at, reports, results), [result.snapshot for result in results], answers.lost)
 
     async def _begin(self, episode: int) -> None:
-        self.observer.begin()
-        self.mailbox.clear()
-        for agent in self.config.task.agents:
-            await self.match_observer.brief(briefing(self.config.task, agent, self.config.run, episode))
+        self.schedule.begin()
+        for side in self.sides:
+            side.begin()
+            for agent in side.task.agents:
+                await self.match_observer.brief(briefing(side.task, agent, self.config.run, episode))
 
-    def _questions(
-        self, at: StepId, observation: SideObservation, feedback: Mapping[str, Feedback], watch: Stopwatch
-    ) -> Iterator[Question]:
-        """Yield a question per agent, made on demand: the first agent thinks while others' observations are made."""
-        for agent in self.config.task.agents:
+    def _questions(self, at: StepId, seats: Sequence[Seat], watch: Stopwatch) -> Iterator[Question]:
+        """Yield a question per seat, made on demand: the first agent thinks while others' observations are made."""
+        for seat in seats:
             with watch.phase("observe"):
-                seen, heard = observation.agents[agent.name], feedback.get(agent.name, Feedback())
-                question = self._question(at, observation.snapshot.game_loop, seen, heard)
+                question = self._side(seat).question(seat.agent, at)
             yield question
 
-    def _question(self, at: StepId, game_loop: int, seen: AgentObservation, heard: Feedback) -> Question:
-        task = self.config.task
-        observation = Observation(
-            run=self.config.run,
-            agent=seen.agent.name,
-            side=task.side,
-            episode=at.episode,
-            step=at.step,
-            game_loop=game_loop,
-            answer_within_s=task.clock.max_wait_s,
-            text=seen.text,
-            view=seen.view,
-            images=tuple(picture.ref for picture in seen.pictures),
-            accepted=heard.accepted,
-            rejections=heard.rejections,
-            messages=heard.messages,
-        )
-        return Question(observation, [picture.data for picture in seen.pictures])
+    def _side(self, seat: Seat) -> Side:
+        return next(side for side in self.sides if side.name == seat.side)
 
-    def _speeches(self, answers: Answers) -> dict[str, Speech]:
-        """Return what each agent says, in the order of the task: the only place where a reply is parsed."""
-        default = self.config.task.default_reply
-        texts = {seat.agent: answer.text or default for seat, answer in answers.by_seat.items()}
-        return {agent: parse(text) for agent, text in texts.items() if text}
-
-    def _messages(self, at: StepId, speeches: Mapping[str, Speech]) -> Sequence[Message]:
-        """Return the messages of agents to each other, in the order of the task and of their words."""
-        return [
-            Message(
-                run=self.config.run,
-                agent=agent,
-                side=self.config.task.side,
-                episode=at.episode,
-                step=at.step,
-                recipient=said.recipient,
-                text=said.text,
-            )
-            for agent, speech in speeches.items()
-            for said in speech.messages
-        ]
-
-    async def _deliver(self, messages: Sequence[Message], speeches: Mapping[str, Speech]) -> Post:
-        for agent, speech in speeches.items():
-            for listen in speech.listens:
-                self.mailbox.listen(Seat(self.config.task.side, agent), listen.channel)
-        for message in messages:
-            await self.match_observer.message(message)
-        return self.mailbox.deliver(messages)
-
-    def _feedback(self, joint: JointAction, result: StepResult, post: Post) -> dict[str, Feedback]:
-        feedback = {}
-        for agent in self.config.task.agents:
-            seat = Seat(self.config.task.side, agent.name)
-            refused = (r.rejection for r in result.played.refusals if r.agent == agent.name)
-            rejections: tuple[Rejection, ...] = (
-                *joint.rejections.get(agent.name, ()),
-                *refused,
-                *post.rejections.get(seat, ()),
-            )
-            accepted, received = joint.accepted.get(agent.name, ()), post.received.get(seat, ())
-            feedback[agent.name] = Feedback(accepted, rejections, received)
-        return feedback
-
-    def _report(
-        self,
-        at: StepId,
-        answers: Answers,
-        messages: Sequence[Message],
-        feedback: Mapping[str, Feedback],
-        result: StepResult,
-        timings: Timings,
-    ) -> Report:
-        agents = tuple(
-            AgentReport(
-                agent=seat.agent,
-                side=seat.side,
-                status=answer.status,
-                detail=answer.detail,
-                latency_s=answer.latency_s,
-                accepted=feedback[seat.agent].accepted,
-                rejections=feedback[seat.agent].rejections,
-                ignored=answer.ignored,
-                usage=answer.usage,
-            )
-            for seat, answer in answers.by_seat.items()
-        )
-        return Report(
-            run=self.config.run,
-            episode=at.episode,
-            step=at.step,
-            game_loop=result.snapshot.game_loop,
-            agents=agents,
-            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in messages),
-            functions=result.played.functions,
-            env_steps=result.env_steps,
-            score=result.snapshot.score.total,
-            timings=timings,
-        )
+    def _whole(self, at: StepId, reports: Sequence[Report], results: Sequence[StepResult]) -> Sequence[Report]:
+        """Return the reports of a step; the last ones of an episode also tell of decisions that came to nothing."""
+        if not any(result.snapshot.ended for result in results):
+            return reports
+        loop, pending = results[0].snapshot.game_loop, self.schedule.drop()
+        dropped = [side.dropped(at, pending, loop) for side in self.sides]
+        pairs = zip(reports, dropped, strict=True)
+        return [report.model_copy(update={"agents": (*report.agents, *more)}) for report, more in pairs]
 
 
 class Stopwatch:
@@ -268,7 +188,7 @@ class Stopwatch:
         finally:
             self._took_s[name] += time.perf_counter() - began
 
-    def timings(self, answers: Answers) -> Timings:
+    def timings(self, answers: Answers, lag_s: float) -> Timings:
         """Return all phases of a step; `Answers` brings the time of asking."""
         return Timings(
             observe_s=self._took_s["observe"],
@@ -276,4 +196,5 @@ class Stopwatch:
             wait_s=answers.wait_s,
             act_s=self._took_s["act"],
             game_s=self._took_s["game"],
+            lag_s=lag_s,
         )

@@ -11,22 +11,29 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Self
 
+from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Bus, Delivery, Liveness, Publisher, Sample, Subscription, Token
-from khala_protocol.keys import Topic, every_agent
+from khala_protocol.errors import WrongKey
+from khala_protocol.keys import Topic, every_agent, parse
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+    from collections.abc import AsyncIterator, Callable, Iterable
     from types import TracebackType
 
     from khala_protocol.recording import Recorder
 
 
 class RecordingBus:
-    """A `Bus` that records every sample it publishes or hands out."""
+    """A `Bus` that records every sample it publishes or hands out.
 
-    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+    Samples under keys of agents that are not in the match are handed out and not recorded: a recording has room for
+    65 535 keys, and anybody who may write can make up more.
+    """
+
+    def __init__(self, bus: Bus, recorder: Recorder, seats: Iterable[Seat]) -> None:
         self._bus = bus
         self._recorder = recorder
+        self._seats = frozenset(seats)
 
     async def publisher(self, key: str, delivery: Delivery) -> Publisher:
         """Declare a publisher whose samples are recorded before they are sent."""
@@ -34,7 +41,8 @@ class RecordingBus:
 
     async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
         """Declare a subscription whose samples are recorded when they are taken."""
-        return _RecordingSubscription(await self._bus.subscribe(key_expr, delivery, depth=depth), self._recorder)
+        subscription = await self._bus.subscribe(key_expr, delivery, depth=depth)
+        return _RecordingSubscription(subscription, self._recorder, self._is_known)
 
     async def announce(self, key: str) -> Token:
         """Declare a liveliness token; tokens are not recorded, reports say who was there."""
@@ -43,6 +51,13 @@ class RecordingBus:
     async def watch(self, key_expr: str, *, depth: int = 1024) -> Subscription[Liveness]:
         """Report tokens."""
         return await self._bus.watch(key_expr, depth=depth)
+
+    def _is_known(self, key: str) -> bool:
+        try:
+            address = parse(key)
+        except WrongKey:
+            return False
+        return address.agent is None or address.side is None or Seat(address.side, address.agent) in self._seats
 
     async def close(self) -> None:
         """Close the bus below; the owner of the recorder closes it."""
@@ -89,9 +104,10 @@ class _RecordingPublisher:
 
 
 class _RecordingSubscription:
-    def __init__(self, subscription: Subscription[Sample], recorder: Recorder) -> None:
+    def __init__(self, subscription: Subscription[Sample], recorder: Recorder, is_known: Callable[[str], bool]) -> None:
         self._subscription = subscription
         self._recorder = recorder
+        self._is_known = is_known
 
     @property
     def dropped(self) -> int:
@@ -106,7 +122,8 @@ class _RecordingSubscription:
 
     async def __anext__(self) -> Sample:
         sample = await self._subscription.__anext__()
-        self._recorder.write(sample.key, sample.payload)
+        if self._is_known(sample.key):
+            self._recorder.write(sample.key, sample.payload)
         return sample
 
     async def close(self) -> None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.config import MatchConfig
-from khala_orchestrator.host import assemble
-from khala_orchestrator.match import SilentObserver
+from khala_orchestrator.host import sides_of
+from khala_orchestrator.match import Match, SilentObserver
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
@@ -52,7 +52,8 @@ async def replay(recording: Recording, game: Sides) -> list[Difference]:
         every observation that differs from the recorded one; a replay that diverges ends at its first step.
     """
     turn = RecordedTurn(recording)
-    match = assemble(recorded_config(recording), game, turn, SilentObserver())
+    config = recorded_config(recording)
+    match = Match(config, game, sides_of(config), turn, SilentObserver())
     try:
         async for _ in match.play():
             pass
@@ -62,16 +63,21 @@ async def replay(recording: Recording, game: Sides) -> list[Difference]:
 
 
 class RecordedTurn:
-    """An `AgentPool` from a recording: replies that were in time then arrive at once."""
+    """An `AgentPool` from a recording: the recorded answers arrive at once, in the step in which they were taken."""
 
     def __init__(self, recording: Recording) -> None:
         self.differences: list[Difference] = []
         self._steps: Iterator[RecordedStep] = recording.by_step()
-        self._replies: dict[tuple[int, int, str], Reply] = {}
+        self._replies: dict[tuple[int, int, Seat], Reply] = {}
         for reply in recording.of(Reply):
-            self._replies.setdefault((reply.episode, reply.step, reply.agent), reply)
+            self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
+        self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
+        for report in recording.of(Report):
+            for agent in report.agents:
+                asked = report.step if agent.asked_step is None else agent.asked_step
+                self._outcomes[report.episode, asked, Seat(agent.side, agent.agent)] = agent
 
-    async def ask(self, questions: Iterable[Question]) -> Answers:
+    async def ask(self, questions: Iterable[Question], *, wait: bool = True) -> Answers:
         """Compare the observations with the recorded ones, and return the recorded answers.
 
         Pictures are compared by the hashes under which observations name them.
@@ -83,24 +89,37 @@ class RecordedTurn:
         self._compare(step, observations)
         if self.differences:
             raise _EndOfRecording
-        (report,) = step.of(Report)
-        return Answers({Seat(agent.side, agent.agent): self._answer(report, agent) for agent in report.agents})
+        return Answers(dict(self._settled_by(step, observations) if wait else self._taken_in(step)))
 
-    def _answer(self, report: Report, agent: AgentReport) -> Answer:
-        taken = agent.status in {"ok", "fallback"}
-        reply = self._replies[report.episode, report.step, agent.agent] if taken else None
+    def _settled_by(self, step: RecordedStep, observations: Iterable[Observation]) -> Iterator[tuple[Seat, Answer]]:
+        """Yield the answers to these observations, which the host waited for."""
+        for observation in observations:
+            seat = Seat(observation.side, observation.agent)
+            outcome = self._outcomes.get((step.episode, step.step, seat))
+            if outcome is None:  # the recording ends before this decision took effect
+                raise _EndOfRecording
+            yield seat, self._answer(step.episode, step.step, seat, outcome)
+
+    def _taken_in(self, step: RecordedStep) -> Iterator[tuple[Seat, Answer]]:
+        """Yield the answers that arrived in this step, whenever their questions were asked."""
+        for agent in (agent for report in step.of(Report) for agent in report.agents):
+            seat, asked = Seat(agent.side, agent.agent), agent.asked_step
+            yield seat, self._answer(step.episode, step.step if asked is None else asked, seat, agent)
+
+    def _answer(self, episode: int, asked: int, seat: Seat, agent: AgentReport) -> Answer:
+        reply = self._replies[episode, asked, seat] if agent.status in {"ok", "fallback"} else None
         return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
-        sent = {observation.agent: encode(observation).decode() for observation in observations}
+        sent = {(one.side, one.agent): encode(one).decode() for one in observations}
         for sample in step.samples:
             message = sample.message
             if not isinstance(message, Observation):
                 continue
-            now, recorded = sent.pop(message.agent, ""), sample.payload.decode()
+            now, recorded = sent.pop((message.side, message.agent), ""), sample.payload.decode()
             if now != recorded:
                 self._differ(message.agent, step, recorded, now)
-        for agent, now in sent.items():
+        for (_, agent), now in sent.items():
             self._differ(agent, step, "", now)
 
     def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:

@@ -15,7 +15,7 @@ from khala_protocol.errors import KhalaError, WrongKey
 from khala_protocol.keys import Topic, every_agent, parse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Awaitable, Callable, Iterable
     from types import TracebackType
 
     from khala_protocol.bus import Bus, Liveness, Subscription
@@ -54,7 +54,8 @@ class Roster:
         self._run = run
         self._instances: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
         self._changed = asyncio.Condition()
-        self._on_gone: Callable[[Seat], None] = _ignore
+        self._gone: Callable[[Seat], None] = _ignore
+        self._here: Callable[[Seat], Awaitable[None]] = _ignore_here
         self._subscription: Subscription[Liveness] | None = None
         self._pump: asyncio.Task[None] | None = None
 
@@ -78,9 +79,9 @@ class Roster:
         """Return the seats that no agent has taken."""
         return tuple(seat for seat in self.seats if not self.present(seat))
 
-    def on_gone(self, callback: Callable[[Seat], None]) -> None:
-        """Call `callback` whenever the last instance of an agent leaves."""
-        self._on_gone = callback
+    def on_change(self, *, gone: Callable[[Seat], None], here: Callable[[Seat], Awaitable[None]]) -> None:
+        """Call `gone` whenever the last instance of an agent leaves, and `here` whenever one comes, or is back."""
+        self._gone, self._here = gone, here
 
     async def assemble(self, required: Iterable[Seat], timeout_s: float) -> None:
         """Wait until all required seats are taken.
@@ -98,11 +99,11 @@ class Roster:
     async def _follow(self, tokens: Subscription[Liveness]) -> None:
         async for token in tokens:
             if token.alive or token.link_up:  # with our own link down, every agent seems to leave at once
-                self._note(token)
+                await self._note(token)
                 async with self._changed:
                     self._changed.notify_all()
 
-    def _note(self, token: Liveness) -> None:
+    async def _note(self, token: Liveness) -> None:
         try:
             address = parse(token.key)
         except WrongKey as error:
@@ -116,14 +117,17 @@ class Roster:
         elif token.alive:
             instances.add(address.instance)
             if len(instances) > 1:
-                log.warning(
-                    "%d instances of agent %s are there: the first reply of a step counts", len(instances), seat
-                )
+                log.error("%d processes are agent %s: the first reply of a step counts, all pay", len(instances), seat)
+            await self._here(seat)
         elif address.instance in instances:
             instances.remove(address.instance)
             if not instances:
-                self._on_gone(seat)
+                self._gone(seat)
 
 
 def _ignore(seat: Seat) -> None:
     """Do nothing: no turn waits yet."""
+
+
+async def _ignore_here(seat: Seat) -> None:
+    """Do nothing: no turn asks yet."""

@@ -10,21 +10,30 @@ from khala_bridge.state import Alliance
 from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from khala_bridge.state import Snapshot
-    from khala_protocol.messages import Outcome
+    from khala_orchestrator.roster import Seat
+    from khala_protocol.messages import Ending, Outcome
 
 
 class Tally:
     """The running account of one episode."""
 
-    def __init__(self, snapshot: Snapshot) -> None:
+    def __init__(self, snapshot: Snapshot, side: str = "blue", required: Collection[str] = ()) -> None:
+        """Begin with the first snapshot of a side; `required` are the agents that it cannot do without."""
+        self._side, self._required = side, tuple(required)
         self._first = self._last = snapshot
         self._alliance: dict[int, Alliance] = {}
         self._dead: Counter[Alliance] = Counter()
         self._usage: dict[str, Usage] = defaultdict(Usage)
         self._statuses: dict[str, Counter[str]] = defaultdict(Counter)
         self._rejections: Counter[str] = Counter()
+        self._fates: dict[str, Counter[str]] = defaultdict(Counter)
+        self._fallbacks: dict[str, Counter[str]] = defaultdict(Counter)
         self._latencies_s: list[float] = []
+        self._ages_loops: list[float] = []
+        self._lag_s = 0.0
         self._accepted = 0
         self._steps = self._env_steps = 0
         self._note(snapshot)
@@ -39,27 +48,37 @@ class Tally:
             self._statuses[name][agent.status] += 1
             self._rejections.update(rejection.reason for rejection in agent.rejections)
             self._accepted += len(agent.accepted)
+            if agent.status == "fallback":
+                self._fallbacks[name][agent.detail] += 1
+            if agent.fate is not None:
+                self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:
                 self._latencies_s.append(agent.latency_s)
+                self._ages_loops.append(agent.age_loops)
+        self._lag_s = report.timings.lag_s
         self._note(after)
 
-    def result(self, run: str, episode: int, *, wall_s: float) -> Result:
+    def result(self, run: str, episode: int, *, wall_s: float, gone: Collection[Seat] = ()) -> Result:
         """Return the account at the end of the episode.
 
         Args:
             run: name of the run.
             episode: its number, from 0.
             wall_s: wall time of the episode.
+            gone: required agents, of any side, that went away for good and so ended it.
         """
-        outcome = self._last.outcome or "draw"
-        cause = CAUSES[outcome] if self._last.outcome else "step limit"
+        outcome, cause = self._ending(gone)
+        why_not = self._invalid_because(gone)
         killed = Casualties(units=self._dead[Alliance.ENEMY], value=self._last.score.killed - self._first.score.killed)
         lost = Casualties(units=self._dead[Alliance.OWN], value=self._last.score.lost - self._first.score.lost)
         return Result(
             run=run,
+            side=self._side,
             episode=episode,
             outcome=outcome,
             cause=cause,
+            valid=not why_not,
+            invalid_because=why_not,
             steps=self._steps,
             env_steps=self._env_steps,
             game_loop=self._last.game_loop,
@@ -72,10 +91,31 @@ class Tally:
             usage=dict(self._usage),
             statuses={name: dict(count) for name, count in self._statuses.items()},
             rejections=dict(self._rejections),
+            fates={name: dict(count) for name, count in self._fates.items()},
+            fallbacks={name: dict(count) for name, count in self._fallbacks.items()},
+            age_p50_loops=_quantile(self._ages_loops, 0.5),
+            age_p95_loops=_quantile(self._ages_loops, 0.95),
+            lag_s=self._lag_s,
             accepted=self._accepted,
             latency_p50_s=statistics.median(self._latencies_s) if self._latencies_s else None,
             latency_p95_s=_quantile(self._latencies_s, 0.95),
         )
+
+    def _ending(self, gone: Collection[Seat]) -> tuple[Ending, str]:
+        if self._last.outcome is not None:
+            return self._last.outcome, CAUSES[self._last.outcome]
+        return ("aborted", "agents gone") if gone else ("draw", "step limit")
+
+    def _invalid_because(self, gone: Collection[Seat]) -> str:
+        """Return why the episode says nothing about its agents; "" if it does."""
+        if gone:
+            return f"required agents went away: {', '.join(map(str, gone))}"
+        silent = [agent for agent in self._required if self._failed_always(agent)]
+        return f"no model ever answered for {', '.join(silent)}" if silent else ""
+
+    def _failed_always(self, agent: str) -> bool:
+        statuses = self._statuses[agent]
+        return bool(statuses) and not statuses["ok"]
 
     def _note(self, snapshot: Snapshot) -> None:
         self._dead.update(self._alliance[tag] for tag in snapshot.dead if tag in self._alliance)

@@ -1,9 +1,12 @@
-"""Ask every agent at once, and wait until all have replied or the deadline has passed.
+"""Ask agents, and take their answers: all of them by a deadline, or those that have arrived.
 
 Below it: publishers of observations and their pictures, and one inbox of replies. Above it: `khala_orchestrator.match`,
-which reads the text of a reply. It knows nothing of games. A reply is accepted if it is the first valid one of its
-agent for the open step; all others are counted as ignored and dropped. The wait for an agent ends early when its
-liveliness token goes, or when what it sent is not a reply: it may still answer while the step is open.
+which decides who is asked when and reads the text of a reply. It knows nothing of games. A question is open until its
+answer is collected. The first valid reply to an open question counts; all others are counted as ignored and dropped.
+
+The wait for an agent ends early when what it sent is not a reply, or when its liveliness token goes: it may still
+answer while the question is open. A required agent that goes is waited for as long as the clock's grace, and once it
+is back, as long as anybody: a restarted agent finds the question on the bus. If it does not come, it is lost.
 """
 
 from __future__ import annotations
@@ -11,18 +14,18 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode_as, encode
-from khala_protocol.errors import PeerError, WrongKey
+from khala_protocol.errors import BusClosed, PeerError, WrongKey
 from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
     from types import TracebackType
 
     from khala_orchestrator.roster import Roster
@@ -38,7 +41,7 @@ class Answer:
     Attributes:
         status: `ok` and `fallback` have a reply, the others none.
         latency_s: from the publication of the observation to the reply's arrival.
-        ignored: replies of this agent that arrived during the step and were not accepted.
+        ignored: replies of this agent that arrived since its answer before and were not accepted.
     """
 
     status: AgentStatus
@@ -60,11 +63,13 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The outcome of asking in one step: an answer for each seat that was asked, in the order of the questions."""
+    """The outcome of asking: an answer for each seat whose question is settled, in the order of the questions."""
 
     by_seat: Mapping[Seat, Answer]
     publish_s: float = 0.0
     wait_s: float = 0.0
+    lost: Collection[Seat] = ()
+    """Required agents that went away and did not come back within the grace."""
 
 
 class Question(NamedTuple):
@@ -77,59 +82,53 @@ class Question(NamedTuple):
 class AgentPool(Protocol):
     """The agents of a match, as the match sees them; a recording can stand in for live ones."""
 
-    async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Publish one observation to each agent and return their answers."""
+    async def ask(self, questions: Iterable[Question], *, wait: bool = True) -> Answers:
+        """Publish observations, and return the answers to all questions, or those that there are without waiting.
+
+        Called once in each step, with no question if nobody is to be asked.
+        """
         ...
 
 
-@dataclass
-class _Step:
-    """The open step: the agents asked, those still awaited, and their replies."""
+@dataclass(slots=True)
+class _Question:
+    """An open question: what was asked, until when it is waited for, and what came."""
 
-    episode: int = -1
-    number: int = -1
-    complete: bool = False
-    asked_at: dict[Seat, float] = field(default_factory=dict)
-    waiting: set[Seat] = field(default_factory=set)
-    taken: dict[Seat, tuple[Reply, float]] = field(default_factory=dict)
-    faults: dict[Seat, str] = field(default_factory=dict)
-    settled: asyncio.Event = field(default_factory=asyncio.Event)
+    observation: Observation
+    payload: bytes
+    asked_at: float
+    until: float | None
+    waiting: bool = True
+    held: bool = False
+    """Whether its agent is required and away."""
+    reply: Reply | None = None
+    arrived_at: float = 0.0
+    fault: str = ""
 
-    def open(self, seat: Seat, observation: Observation, now: float) -> Self:
-        """Begin to wait for one agent."""
-        self.episode, self.number = observation.episode, observation.step
-        self.asked_at[seat] = now
-        self.waiting.add(seat)
-        return self
-
-    def all_asked(self) -> None:
-        """Settle the step as soon as no agent is awaited."""
-        self.complete = True
-        self._settle()
-
-    def stop_waiting(self, seat: Seat) -> None:
-        """Stop waiting for one agent; it may still answer."""
-        self.waiting.discard(seat)
-        self._settle()
-
-    def _settle(self) -> None:
-        if self.complete and not self.waiting:
-            self.settled.set()
+    def answers_to(self, reply: Reply) -> bool:
+        """Return whether a reply is the first one to this question."""
+        return self.reply is None and (reply.episode, reply.step) == (self.observation.episode, self.observation.step)
 
 
 class Turn:
     """An `AgentPool` over a bus. An asynchronous context manager."""
 
-    def __init__(self, bus: Bus, run: str, roster: Roster) -> None:
+    def __init__(
+        self, bus: Bus, run: str, roster: Roster, *, required: Iterable[Seat] = (), grace_s: float = 0.0
+    ) -> None:
+        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away."""
         self._bus = bus
         self._run = run
         self._roster = roster
+        self._required = frozenset(required)
+        self._grace_s = grace_s
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inbox: Subscription[Sample] | None = None
         self._pump: asyncio.Task[None] | None = None
         self._ignored: Counter[Seat] = Counter()
-        self._step: _Step | None = None
+        self._open: dict[Seat, _Question] = {}
+        self._changed = asyncio.Event()
 
     async def __aenter__(self) -> Self:
         for seat in self._roster.seats:
@@ -137,7 +136,8 @@ class Turn:
             self._publishers[seat] = await self._bus.publisher(key, Delivery.STATE)
         self._inbox = await self._bus.subscribe(every_agent(self._run, Topic.REPLY), Delivery.SPEECH)
         self._pump = asyncio.create_task(self._take_replies(self._inbox), name="inbox of replies")
-        self._roster.on_gone(self._gone)
+        self._pump.add_done_callback(lambda _: self._changed.set())
+        self._roster.on_change(gone=self._gone, here=self._here)
         return self
 
     async def __aexit__(
@@ -145,36 +145,43 @@ class Turn:
     ) -> None:
         assert self._inbox is not None and self._pump is not None
         await self._inbox.close()
-        await self._pump
+        await asyncio.wait([self._pump])
         for publisher in (*self._publishers.values(), *self._frames.values()):
             await publisher.close()
+        if error is None:
+            self._pump.result()
 
-    async def ask(self, questions: Iterable[Question]) -> Answers:
-        """Publish the observations, each after its pictures, and wait for replies until their deadline.
+    async def ask(self, questions: Iterable[Question], *, wait: bool = True) -> Answers:
+        """Publish the observations, each after its pictures; then collect answers.
 
         Args:
-            questions: one per seat, all of the same episode and step and with the same `answer_within_s`. They may be
-                made lazily: each is published before the next is taken.
+            questions: one per seat at most. They may be made lazily: each is published before the next is taken. A
+                question to a seat whose question is still open takes its place.
+            wait: wait until every open question is settled: answered, or past its deadline.
         """
-        loop = asyncio.get_running_loop()
-        step, within_s, publish_s = _Step(), None, 0.0
-        for observation, pictures in questions:
-            began = loop.time()
-            seat, within_s = Seat(observation.side, observation.agent), observation.answer_within_s
-            await self._show(seat, pictures)
-            self._step = step.open(seat, observation, began)
-            await self._publishers[seat].put(encode(observation))
-            if not self._roster.present(seat):
-                step.stop_waiting(seat)
-            publish_s += loop.time() - began
-        began = loop.time()
-        step.all_asked()
-        try:
-            async with asyncio.timeout(within_s):
-                await step.settled.wait()
-        except TimeoutError:
-            log.info("step %d: no reply in time from %s", step.number, ", ".join(map(str, sorted(step.waiting))))
-        return self._close(step, publish_s=publish_s, wait_s=loop.time() - began)
+        now = asyncio.get_running_loop().time
+        publish_s = 0.0
+        for question in questions:
+            began = now()
+            await self._publish(question, began)
+            publish_s += now() - began
+        began = now()
+        if wait:
+            await self._settled()
+        return self._collect(publish_s=publish_s, wait_s=now() - began)
+
+    # --- asking -------------------------------------------------------------------------------------
+
+    async def _publish(self, question: Question, now: float) -> None:
+        observation = question.observation
+        seat = Seat(observation.side, observation.agent)
+        await self._show(seat, question.pictures)
+        within_s = observation.answer_within_s
+        asked = _Question(observation, encode(observation), now, None if within_s is None else now + within_s)
+        self._open[seat] = asked
+        await self._publishers[seat].put(asked.payload)
+        if not self._roster.present(seat):
+            self._gone(seat)
 
     async def _show(self, seat: Seat, pictures: Sequence[bytes]) -> None:
         """Publish pictures, each under the key of its place, so that late joiners find all of the newest ones."""
@@ -184,26 +191,81 @@ class Turn:
                 self._frames[seat, place] = await self._bus.publisher(key, Delivery.STATE)
             await self._frames[seat, place].put(picture)
 
-    def _close(self, step: _Step, *, publish_s: float, wait_s: float) -> Answers:
-        self._step = None
-        answers = {seat: self._answer(step, seat) for seat in step.asked_at}
-        self._ignored.clear()
-        return Answers(answers, publish_s, wait_s)
+    def _gone(self, seat: Seat) -> None:
+        """Stop waiting for an agent; wait for a required one until its grace is over."""
+        asked = self._open.get(seat)
+        if asked is None or not asked.waiting:
+            return
+        if seat in self._required and self._grace_s > 0:
+            asked.held, asked.until = True, asyncio.get_running_loop().time() + self._grace_s
+            log.error("required agent %s went away; waiting for it for %g s", seat, self._grace_s)
+        else:
+            asked.waiting = False
+        self._changed.set()
 
-    def _answer(self, step: _Step, seat: Seat) -> Answer:
-        ignored = self._ignored[seat]
-        if seat in step.taken:
-            reply, arrived = step.taken[seat]
-            return Answer(reply.status, reply, reply.detail, arrived - step.asked_at[seat], ignored)
-        if seat in step.faults:
-            return Answer("malformed", detail=step.faults[seat], ignored=ignored)
+    async def _here(self, seat: Seat) -> None:
+        """Ask an agent again that is back: what it sent while its link was down is lost, and it may send it again."""
+        asked = self._open.get(seat)
+        if asked is None or asked.reply is not None:
+            return
+        if asked.held:
+            within_s = asked.observation.answer_within_s
+            asked.held, asked.until = False, None if within_s is None else asyncio.get_running_loop().time() + within_s
+            log.error("required agent %s is back", seat)
+            self._changed.set()
+        await self._publishers[seat].put(asked.payload)
+
+    # --- collecting ---------------------------------------------------------------------------------
+
+    async def _settled(self) -> None:
+        """Wait until no open question is waited for."""
+        while waiting := [asked for asked in self._open.values() if asked.waiting]:
+            self._check_pump()
+            until = min((asked.until for asked in waiting if asked.until is not None), default=None)
+            self._changed.clear()
+            try:
+                async with asyncio.timeout_at(until):
+                    await self._changed.wait()
+            except TimeoutError:
+                self._close_overdue()
+
+    def _close_overdue(self) -> None:
+        now = asyncio.get_running_loop().time()
+        for seat, asked in self._open.items():
+            if asked.waiting and asked.until is not None and asked.until <= now:
+                asked.waiting = False
+                log.info("step %d: no reply in time from %s", asked.observation.step, seat)
+
+    def _collect(self, *, publish_s: float, wait_s: float) -> Answers:
+        """Return the answers to the settled questions, which are closed."""
+        self._check_pump()
+        self._close_overdue()
+        settled = {seat: asked for seat, asked in self._open.items() if not asked.waiting}
+        for seat in settled:
+            del self._open[seat]
+        answers = {seat: self._answer(seat, asked) for seat, asked in settled.items()}
+        lost = [seat for seat, asked in settled.items() if asked.held]
+        return Answers(answers, publish_s, wait_s, lost)
+
+    def _answer(self, seat: Seat, asked: _Question) -> Answer:
+        ignored = self._ignored.pop(seat, 0)
+        if asked.reply is not None:
+            latency_s = asked.arrived_at - asked.asked_at
+            return Answer(asked.reply.status, asked.reply, asked.reply.detail, latency_s, ignored)
+        if asked.fault:
+            return Answer("malformed", detail=asked.fault, ignored=ignored)
         if not self._roster.present(seat):
             return Answer("gone", detail="its liveliness token went away", ignored=ignored)
         return Answer("late", detail="no reply before the deadline", ignored=ignored)
 
-    def _gone(self, seat: Seat) -> None:
-        if self._step is not None:
-            self._step.stop_waiting(seat)
+    def _check_pump(self) -> None:
+        """Raise if replies can no longer arrive: every agent would be late from now on."""
+        assert self._pump is not None
+        if self._pump.done():
+            self._pump.result()
+            raise BusClosed("the inbox of replies was closed while a match was played")
+
+    # --- the inbox ----------------------------------------------------------------------------------
 
     async def _take_replies(self, inbox: Subscription[Sample]) -> None:
         async for sample in inbox:
@@ -216,26 +278,28 @@ class Turn:
             self._take_reply(Seat(address.side, address.agent), sample.payload)
 
     def _take_reply(self, seat: Seat, payload: bytes) -> None:
-        step = self._step
+        if seat not in self._publishers:
+            log.warning("%s is not in this match, and sent a reply", seat)
+            return
+        asked = self._open.get(seat)
         try:
             reply = decode_as(Reply, payload)
             self._check_sender(seat, reply)
         except PeerError as error:
             log.warning("agent %s sent no valid reply: %s", seat, error)
             self._ignored[seat] += 1
-            if step is not None and seat not in step.taken:
-                step.faults[seat] = str(error)
-                step.stop_waiting(seat)
+            if asked is not None and asked.reply is None:
+                asked.fault, asked.waiting = str(error), False
+                self._changed.set()
             return
-        fits = step is not None and (reply.episode, reply.step) == (step.episode, step.number)
-        if step is None or not fits or seat in step.taken:
+        if asked is None or not asked.answers_to(reply):
             self._ignored[seat] += 1
             return
-        step.taken[seat] = (reply, asyncio.get_running_loop().time())
-        step.stop_waiting(seat)
+        asked.reply, asked.arrived_at = reply, asyncio.get_running_loop().time()
+        asked.waiting = asked.held = False
+        if not any(other.waiting for other in self._open.values()):
+            self._changed.set()
 
     def _check_sender(self, seat: Seat, reply: Reply) -> None:
         if (reply.run, reply.side, reply.agent) != (self._run, *seat):
             raise WrongKey(f"reply of {reply.side}/{reply.agent} in run {reply.run} stands under the key of {seat}")
-        if seat not in self._publishers:
-            raise WrongKey(f"{seat} is not in this match")

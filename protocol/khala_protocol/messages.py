@@ -23,6 +23,8 @@ LOOPS_PER_S = 22.4
 Point = tuple[float, float]
 Alliance = Literal["own", "ally", "enemy", "neutral"]
 Outcome = Literal["win", "draw", "loss"]
+Ending = Literal["win", "draw", "loss", "aborted"]
+"""How an episode ended for one side; `aborted` if the host ended it, because it could not be played as it should be."""
 ClockRule = Literal["frozen", "budget", "token", "realtime"]
 
 RejectionReason = Literal[
@@ -39,6 +41,7 @@ RejectionReason = Literal[
     "not_available",  # known, but not now: cost, cooldown, requirement
     "too_many_actions",  # over the number of actions a team may have in one reply
     "unknown_recipient",  # a message to nobody
+    "too_late",  # the reply took effect too long after its observation
     "refused_by_game",  # PySC2 or the game answered with an error
 ]
 
@@ -49,6 +52,16 @@ AgentStatus = Literal[
     "gone",  # its liveliness token went away while the host was waiting
     "malformed",  # something arrived that is not a valid reply
 ]
+
+Fate = Literal[
+    "fresh",  # carried out at the game loop that the agent had seen
+    "stale",  # carried out later than that, as it was meant
+    "adapted",  # carried out later, as far as the state of the game still allowed it
+    "refused",  # it held orders, and none of them was carried out
+    "dropped",  # the episode ended before it could take effect
+]
+
+Trigger = Literal["attacked", "idle", "message"]
 
 
 class Frozen(BaseModel):
@@ -424,14 +437,85 @@ class Frames(Frozen):
     minimap: float = 64.0
 
 
+class Usage(Frozen):
+    """The usage of requests to a model. Sums with `+`."""
+
+    requests: int = 0
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+    cached_tokens: int = 0
+    """The part of `prompt_tokens` that the provider had in its cache."""
+    reasoning_tokens: int = 0
+    """The part of `completion_tokens` that was reasoning."""
+    cost_usd: float | None = None
+    """None if no price is known for the model."""
+    unknown_requests: int = 0
+    """Requests that were cancelled or failed, whose tokens are unknown."""
+    images: int = 0
+    """Number of pictures that were sent along."""
+    image_tokens: int = 0
+    """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
+
+    def __add__(self, other: Usage) -> Usage:
+        costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
+        return Usage(
+            requests=self.requests + other.requests,
+            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
+            completion_tokens=self.completion_tokens + other.completion_tokens,
+            cached_tokens=self.cached_tokens + other.cached_tokens,
+            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
+            cost_usd=sum(costs) if costs else None,
+            unknown_requests=self.unknown_requests + other.unknown_requests,
+            images=self.images + other.images,
+            image_tokens=self.image_tokens + other.image_tokens,
+        )
+
+
+class Pace(Frozen):
+    """How long a model takes, as a function of what it reads and writes, so that the same reply always costs the same.
+
+    seconds = requests * latency_s + tokens read / read_tokens_per_s + tokens written / write_tokens_per_s
+    """
+
+    latency_s: float = Field(default=0.5, ge=0, le=3600)
+    """Seconds of each request, whatever its length."""
+    read_tokens_per_s: float = Field(default=5000.0, gt=0)
+    write_tokens_per_s: float = Field(default=50.0, gt=0)
+
+    def seconds(self, usage: Usage) -> float:
+        """Return the seconds that this usage takes."""
+        reading_s = usage.prompt_tokens / self.read_tokens_per_s
+        writing_s = usage.completion_tokens / self.write_tokens_per_s
+        return usage.requests * self.latency_s + reading_s + writing_s
+
+
 class Clock(Frozen):
     """How game time and thinking time relate in this run."""
 
     rule: ClockRule = "frozen"
-    max_wait_s: float | None = 15.0
-    """Longest time the host waits for the agents of one step; None for no limit."""
-    step_loops: int = Field(default=8, ge=1)
-    """Game loops that pass between two observations."""
+    """`frozen`: the game stands still while agents decide. `budget`: each decision takes effect `thinking_loops` after
+    its observation. `token`: as many loops later as `pace` says of the tokens that were read and written. `realtime`:
+    the game goes on at `speed` and waits for nobody; a decision takes effect when it arrives."""
+    max_wait_s: float | None = Field(default=15.0, gt=0, le=86_400)
+    """Longest time the host waits for the answer to an observation; None for no limit."""
+    step_loops: int = Field(default=8, ge=1, le=100_000)
+    """Game loops from a decision's effect to the agent's next observation; with `realtime`, also those between two
+    looks of the host at the game and at its inbox."""
+    thinking_loops: int = Field(default=22, ge=0, le=100_000)
+    """With `budget`: game loops that each decision costs."""
+    pace: Pace = Pace()
+    """With `token`: the pace of models whose model file gives none."""
+    speed: float = Field(default=1.0, gt=0, le=1000)
+    """With `realtime`: 1 is 22.4 game loops in a second."""
+    max_age_loops: int | None = Field(default=None, ge=0, le=1_000_000)
+    """A decision that takes effect more game loops after its observation is refused; None for no limit."""
+    grace_s: float = Field(default=15.0, ge=0, le=86_400)
+    """How long a required agent may be away: the host waits for it as long, and then ends the match."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether the game stands still until the agents that were asked have answered."""
+        return self.rule != "realtime"
 
 
 class Briefing(Wire):
@@ -481,40 +565,6 @@ class Observation(Wire):
 # --- what an agent sends ----------------------------------------------------------------------------
 
 
-class Usage(Frozen):
-    """The usage of requests to a model. Sums with `+`."""
-
-    requests: int = 0
-    prompt_tokens: int = 0
-    completion_tokens: int = 0
-    cached_tokens: int = 0
-    """The part of `prompt_tokens` that the provider had in its cache."""
-    reasoning_tokens: int = 0
-    """The part of `completion_tokens` that was reasoning."""
-    cost_usd: float | None = None
-    """None if no price is known for the model."""
-    unknown_requests: int = 0
-    """Requests that were cancelled or failed, whose tokens are unknown."""
-    images: int = 0
-    """Number of pictures that were sent along."""
-    image_tokens: int = 0
-    """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
-
-    def __add__(self, other: Usage) -> Usage:
-        costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
-        return Usage(
-            requests=self.requests + other.requests,
-            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
-            completion_tokens=self.completion_tokens + other.completion_tokens,
-            cached_tokens=self.cached_tokens + other.cached_tokens,
-            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
-            cost_usd=sum(costs) if costs else None,
-            unknown_requests=self.unknown_requests + other.unknown_requests,
-            images=self.images + other.images,
-            image_tokens=self.image_tokens + other.image_tokens,
-        )
-
-
 class Reply(Wire):
     """Agent → host: the answer to one observation. The first valid one of a step counts."""
 
@@ -532,6 +582,8 @@ class Reply(Wire):
     """From the arrival of the observation to this reply."""
     attempts: int = Field(default=0, ge=0)
     usage: Usage = Usage()
+    pace: Pace | None = None
+    """The pace of its model, if the model file gives one; see `Clock.pace`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -623,7 +675,7 @@ class Run(Wire):
 
 
 class AgentReport(Frozen):
-    """The result of one agent's part of a step."""
+    """The result of one agent's decision, in the step in which it took effect."""
 
     agent: str
     side: str
@@ -636,6 +688,12 @@ class AgentReport(Frozen):
     ignored: int = 0
     """Replies that arrived and were not executed: duplicates, late or foreign ones."""
     usage: Usage = Usage()
+    asked_step: int | None = Field(default=None, ge=0)
+    """Step of the observation that it answers; None for the step of the report."""
+    age_loops: int = Field(default=0, ge=0)
+    """Game loops from the observation to the effect."""
+    fate: Fate | None = None
+    """What became of the decision; None if there was none."""
 
 
 class Timings(Frozen):
@@ -646,12 +704,16 @@ class Timings(Frozen):
     wait_s: float = 0.0
     act_s: float = 0.0
     game_s: float = 0.0
+    lag_s: float = 0.0
+    """With the clock `realtime`: how much the game is behind the wall clock since the episode began."""
 
 
 class Report(Wire):
     """Host → all: what happened in one step."""
 
     kind: Literal["report"] = "report"
+    side: str = "blue"
+    """Whose agents these are; in a match of two sides each has a report of each step."""
     episode: int = Field(ge=0)
     step: int = Field(ge=0)
     game_loop: int = Field(ge=0)
@@ -678,10 +740,14 @@ class Result(Wire):
     """Host → all: the result of an episode."""
 
     kind: Literal["result"] = "result"
+    side: str = "blue"
     episode: int = Field(ge=0)
-    outcome: Outcome
+    outcome: Ending
     cause: str
-    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`."""
+    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`, `agents gone`."""
+    valid: bool = True
+    """False if the episode says nothing about its agents; `invalid_because` has the reason."""
+    invalid_because: str = ""
     steps: int
     """Number of decisions of the agents."""
     env_steps: int = 0
@@ -700,6 +766,15 @@ class Result(Wire):
     """By agent: how many of its steps ended `ok`, `late`, …"""
     rejections: dict[str, int] = {}
     """Rejected calls by reason."""
+    fates: dict[str, dict[str, int]] = {}
+    """By agent: how many of its decisions were `fresh`, `stale`, …"""
+    fallbacks: dict[str, dict[str, int]] = {}
+    """By agent: how often it fell back, by reason."""
+    age_p50_loops: float | None = None
+    """Game loops from an observation to the effect of the decision."""
+    age_p95_loops: float | None = None
+    lag_s: float = 0.0
+    """With the clock `realtime`: how much the game was behind the wall clock at the end."""
     accepted: int = 0
     latency_p50_s: float | None = None
     latency_p95_s: float | None = None

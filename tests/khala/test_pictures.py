@@ -93,7 +93,7 @@ async def play(connect: Connect, path: Path) -> Looking:
     host = await connect()
     policy, stop = Looking(), asyncio.Event()
     with Recorder(path) as recorder:
-        bus = RecordingBus(host, recorder)
+        bus = RecordingBus(host, recorder, [SEAT])
         card = Run(
             run=RUN, task="t", map_name="m", map_sha256="0", seed=1, episodes=1, game="none", executor="raw",
             clock=Clock(), agents=(AgentCard(name=SEAT.agent, side=SEAT.side, teams=()),), catalogue_sha256="0",

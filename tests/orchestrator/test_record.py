@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery, Sample
 from khala_protocol.codec import encode
 from khala_protocol.errors import BusClosed, RecordingError
@@ -26,6 +27,7 @@ RUN = "test"
 REPLIES = every_agent(RUN, Topic.REPLY)
 OBSERVATION = agent_key(RUN, "blue", "Stalkers", Topic.OBSERVATION)
 REPLY = agent_key(RUN, "blue", "Stalkers", Topic.REPLY)
+SEATS = [Seat("blue", "Stalkers")]
 EXCHANGE = agent_key(RUN, "blue", "Stalkers", Topic.EXCHANGE)
 
 
@@ -38,7 +40,7 @@ async def test_what_is_sent_and_what_is_taken_stand_in_the_order_of_the_host(
 ) -> None:
     agent = await broker.session().publisher(REPLY, Delivery.SPEECH)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        bus = RecordingBus(broker.session(), recorder)
+        bus = RecordingBus(broker.session(), recorder, SEATS)
         publisher = await bus.publisher(OBSERVATION, Delivery.STATE)
         replies = await bus.subscribe(REPLIES, Delivery.SPEECH)
         await publisher.put(b"step 0")
@@ -58,7 +60,7 @@ async def test_what_is_sent_and_what_is_taken_stand_in_the_order_of_the_host(
 async def test_what_is_sent_arrives_as_without_a_recording(broker: MemoryBroker, tmp_path: Path) -> None:
     agent = await broker.session().subscribe(OBSERVATION, Delivery.STATE)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+        publisher = await RecordingBus(broker.session(), recorder, SEATS).publisher(OBSERVATION, Delivery.STATE)
         assert publisher.key == OBSERVATION
         await publisher.put(b"step 0")
         assert (await anext(agent)).payload == b"step 0"
@@ -73,7 +75,7 @@ async def test_it_is_recorded_before_it_is_sent(broker: MemoryBroker, tmp_path: 
     """What cannot be sent any more was meant to be, and stands in the file."""
     session = broker.session()
     with Recorder(tmp_path / "run.mcap") as recorder:
-        publisher = await RecordingBus(session, recorder).publisher(OBSERVATION, Delivery.STATE)
+        publisher = await RecordingBus(session, recorder, SEATS).publisher(OBSERVATION, Delivery.STATE)
         session.kill()
         with pytest.raises(BusClosed):
             await publisher.put(b"last")
@@ -83,7 +85,7 @@ async def test_it_is_recorded_before_it_is_sent(broker: MemoryBroker, tmp_path: 
 async def test_bytes_that_are_no_message_are_kept_as_they_came(broker: MemoryBroker, tmp_path: Path) -> None:
     agent = await broker.session().publisher(REPLY, Delivery.SPEECH)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        replies = await RecordingBus(broker.session(), recorder).subscribe(REPLIES, Delivery.SPEECH)
+        replies = await RecordingBus(broker.session(), recorder, SEATS).subscribe(REPLIES, Delivery.SPEECH)
         await agent.put(b"\x00\xff garbage")
         await anext(replies)
     (sample,) = Recording.open(tmp_path / "run.mcap")
@@ -93,7 +95,7 @@ async def test_bytes_that_are_no_message_are_kept_as_they_came(broker: MemoryBro
 async def test_a_subscription_keeps_its_depth_and_says_what_it_lost(broker: MemoryBroker, tmp_path: Path) -> None:
     agent = await broker.session().publisher(OBSERVATION, Delivery.STATE)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        samples = await RecordingBus(broker.session(), recorder).subscribe(OBSERVATION, Delivery.STATE, depth=1)
+        samples = await RecordingBus(broker.session(), recorder, SEATS).subscribe(OBSERVATION, Delivery.STATE, depth=1)
         await agent.put(b"0")
         await agent.put(b"1")
         assert (samples.dropped, samples.missed) == (1, 0)
@@ -108,7 +110,7 @@ async def test_it_says_how_many_samples_were_missed_while_the_link_was_down(
     session = broker.session()
     agent = await broker.session().publisher(OBSERVATION, Delivery.STATE)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        samples = await RecordingBus(session, recorder).subscribe(OBSERVATION, Delivery.STATE)
+        samples = await RecordingBus(session, recorder, SEATS).subscribe(OBSERVATION, Delivery.STATE)
         await agent.put(b"0")
         session.cut()
         for payload in (b"1", b"2", b"3"):
@@ -120,7 +122,7 @@ async def test_it_says_how_many_samples_were_missed_while_the_link_was_down(
 async def test_tokens_pass_through_and_are_not_recorded(broker: MemoryBroker, tmp_path: Path) -> None:
     key = alive_key(RUN, "blue", "Stalkers", "1")
     with Recorder(tmp_path / "run.mcap") as recorder:
-        bus = RecordingBus(broker.session(), recorder)
+        bus = RecordingBus(broker.session(), recorder, SEATS)
         others = await broker.session().watch(every_agent(RUN, Topic.ALIVE))
         own = await bus.watch(every_agent(RUN, Topic.ALIVE))
         token = await bus.announce(key)
@@ -133,7 +135,7 @@ async def test_tokens_pass_through_and_are_not_recorded(broker: MemoryBroker, tm
 async def test_closing_closes_the_bus_below_and_leaves_the_recorder(broker: MemoryBroker, tmp_path: Path) -> None:
     session = broker.session()
     with Recorder(tmp_path / "run.mcap") as recorder:
-        await RecordingBus(session, recorder).close()
+        await RecordingBus(session, recorder, SEATS).close()
         with pytest.raises(BusClosed):
             await session.publisher(OBSERVATION, Delivery.STATE)
         recorder.write(OBSERVATION, b"still open")
@@ -142,7 +144,7 @@ async def test_closing_closes_the_bus_below_and_leaves_the_recorder(broker: Memo
 
 async def test_what_was_flushed_is_there_when_the_process_is_killed(broker: MemoryBroker, tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "run.mcap")
-    publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+    publisher = await RecordingBus(broker.session(), recorder, SEATS).publisher(OBSERVATION, Delivery.STATE)
     await publisher.put(b"step 0")
     recorder.flush()
     await publisher.put(b"step 1")
@@ -156,7 +158,7 @@ async def test_what_was_flushed_is_there_when_the_process_is_killed(broker: Memo
 async def test_a_sample_that_cannot_be_recorded_is_not_sent(broker: MemoryBroker, tmp_path: Path) -> None:
     agent = await broker.session().subscribe(OBSERVATION, Delivery.STATE)
     with Recorder(tmp_path / "run.mcap") as recorder:
-        publisher = await RecordingBus(broker.session(), recorder).publisher(OBSERVATION, Delivery.STATE)
+        publisher = await RecordingBus(broker.session(), recorder, SEATS).publisher(OBSERVATION, Delivery.STATE)
     with pytest.raises(RecordingError, match=r"run\.mcap was closed: open another recording to write more"):
         await publisher.put(b"after the end")
     await agent.close()
@@ -170,7 +172,7 @@ async def test_a_listener_takes_what_agents_asked_their_models(broker: MemoryBro
     )  # fmt: skip
     agent = broker.session()
     with Recorder(tmp_path / "run.mcap") as recorder:
-        bus = RecordingBus(broker.session(), recorder)
+        bus = RecordingBus(broker.session(), recorder, SEATS)
         async with Listener(bus, RUN):
             await (await agent.publisher(EXCHANGE, Delivery.LOG)).put(encode(asked))
             said = Reply(run=RUN, side="blue", agent="Stalkers", episode=0, step=0, text="")
@@ -183,7 +185,7 @@ async def test_a_listener_takes_what_agents_asked_their_models(broker: MemoryBro
 
 async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBroker, tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.mcap") as recorder:
-        async with Listener(RecordingBus(broker.session(), recorder), RUN):
+        async with Listener(RecordingBus(broker.session(), recorder, SEATS), RUN):
             agent = await broker.session().publisher(EXCHANGE, Delivery.LOG)
             await agent.put(b"at the last moment")
         await agent.put(b"after the end")

@@ -30,8 +30,12 @@ async def called(broker: MemoryBroker, *seats: Seat) -> AsyncIterator[tuple[Rost
     """A roster, and the seats that it said were left."""
     gone: list[Seat] = []
     async with Roster(broker.session(), RUN, seats or (ZEALOTS, STALKERS)) as roster:
-        roster.on_gone(gone.append)
+        roster.on_change(gone=gone.append, here=_greet)
         yield roster, gone
+
+
+async def _greet(seat: Seat) -> None:
+    """Take no note of who comes."""
 
 
 async def settle() -> None:
@@ -146,7 +150,7 @@ async def test_an_agent_is_gone_when_its_last_instance_is(
     await new.arrive("2")
     async with called(broker) as (roster, gone):
         await settle()
-        assert caplog.messages == ["2 instances of agent p1/Zealots are there: the first reply of a step counts"]
+        assert caplog.messages == ["2 processes are agent p1/Zealots: the first reply of a step counts, all pay"]
         old.bus.kill()
         await settle()
         assert (roster.present(ZEALOTS), gone) == (True, [])
@@ -197,7 +201,7 @@ async def test_with_the_own_link_down_nobody_is_gone(broker: MemoryBroker, peer:
     await peer(ZEALOTS).arrive()
     gone: list[Seat] = []
     async with Roster(session, RUN, [ZEALOTS]) as roster:
-        roster.on_gone(gone.append)
+        roster.on_change(gone=gone.append, here=_greet)
         await settle()
         session.cut()
         await settle()

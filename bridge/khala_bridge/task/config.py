@@ -22,7 +22,7 @@ from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evalua
 from khala_bridge.task.maps import Difficulty, MapSpec, Race, known_maps
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec
+from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec, Trigger
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -172,7 +172,12 @@ class AgentConfig(Frozen):
     max_actions: int | None = Field(default=None, ge=1)
     """Limit of actions for one of its teams in one reply; None for the task's limit."""
     required: bool = True
-    """Whether the match waits for it at the start."""
+    """Whether the match waits for it, at the start and while it is away."""
+    every_loops: int = Field(default=0, ge=0, le=100_000)
+    """Game loops that pass at least between two of its observations."""
+    when: tuple[Trigger, ...] = ()
+    """What has it asked at once, even before `every_loops` have passed: `attacked` (a unit of its teams lost health or
+    died), `idle` (one of them has no order), `message` (somebody wrote to it). Without `every_loops`, nothing else."""
 
     @field_validator("actions")
     @classmethod
@@ -242,13 +247,6 @@ class TaskConfig(Frozen):
     max_steps: int | None = Field(default=None, ge=1)
     """Decisions after which an episode ends without a result; None: the map decides."""
 
-    @field_validator("clock")
-    @classmethod
-    def _clock(cls, clock: Clock) -> Clock:
-        if clock.rule != "frozen":
-            raise ValueError(f"the clock rule '{clock.rule}' is not there yet, only 'frozen' is")
-        return clock
-
     @field_validator("agents")
     @classmethod
     def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
@@ -282,6 +280,10 @@ class TaskConfig(Frozen):
         """Size of the pictures that the game itself must render; None for none."""
         sizes = [image.size_px for agent in self.agents for image in agent.images if image.is_rendered]
         return max(sizes, default=None)
+
+    def per_side(self) -> tuple[TaskConfig, ...]:
+        """Return the task of each side."""
+        return (self,)
 
     def agent(self, name: str) -> AgentConfig:
         """Return the agent of this name."""

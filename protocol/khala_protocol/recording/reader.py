@@ -21,7 +21,7 @@ from mcap.writer import MCAP0_MAGIC
 from khala_protocol.codec import decode
 from khala_protocol.errors import PeerError, RecordingError
 from khala_protocol.keys import Topic, parse
-from khala_protocol.messages import Observation, Reply, Result, Run, Wire
+from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
 from khala_protocol.recording.recorder import KINDS, LIBRARY, METADATA, Recorder
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 W = TypeVar("W", bound=Wire)
 
 _RUN_LEVEL = tuple(f"/{topic}" for topic in (Topic.RUN, Topic.RESULT))
+_OPENERS = tuple(f"/{topic}" for topic in (Topic.OBSERVATION, Topic.REPORT))
 _LARGEST_RECORD = 2**30  # bytes; ours are a megabyte or one sample, a length beyond this is damage
 _BROKEN = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError, OverflowError, MemoryError)
 """Errors that mcap raises on bytes that are not an MCAP file; found by cutting and flipping bytes of one."""
@@ -170,11 +171,14 @@ class Recording:
         return tuple(reply for reply in self.of(Reply) if (reply.episode, reply.step) == (episode, step))
 
     def by_step(self) -> Iterator[RecordedStep]:
-        """Yield the samples step by step; samples before the first observation belong to no step."""
+        """Yield the samples step by step; samples before the first observation belong to no step.
+
+        A step begins with its first observation, or with its report if nobody was asked in it.
+        """
         place: tuple[int, int] | None = None
         samples: list[Recorded] = []
         for sample in self:
-            if sample.key.endswith(f"/{Topic.OBSERVATION}") and isinstance(sample.message, Observation):
+            if sample.key.endswith(_OPENERS) and isinstance(sample.message, Observation | Report):
                 begun = (sample.message.episode, sample.message.step)
                 if place is None or begun > place:
                     if place is not None:

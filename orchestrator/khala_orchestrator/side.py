@@ -1,0 +1,249 @@
+"""One side of a match: what its agents see, what becomes of their words, and what each of them hears next.
+
+A side knows its own task, its own snapshots and its own agents, and nothing of the other side. It owns no order and no
+time: `khala_orchestrator.match` says when an agent is asked and when its decision takes effect. What is to be said to
+an agent (what was accepted and rejected, and who wrote to it) waits here until it is asked again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_bridge.act import Actor
+from khala_bridge.observe import Feedback, Observer
+from khala_orchestrator.mailbox import Mailbox
+from khala_orchestrator.roster import Seat
+from khala_orchestrator.turn import Question
+from khala_protocol.messages import AgentReport, Message, Observation, Received, Rejection, Report
+from khala_protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from khala_bridge.act import Command, JointAction
+    from khala_bridge.game.game import StepResult
+    from khala_bridge.observe import AgentObservation, SideObservation
+    from khala_bridge.state import Snapshot
+    from khala_bridge.task.config import TaskConfig
+    from khala_orchestrator.mailbox import Post
+    from khala_orchestrator.schedule import Decision, StepId
+    from khala_protocol.messages import Fate, Timings, Trigger
+    from khala_protocol.speech import Speech
+
+
+class Played(NamedTuple):
+    """What a side does in one step: its decisions, and the commands and messages that came of them."""
+
+    decisions: Sequence[Decision]
+    joint: JointAction
+    messages: Sequence[Message]
+    post: Post
+
+    @property
+    def commands(self) -> Sequence[Command]:
+        """What the game is to carry out."""
+        return self.joint.commands
+
+
+@dataclass
+class Side:
+    """One side of a match; see the module."""
+
+    task: TaskConfig
+    """Of this side alone."""
+    run: str
+    observer: Observer = field(init=False)
+    actor: Actor = field(init=False)
+    mailbox: Mailbox = field(init=False)
+    _now: SideObservation = field(init=False)
+    _seen: dict[str, AgentObservation] = field(init=False, default_factory=dict)
+    """By agent, the observation that it decides on."""
+    _pending: dict[str, Feedback] = field(init=False, default_factory=dict)
+    """By agent, what it finds in its next observation."""
+
+    def __post_init__(self) -> None:
+        task = self.task
+        reach = {self.seat(a.name): [self.seat(other.name) for other in task.correspondents(a)] for a in task.agents}
+        self.observer, self.actor = Observer(task), Actor(task)
+        self.mailbox = Mailbox(reach, task.channels if task.communication else ())
+
+    @property
+    def name(self) -> str:
+        """The side's name in keys and reports."""
+        return self.task.side
+
+    @property
+    def seats(self) -> Sequence[Seat]:
+        """The seats of its agents, in the order of the task."""
+        return [self.seat(agent.name) for agent in self.task.agents]
+
+    @property
+    def required(self) -> Sequence[str]:
+        """The agents that it cannot do without."""
+        return [agent.name for agent in self.task.agents if agent.required]
+
+    def seat(self, agent: str) -> Seat:
+        """Return the seat of an agent of this side."""
+        return Seat(self.name, agent)
+
+    def begin(self) -> None:
+        """Forget the episode before."""
+        self.observer.begin()
+        self.mailbox.clear()
+        self._seen.clear()
+        self._pending = {agent.name: Feedback() for agent in self.task.agents}
+
+    # --- seeing -------------------------------------------------------------------------------------
+
+    def look(self, snapshot: Snapshot) -> None:
+        """Take in the present state of the game."""
+        self._now = self.observer.observe(snapshot, self._pending)
+
+    def happened(self, agent: str) -> Collection[Trigger]:
+        """Return what happened to an agent since its last observation."""
+        found: set[Trigger] = set(self._now.triggers(agent))
+        if self._pending[agent].messages:
+            found.add("message")
+        return found
+
+    def question(self, agent: str, at: StepId) -> Question:
+        """Return an agent's observation of the present state, with all that was to be said to it."""
+        seen, heard = self._now.agents[agent], self._pending[agent]
+        self._seen[agent], self._pending[agent] = seen, Feedback()
+        observation = Observation(
+            run=self.run,
+            agent=agent,
+            side=self.name,
+            episode=at.episode,
+            step=at.step,
+            game_loop=self._now.snapshot.game_loop,
+            answer_within_s=self.task.clock.max_wait_s,
+            text=seen.text,
+            view=seen.view,
+            images=tuple(picture.ref for picture in seen.pictures),
+            accepted=heard.accepted,
+            rejections=heard.rejections,
+            messages=heard.messages,
+        )
+        return Question(observation, [picture.data for picture in seen.pictures])
+
+    # --- acting -------------------------------------------------------------------------------------
+
+    def act(self, at: StepId, decisions: Sequence[Decision]) -> Played:
+        """Return what comes of the decisions that take effect now."""
+        speeches = {decision.seat.agent: speech for decision in decisions if (speech := self._speech(decision))}
+        joint = self.actor.joint(self._now, speeches, self._seen)
+        messages = [
+            Message(
+                run=self.run,
+                agent=agent,
+                side=self.name,
+                episode=at.episode,
+                step=at.step,
+                recipient=said.recipient,
+                text=said.text,
+            )
+            for agent, speech in speeches.items()
+            for said in speech.messages
+        ]
+        for agent, speech in speeches.items():
+            for listen in speech.listens:
+                self.mailbox.listen(self.seat(agent), listen.channel)
+        return Played(decisions, joint, messages, self.mailbox.deliver(messages))
+
+    def _speech(self, decision: Decision) -> Speech | None:
+        """Return what an agent says: the only place where a reply is parsed. None if it says nothing.
+
+        The default reply stands in for an agent that failed, and not for one that chose to say nothing.
+        """
+        answer = decision.answer
+        text = answer.text if answer.status == "ok" else answer.text or self.task.default_reply
+        speech = parse(text) if text else None
+        if speech is None or not self._is_too_old(decision):
+            return speech
+        faults = [_too_old(decision, call.name, call.start) for call in speech.calls[:1]]
+        return replace(speech, calls=(), faults=(*speech.faults, *faults))
+
+    def _is_too_old(self, decision: Decision) -> bool:
+        limit = self.task.clock.max_age_loops
+        return limit is not None and decision.due_loop - decision.asked_loop > limit
+
+    # --- reporting ----------------------------------------------------------------------------------
+
+    def report(self, at: StepId, played: Played, result: StepResult, timings: Timings) -> Report:
+        """Return the report of a step, and keep what each agent is to hear of it."""
+        heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
+        for agent, feedback in heard.items():
+            self._pending[agent] = _joined(self._pending[agent], feedback)
+        return Report(
+            run=self.run,
+            side=self.name,
+            episode=at.episode,
+            step=at.step,
+            game_loop=result.snapshot.game_loop,
+            agents=tuple(self._agent(at, one, played, heard[one.seat.agent]) for one in played.decisions),
+            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in played.messages),
+            functions=result.played.functions,
+            env_steps=result.env_steps,
+            score=result.snapshot.score.total,
+            timings=timings,
+        )
+
+    def _heard(self, seat: Seat, played: Played, result: StepResult) -> Feedback:
+        joint = played.joint
+        rejections: tuple[Rejection, ...] = (
+            *joint.rejections.get(seat.agent, ()),
+            *(refusal.rejection for refusal in result.played.refusals if refusal.agent == seat.agent),
+            *played.post.rejections.get(seat, ()),
+        )
+        return Feedback(joint.accepted.get(seat.agent, ()), rejections, played.post.received.get(seat, ()))
+
+    def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
+        agent, loop = decision.seat.agent, self._now.snapshot.game_loop
+        fate: Fate | None = "refused" if self._is_too_old(decision) else played.joint.fates.get(agent)
+        return _reported(at, decision, loop, fate=fate, accepted=heard.accepted, rejections=heard.rejections)
+
+    def dropped(self, at: StepId, decisions: Sequence[Decision], loop: int) -> Sequence[AgentReport]:
+        """Return the reports of decisions that did not take effect before the end of the episode."""
+        own = (decision for decision in decisions if decision.seat.side == self.name)
+        return [_reported(at, decision, loop, fate="dropped") for decision in own]
+
+
+def _reported(
+    at: StepId,
+    decision: Decision,
+    loop: int,
+    *,
+    fate: Fate | None,
+    accepted: tuple[str, ...] = (),
+    rejections: tuple[Rejection, ...] = (),
+) -> AgentReport:
+    answer = decision.answer
+    return AgentReport(
+        agent=decision.seat.agent,
+        side=decision.seat.side,
+        status=answer.status,
+        detail=answer.detail,
+        latency_s=answer.latency_s,
+        accepted=accepted,
+        rejections=rejections,
+        ignored=answer.ignored,
+        usage=answer.usage,
+        asked_step=None if decision.asked == at else decision.asked.step,
+        age_loops=loop - decision.asked_loop,
+        fate=fate,
+    )
+
+
+def _too_old(decision: Decision, text: str, start: int) -> Rejection:
+    age = decision.due_loop - decision.asked_loop
+    message = f"Your reply came {age} game loops after its observation, which is too late: no order of it was given."
+    return Rejection(reason="too_late", message=message, text=text, start=start)
+
+
+def _joined(before: Feedback, more: Feedback) -> Feedback:
+    """Return two feedbacks as one, the older first."""
+    return Feedback(
+        before.accepted + more.accepted, before.rejections + more.rejections, before.messages + more.messages
+    )
