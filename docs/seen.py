@@ -99,7 +99,7 @@ class Played:
         self.questions: dict[str, Question] = {}
         self._step = step
 
-    async def ask(self, questions: Iterable[Question]) -> Answers:
+    async def ask(self, questions: Iterable[Question], *, wait: bool = True) -> Answers:  # noqa: ARG002
         """Return the answers of one step."""
         asked = list(questions)
         self.questions = {question.observation.agent: question for question in asked}

@@ -115,8 +115,11 @@ async def play_hosted(
 def one_side(config: MatchConfig, sc2path: Path) -> Sides:
     """Return the game of a match, not started yet."""
     task = config.task
-    started = GameConfig(sc2path=sc2path, map=task.map_spec, seed=config.seed, render_px=task.render_px)
-    return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(task)])
+    sides = task.per_side()
+    started = GameConfig(
+        sc2path=sc2path, map=task.map_spec, players=2 if task.sides else 1, seed=config.seed, render_px=task.render_px
+    )
+    return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(side) for side in sides])
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:

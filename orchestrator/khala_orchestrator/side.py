@@ -102,7 +102,7 @@ class Side:
 
     def happened(self, agent: str) -> Collection[Trigger]:
         """Return what happened to an agent since its last observation."""
-        found: set[Trigger] = set(self._now.triggers(agent))
+        found: set[Trigger] = set()
         if self._pending[agent].messages:
             found.add("message")
         return found
@@ -133,7 +133,7 @@ class Side:
     def act(self, at: StepId, decisions: Sequence[Decision]) -> Played:
         """Return what comes of the decisions that take effect now."""
         speeches = {decision.seat.agent: speech for decision in decisions if (speech := self._speech(decision))}
-        joint = self.actor.joint(self._now, speeches, self._seen)
+        joint = self.actor.joint(self._now, speeches)
         messages = [
             Message(
                 run=self.run,
@@ -201,7 +201,7 @@ class Side:
 
     def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
         agent, loop = decision.seat.agent, self._now.snapshot.game_loop
-        fate: Fate | None = "refused" if self._is_too_old(decision) else played.joint.fates.get(agent)
+        fate: Fate | None = "refused" if self._is_too_old(decision) else "fresh"
         return _reported(at, decision, loop, fate=fate, accepted=heard.accepted, rejections=heard.rejections)
 
     def dropped(self, at: StepId, decisions: Sequence[Decision], loop: int) -> Sequence[AgentReport]:

@@ -17,7 +17,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeVar
 
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
@@ -41,6 +41,8 @@ class GameConfig(Frozen):
     sc2path: Path
     """Directory of the install, in the layout of StarCraft II; SC2PATH points to it while PySC2 looks for it."""
     map: MapSpec
+    players: Literal[1, 2] = 1
+    """That Khala plays: with 2, the second one plays the race of the opponent in place of the computer."""
     seed: int | None = None
     """Of the first episode; the next ones count up from it. None: the game chooses."""
     screen_px: int = 128

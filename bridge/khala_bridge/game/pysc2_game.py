@@ -41,7 +41,10 @@ _environment = threading.Lock()
 
 
 class PySC2Game:
-    """One player against the computer, on `SC2Env`."""
+    """One player against the computer, or two against each other, on `SC2Env`.
+
+    Two players have two processes of the game, which PySC2 joins over LAN ports of this machine.
+    """
 
     def __init__(self, config: GameConfig) -> None:
         """Start the game.
@@ -225,11 +228,6 @@ def _start(config: GameConfig) -> Any:
         send_observation_proto=True,
         hide_specific_actions=False,  # a general action would do what the unit can, not what the call says
     )
-    players: list[Any] = [sc2_env.Agent(sc2_env.Race[config.map.race], "Khala")]
-    if config.map.opponent is not None:
-        # PySC2 would draw the build `random` from Python's own generator
-        difficulty, build = sc2_env.Difficulty[config.map.difficulty], sc2_env.BotBuild.macro
-        players.append(sc2_env.Bot(sc2_env.Race[config.map.opponent], difficulty, build))
     if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
         flags.FLAGS.mark_as_parsed()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
@@ -238,7 +236,7 @@ def _start(config: GameConfig) -> Any:
         with _sc2path(config.sc2path), _explained("the game could not be started"):
             env.__init__(
                 map_name=_Map(config.map),
-                players=players,
+                players=_players(config),
                 agent_interface_format=interface,
                 game_steps_per_episode=config.limit_loops,
                 random_seed=config.seed,
@@ -248,6 +246,19 @@ def _start(config: GameConfig) -> Any:
         env.close()
         raise
     return env
+
+
+def _players(config: GameConfig) -> list[Any]:
+    """Return the players as PySC2 takes them; it starts a process of the game for each agent."""
+    spec = config.map
+    players: list[Any] = [sc2_env.Agent(sc2_env.Race[spec.race], "Khala")]
+    if spec.opponent is None:
+        return players
+    race = sc2_env.Race[spec.opponent]
+    if config.players == 2:
+        return [*players, sc2_env.Agent(race, "Khala")]
+    # PySC2 would draw the build `random` from Python's own generator
+    return [*players, sc2_env.Bot(race, sc2_env.Difficulty[spec.difficulty], sc2_env.BotBuild.macro)]
 
 
 @contextlib.contextmanager

@@ -12,7 +12,8 @@ from collections import Counter
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from khala_bridge.catalogue.action import GROUP_SELECTOR, Action
 from khala_bridge.catalogue.catalogue import alias_of, catalogue, chosen
@@ -209,6 +210,35 @@ class AgentConfig(Frozen):
         return tuple(TeamSpec(name=t.name, unit_types=t.unit_types, task=t.task) for t in self.teams)
 
 
+def _team_mates(agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
+    """Return agents whose names and control groups agree."""
+    _once((agent.name for agent in agents), "agent")
+    names = [agent.name for agent in agents]
+    for agent in agents:
+        for name in agent.talks_to or ():
+            _known(name, names, "agent")
+    groups = [t.control_group for a in agents for t in a.teams if t.control_group is not None]
+    _once((str(group) for group in groups), "control group")
+    return agents
+
+
+Agents: TypeAlias = Annotated[tuple[AgentConfig, ...], AfterValidator(_team_mates)]
+
+
+class SideConfig(Frozen):
+    """One of two sides: its name, and the fields in which it differs from what the task gives both of them."""
+
+    side: KeyName
+    race: Race | None = None
+    task: str | None = None
+    agents: Annotated[Agents, AfterValidator(_some)] | None = None
+    channels: tuple[str, ...] | None = None
+    communication: bool | None = None
+    auto: AutoConfig | None = None
+    default_reply: str | None = None
+    max_actions: int | None = Field(default=None, ge=1)
+
+
 class Opponent(Frozen):
     """The computer player; values that are missing come from the map table."""
 
@@ -229,9 +259,12 @@ class TaskConfig(Frozen):
     opponent: Opponent = Opponent()
     side: KeyName = "blue"
     """Name of the agents' side in keys and reports."""
-    task: str
-    """The task of all agents."""
-    agents: Annotated[tuple[AgentConfig, ...], AfterValidator(_some)]
+    sides: tuple[SideConfig, ...] = ()
+    """Two, if agents play against agents. The other fields hold for both, unless a side has its own."""
+    task: str = Field(default=None, validate_default=True)
+    """The task of all agents; required, unless each side has its own."""
+    agents: Agents = Field(default=None, validate_default=True)
+    """One or more; required, unless each side has its own."""
     channels: tuple[str, ...] = ()
     """Names for groups of agents that can receive messages."""
     communication: bool = True
@@ -247,17 +280,24 @@ class TaskConfig(Frozen):
     max_steps: int | None = Field(default=None, ge=1)
     """Decisions after which an episode ends without a result; None: the map decides."""
 
-    @field_validator("agents")
+    @field_validator("sides")
     @classmethod
-    def _agents(cls, agents: tuple[AgentConfig, ...]) -> tuple[AgentConfig, ...]:
-        _once((agent.name for agent in agents), "agent")
-        names = [agent.name for agent in agents]
-        for agent in agents:
-            for name in agent.talks_to or ():
-                _known(name, names, "agent")
-        groups = [t.control_group for a in agents for t in a.teams if t.control_group is not None]
-        _once((str(group) for group in groups), "control group")
-        return agents
+    def _two(cls, sides: tuple[SideConfig, ...]) -> tuple[SideConfig, ...]:
+        if len(sides) not in (0, 2):
+            raise ValueError(f"there are {len(sides)} sides: give two, or none for one side against the computer")
+        _once((side.side for side in sides), "side")
+        return sides
+
+    @field_validator("task", "agents", mode="before")
+    @classmethod
+    def _given(cls, value: object, info: ValidationInfo) -> object:
+        field = str(info.field_name)
+        if value not in (None, [], ()):
+            return value
+        sides = info.data.get("sides", ())
+        if sides and all(getattr(side, field) is not None for side in sides):
+            return () if field == "agents" else ""
+        raise PydanticCustomError("missing", "Field required")
 
     @model_validator(mode="after")
     def _one_map(self) -> Self:
@@ -265,25 +305,59 @@ class TaskConfig(Frozen):
             raise ValueError("give either map or own_map")
         return self
 
+    @model_validator(mode="after")
+    def _room_for_two(self) -> Self:
+        if not self.sides:
+            return self
+        if not self._map.two_sides:
+            raise ValueError(f"the map {self._map.name} has no place for a second side of agents")
+        if self.opponent != Opponent():
+            raise ValueError("a task of two sides has no opponent: give the race of each side in `sides`")
+        if self.side != type(self).model_fields["side"].default:
+            raise ValueError("a task of two sides has no side of its own: name both in `sides`")
+        return self
+
+    @model_validator(mode="after")
+    def _races(self) -> Self:
+        spec = self._map
+        asked = [self.race, *(side.race for side in self.sides)]
+        if strange := [race for race in asked if race not in (None, spec.race)] if not spec.any_race else []:
+            raise ValueError(f"the units of the map {spec.name} are {spec.race}: the race cannot be {strange[0]}")
+        return self
+
     @property
     def map_spec(self) -> MapSpec:
-        """The map, with this task's changes."""
-        changed = {"race": self.race, "opponent": self.opponent.race, "difficulty": self.opponent.difficulty}
+        """The map, with this task's changes; the opponent of two sides is the second one."""
+        race, opponent = self.race, self.opponent.race
+        if self.sides:
+            race, opponent = (side.race or self.race for side in self.sides)
+        changed = {"race": race, "opponent": opponent, "difficulty": self.opponent.difficulty}
+        return self._map.model_copy(update={k: v for k, v in changed.items() if v is not None})
+
+    @property
+    def _map(self) -> MapSpec:
+        """The map as it is."""
         if self.own_map is None:
-            spec = known_maps()[self.map]
-        else:
-            spec = self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
-        return spec.model_copy(update={k: v for k, v in changed.items() if v is not None})
+            return known_maps()[self.map]
+        return self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
+
+    def per_side(self) -> tuple[TaskConfig, ...]:
+        """Return the task of each side, as if the other one were an opponent; itself if there is only one."""
+        if not self.sides:
+            return (self,)
+        spec = self.map_spec
+        first, second = self.sides
+        return self._of(first, spec.race, spec.opponent), self._of(second, spec.opponent, spec.race)
+
+    def _of(self, side: SideConfig, race: Race | None, other: Race | None) -> TaskConfig:
+        own = {name: value for name in SideConfig.model_fields if (value := getattr(side, name)) is not None}
+        return self.model_copy(update=own | {"sides": (), "race": race, "opponent": Opponent(race=other)})
 
     @property
     def render_px(self) -> int | None:
         """Size of the pictures that the game itself must render; None for none."""
-        sizes = [image.size_px for agent in self.agents for image in agent.images if image.is_rendered]
-        return max(sizes, default=None)
-
-    def per_side(self) -> tuple[TaskConfig, ...]:
-        """Return the task of each side."""
-        return (self,)
+        agents = (agent for task in self.per_side() for agent in task.agents)
+        return max((image.size_px for agent in agents for image in agent.images if image.is_rendered), default=None)
 
     def agent(self, name: str) -> AgentConfig:
         """Return the agent of this name."""
@@ -301,10 +375,11 @@ class TaskConfig(Frozen):
         return tuple(a for a in self.agents if a.name != agent.name and (names is None or a.name in names))
 
     def cards(self) -> tuple[AgentCard, ...]:
-        """Return the agents as the run card lists them."""
+        """Return the agents of all sides as the run card lists them."""
         return tuple(
-            AgentCard(name=a.name, side=self.side, teams=tuple(t.name for t in a.teams), required=a.required)
-            for a in self.agents
+            AgentCard(name=a.name, side=task.side, teams=tuple(t.name for t in a.teams), required=a.required)
+            for task in self.per_side()
+            for a in task.agents
         )
 
 

@@ -35,7 +35,11 @@ class MapSpec(Frozen):
     race: Race
     """Of the agents' side."""
     opponent: Race | None
-    """Of the computer player; None if the map is played alone."""
+    """Of the computer player, or of the second side; None if the map is played alone."""
+    any_race: bool = False
+    """Whether a task may choose the race of a side: the map does not place its units."""
+    two_sides: bool = False
+    """Whether a second side of agents can take the place of the computer player."""
     difficulty: Difficulty = "very_hard"
     """Of the computer player; the paper's setting."""
     limit_loops: int | None = None
