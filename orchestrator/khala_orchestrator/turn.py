@@ -97,13 +97,18 @@ class _Question:
     observation: Observation
     payload: bytes
     asked_at: float
-    until: float | None
+    until: float | None = None
     waiting: bool = True
     held: bool = False
     """Whether its agent is required and away."""
     reply: Reply | None = None
     arrived_at: float = 0.0
     fault: str = ""
+
+    def wait_until_answered(self, now: float) -> None:
+        """Give the agent its time, unless it is away."""
+        if not self.held and self.observation.answer_within_s is not None:
+            self.until = now + self.observation.answer_within_s
 
     def answers_to(self, reply: Reply) -> bool:
         """Return whether a reply is the first one to this question."""
@@ -160,28 +165,29 @@ class Turn:
             wait: wait until every open question is settled: answered, or past its deadline.
         """
         now = asyncio.get_running_loop().time
-        publish_s = 0.0
+        publish_s, asked = 0.0, list[_Question]()
         for question in questions:
             began = now()
-            await self._publish(question, began)
+            asked.append(await self._publish(question, began))
             publish_s += now() - began
         began = now()
+        for one in asked:
+            one.wait_until_answered(began)
         if wait:
             await self._settled()
         return self._collect(publish_s=publish_s, wait_s=now() - began)
 
     # --- asking -------------------------------------------------------------------------------------
 
-    async def _publish(self, question: Question, now: float) -> None:
+    async def _publish(self, question: Question, now: float) -> _Question:
         observation = question.observation
         seat = Seat(observation.side, observation.agent)
         await self._show(seat, question.pictures)
-        within_s = observation.answer_within_s
-        asked = _Question(observation, encode(observation), now, None if within_s is None else now + within_s)
-        self._open[seat] = asked
+        self._open[seat] = asked = _Question(observation, encode(observation), now)
         await self._publishers[seat].put(asked.payload)
         if not self._roster.present(seat):
             self._gone(seat)
+        return asked
 
     async def _show(self, seat: Seat, pictures: Sequence[bytes]) -> None:
         """Publish pictures, each under the key of its place, so that late joiners find all of the newest ones."""
@@ -196,9 +202,9 @@ class Turn:
         asked = self._open.get(seat)
         if asked is None or not asked.waiting:
             return
-        if seat in self._required and self._grace_s > 0:
+        if seat in self._required:
             asked.held, asked.until = True, asyncio.get_running_loop().time() + self._grace_s
-            log.error("required agent %s went away; waiting for it for %g s", seat, self._grace_s)
+            log.error("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
         else:
             asked.waiting = False
         self._changed.set()
@@ -209,8 +215,8 @@ class Turn:
         if asked is None or asked.reply is not None:
             return
         if asked.held:
-            within_s = asked.observation.answer_within_s
-            asked.held, asked.until = False, None if within_s is None else asyncio.get_running_loop().time() + within_s
+            asked.held, asked.until = False, None
+            asked.wait_until_answered(asyncio.get_running_loop().time())
             log.error("required agent %s is back", seat)
             self._changed.set()
         await self._publishers[seat].put(asked.payload)

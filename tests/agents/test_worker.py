@@ -148,15 +148,22 @@ async def test_the_last_briefing_serves_if_the_new_one_does_not_come(
     assert 0.2 < reply.latency_s < 0.3
 
 
-async def test_a_step_is_answered_once_however_often_it_arrives(
+async def test_a_step_is_decided_once_and_its_reply_sent_again_if_it_is_asked_again(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    await players.start(Fixed(ATTACK))
+    decided: list[int] = []
+
+    async def decide(briefing: Briefing, observation: Observation) -> str:
+        decided.append(observation.step)
+        return ATTACK
+
+    await players.start(FunctionPolicy(decide))
     await host.say(briefing())
     for step in (0, 0, 1, 0, 1, 2):
         await host.say(observation(step=step))
         await asyncio.sleep(0.1)
-    assert [reply.step for reply in host.of(Reply)] == [0, 1, 2]
+    assert decided == [0, 1, 2]
+    assert [reply.step for reply in host.of(Reply)] == [0, 0, 1, 1, 2]
 
 
 async def test_a_host_that_begins_anew_is_answered_from_step_0_again(

@@ -258,8 +258,12 @@ def snapshot() -> Callable[..., Snapshot]:
 def config() -> Callable[..., MatchConfig]:
     """A match of Stalkers and Zealots on one side, of three steps in one episode, if nothing else is said."""
 
-    def make(*, episodes: int = 1, assemble_s: float = 60.0, record: Any = None, **changes: Any) -> MatchConfig:
+    def make(
+        *, episodes: int = 1, assemble_s: float = 60.0, record: Any = None, required: bool = True, **changes: Any
+    ) -> MatchConfig:
         task = change(load_task("2s3z_pair"), **{"max_steps": 3, "max_wait_s": 10.0} | changes)
+        agents = tuple(agent.model_copy(update={"required": required}) for agent in task.agents)
+        task = task.model_copy(update={"agents": agents})
         return MatchConfig(task=task, run=RUN, episodes=episodes, assemble_s=assemble_s, record=record)
 
     return make

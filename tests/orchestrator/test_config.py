@@ -79,8 +79,8 @@ def test_a_mistake_in_a_task_file_is_named_with_its_line_and_field(tmp_path: Pat
         ("task: Win.", "task: Win.\nexecutor: mouse", "4 (executor): 'mouse' is none of 'raw' or 'screen'"),
         (
             "task: Win.",
-            "task: Win.\nclock: {rule: realtime}",
-            "4 (clock): the clock rule 'realtime' is not there yet, only 'frozen' is",
+            "task: Win.\nclock: {rule: warp}",
+            "4 (clock.rule): 'warp' is none of 'frozen', 'budget', 'token' or 'realtime'",
         ),
         (
             "[Attack_Unit]",
@@ -129,7 +129,7 @@ def test_a_value_that_does_not_fit_is_said_to_come_from_the_command_line(subtest
         ({"max_steps": 0}, "max_steps: Input should be greater than or equal to 1"),
         ({"executor": "mouse"}, "executor: Input should be 'raw' or 'screen'"),
         ({"map": "2s3"}, "map: there is no map '2s3', did you mean '2s3z'?"),
-        ({"speed": 2}, "speed: Extra inputs are not permitted"),
+        ({"colour": 2}, "colour: Extra inputs are not permitted"),
     ]
     for changes, said in rows:
         with subtests.test(**changes), pytest.raises(ConfigError) as raised:

@@ -163,7 +163,7 @@ async def test_what_comes_late_is_neither_carried_out_nor_delivered(hall: Hall, 
         assert result.accepted == int(in_time)
 
 
-async def test_the_default_reply_counts_where_an_agent_has_no_words(
+async def test_the_default_reply_counts_for_an_agent_that_failed_and_not_for_one_that_says_nothing(
     hall: Hall, config: MakeConfig, subtests: pytest.Subtests
 ) -> None:
     async def fail(peer: Peer, seen: Observation) -> None:
@@ -184,7 +184,7 @@ async def test_the_default_reply_counts_where_an_agent_has_no_words(
         ("late", thinking(11), "late", order),
         ("gone", leave, "gone", order),
         ("garbage", garbage, "malformed", order),
-        ("a reply without words", thinking(0, ""), "ok", order),
+        ("a reply without words", thinking(0, ""), "ok", ()),
         ("a fallback without words", fail, "fallback", order),
         ("a fallback with words", speak, "fallback", ()),
     ]
@@ -197,7 +197,7 @@ async def test_the_default_reply_counts_where_an_agent_has_no_words(
             assert [m.text for m in hall.reports[0].messages] == ["I am late"] * bool(accepted)
 
 
-async def test_an_agent_that_dies_and_comes_back_misses_the_steps_between(
+async def test_an_agent_that_may_be_missing_and_comes_back_misses_the_steps_between(
     hall: Hall, config: MakeConfig, peer: MakePeer
 ) -> None:
     again, arrived = peer(Seat("blue", "Stalkers")), asyncio.Event()
@@ -224,7 +224,7 @@ async def test_an_agent_that_dies_and_comes_back_misses_the_steps_between(
         await again.play(next_step)
 
     back = asyncio.create_task(come_back())
-    await hall.play(config(max_steps=5), Stalkers=dies, Zealots=zealots)
+    await hall.play(config(max_steps=5, required=False), Stalkers=dies, Zealots=zealots)
     back.cancel()
     assert [found.status for found in hall.of("Zealots")] == ["ok"] * 5
     assert [found.status for found in hall.of("Stalkers")] == ["ok", "gone", "late", "ok", "ok"]
