@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from khala_protocol.keys import Topic
 from khala_protocol.messages import Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import AsyncIterator, Callable, Iterator
 
     from khala_protocol.bus import Publisher
     from khala_protocol.bus.memory import MemoryBroker
@@ -508,3 +509,128 @@ async def test_a_turn_takes_back_what_it_declared(table: Table, broker: MemoryBr
     late = await broker.session().subscribe("**", Delivery.STATE)
     await late.close()
     assert [sample.key async for sample in late] == []
+
+
+# --- required agents ------------------------------------------------------------------------------------
+
+
+@asynccontextmanager
+async def requiring(
+    broker: MemoryBroker, peer: MakePeer, *seats: Seat, grace_s: float = 30.0
+) -> AsyncIterator[tuple[Turn, list[Peer]]]:
+    """A turn that cannot do without the first of its agents, all of them there."""
+    peers = [peer(seat) for seat in seats]
+    for one in peers:
+        await one.arrive()
+    host = broker.session()
+    async with Roster(host, RUN, seats) as roster, Turn(host, RUN, roster, required=seats[:1], grace_s=grace_s) as turn:
+        await roster.assemble(seats, 1)
+        yield turn, peers
+
+
+async def test_a_required_agent_that_dies_is_waited_for_and_its_successor_loses_nothing(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, STALKERS, within_s=10)))
+        await stalkers.observed()
+        await stalkers.reply("")
+        zealots.bus.kill()
+        await asyncio.sleep(29)
+        again = peer(ZEALOTS)
+        await again.arrive("2")
+        await again.observed()
+        await asyncio.sleep(9)
+        await again.reply("back")
+        answers = await asked
+    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("back", [])
+
+
+async def test_a_required_agent_that_does_not_come_back_is_lost(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        zealots.bus.kill()
+        stalkers.bus.kill()
+        answers = await turn.ask(observe(ZEALOTS, STALKERS, within_s=10))
+        assert asyncio.get_running_loop().time() == 30
+    assert {seat.agent: answer.status for seat, answer in answers.by_seat.items()} == dict.fromkeys(
+        ("Zealots", "Stalkers"), "gone"
+    )
+    assert answers.lost == [ZEALOTS]
+
+
+async def test_one_that_is_back_and_silent_is_late_and_not_lost(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        await asyncio.sleep(5)
+        zealots.bus.kill()
+        await asyncio.sleep(20)
+        await peer(ZEALOTS).arrive("2")
+        answers = await asked
+        assert asyncio.get_running_loop().time() == 5 + 20 + 10
+    assert (answers.by_seat[ZEALOTS].status, answers.lost) == ("late", [])
+
+
+async def test_one_whose_link_is_back_is_asked_again(broker: MemoryBroker, peer: MakePeer, observe: Observe) -> None:
+    async with requiring(broker, peer, ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        first = await zealots.observed()
+        await zealots.leave()  # and its reply is lost on the way
+        await asyncio.sleep(2)
+        await zealots.arrive()
+        while (await zealots.observed()) != first:
+            pass
+        await zealots.reply("once more")
+        assert (await asked).by_seat[ZEALOTS].text == "once more"
+
+
+# --- without waiting ------------------------------------------------------------------------------------
+
+
+async def test_without_waiting_there_are_the_answers_that_have_arrived(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        found = [await turn.ask(observe(ZEALOTS, STALKERS, within_s=60), wait=False)]
+        await zealots.observed()
+        await zealots.reply("quick")
+        await asyncio.sleep(1)
+        found.append(await turn.ask([], wait=False))
+        await turn.ask(observe(ZEALOTS, step=1, within_s=60), wait=False)
+        await stalkers.reply("slow", step=0)
+        await zealots.reply("quick again", step=1)
+        await asyncio.sleep(1)
+        found.append(await turn.ask([], wait=False))
+        found.append(await turn.ask([], wait=False))
+    said = [{seat.agent: answer.text for seat, answer in answers.by_seat.items()} for answers in found]
+    assert said == [{}, {"Zealots": "quick"}, {"Stalkers": "slow", "Zealots": "quick again"}, {}]
+
+
+async def test_a_question_that_nobody_waits_for_has_a_deadline_all_the_same(table: Table, observe: Observe) -> None:
+    async with table(ZEALOTS) as (turn, _):
+        await turn.ask(observe(ZEALOTS, within_s=10), wait=False)
+        await asyncio.sleep(9)
+        assert not (await turn.ask([], wait=False)).by_seat
+        await asyncio.sleep(1)
+        assert (await turn.ask([], wait=False)).by_seat[ZEALOTS].status == "late"
+
+
+async def test_an_inbox_that_fails_ends_the_match(broker: MemoryBroker, peer: MakePeer, observe: Observe) -> None:
+    class Full(Exception):
+        pass
+
+    async with requiring(broker, peer, ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=60)))
+        await zealots.observed()
+
+        def fail(*_: object) -> None:
+            raise Full
+
+        turn._take_reply = fail  # type: ignore[method-assign]
+        await zealots.reply("too much")
+        with pytest.raises(Full):
+            await asked
+        with pytest.raises(Full):
+            await turn.ask([], wait=False)
+        turn._pump = asyncio.create_task(asyncio.sleep(0))
