@@ -20,9 +20,9 @@ from khala_agents.llm.vision import ANTHROPIC, OPENAI
 from khala_agents.scripted.players import PLAYERS
 from khala_bridge.task.images import PAPER, ImageSpec
 from khala_orchestrator.config import MatchConfig, load_task
-from khala_orchestrator.host import sides_of
 from khala_orchestrator.match import Match, SilentObserver
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Reply
 from khala_simulator.process.install import install

@@ -13,24 +13,31 @@ from typing import TYPE_CHECKING
 from khala_orchestrator.announce import Announcer
 from khala_orchestrator.cards import run_card
 from khala_orchestrator.match import Match
-from khala_orchestrator.pacing import pacing_of
+from khala_orchestrator.pacing import AtOnce, pacing_of
 from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.resume import ResumedTurn
 from khala_orchestrator.roster import Roster
-from khala_orchestrator.side import Side
+from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Turn
 from khala_protocol.recording import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import AsyncIterator, Callable
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Briefing, Message, Report, Result, Wire
 
 
 async def host(
-    config: MatchConfig, game: Sides, bus: Bus, *, watch: Callable[[Wire], None] = lambda _: None
+    config: MatchConfig,
+    game: Sides,
+    bus: Bus,
+    *,
+    watch: Callable[[Wire], None] = lambda _: None,
+    past: Unfinished | None = None,
 ) -> list[Result]:
     """Wait for the agents, play the match with them, and return its results.
 
@@ -39,8 +46,10 @@ async def host(
         game: a game that was started for this task and seed.
         bus: a session on the bus that agents join.
         watch: is called with the run card, every report and every result.
+        past: what was played of this match; `game` begins with the first episode that is not over.
 
     Raises:
+        ResumeError: the game goes another way than in what was played.
         MissingAgents: required agents did not come in time.
         RecordingError: the recording cannot be written.
         GameError: the game died or hangs.
@@ -53,6 +62,8 @@ async def host(
         flush = _nothing
         if config.record is not None:
             recorder = stack.enter_context(Recorder(config.record))
+            for sample in past.kept() if past else ():
+                recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
             bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats))
@@ -65,31 +76,57 @@ async def host(
         gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms
         observer = _PublishingObserver(announcer, watch, flush)
         match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock))
-        return [result async for result in match.play()]
+        if past is None:
+            return [result async for result in match.play()]
+        return [*past.results, *[result async for result in _resumed(match, past, observer)]]
 
 
-def sides_of(config: MatchConfig) -> list[Side]:
-    """Return the sides of a match, in the order of the game's players."""
-    return [Side(task, config.run) for task in config.task.per_side()]
+def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:
+    """Play a match from where its recording ends; what was published then is not published again."""
+    pacing, match.pacing, observer.live = match.pacing, AtOnce(), False
+
+    async def go_live() -> None:
+        match.pacing = pacing
+        await observer.go_live()
+
+    match.agents = ResumedTurn(past, match.agents, go_live)
+    return match.play(past.episode)
 
 
 class _PublishingObserver:
-    """An observer that publishes what happens, calls `watch`, and flushes the recording after each step."""
+    """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
+
+    Attributes:
+        live: False while a recording is played again: then it only calls `watch`, and keeps the briefings.
+    """
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
         self._announcer = announcer
         self._watch = watch
         self._flush = flush
+        self._held: list[Briefing] = []
+        self.live = True
+
+    async def go_live(self) -> None:
+        """Publish from now on, beginning with the briefings of the episode."""
+        self.live = True
+        for briefing in self._held:
+            await self._announcer.brief(briefing)
 
     async def brief(self, briefing: Briefing) -> None:
-        await self._announcer.brief(briefing)
+        if self.live:
+            await self._announcer.brief(briefing)
+        else:
+            self._held.append(briefing)
 
     async def message(self, message: Message) -> None:
-        await self._announcer.message(message)
+        if self.live:
+            await self._announcer.message(message)
 
     async def report(self, report: Report) -> None:
-        await self._announcer.report(report)
-        self._flush()
+        if self.live:
+            await self._announcer.report(report)
+            self._flush()
         self._watch(report)
 
     async def result(self, result: Result) -> None:

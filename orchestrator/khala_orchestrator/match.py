@@ -97,9 +97,9 @@ class Match:
         cadences = {side.seat(agent.name): Cadence(agent.every_loops, agent.when) for side, agent in places}
         self.schedule = Schedule(self.config.task.clock, cadences)
 
-    async def play(self) -> AsyncIterator[Result]:
-        """Play every episode and yield the result of each side; an episode that is not valid is the last."""
-        for episode in range(self.config.episodes):
+    async def play(self, first: int = 0) -> AsyncIterator[Result]:
+        """Play every episode from the first one on; yield the result of each side. One that is aborted is the last."""
+        for episode in range(first, self.config.episodes):
             results = await self._episode(episode)
             for result in results:
                 yield result
@@ -110,7 +110,7 @@ class Match:
         began = time.perf_counter()
         await self._begin(episode)
         snapshots: Sequence[Snapshot] = await self.game.reset()
-        self.pacing.begin(snapshots[0].game_loop)
+        self.pacing.begin()
         both = zip(self.sides, snapshots, strict=True)
         tallies, at = [Tally(snapshot, side.name, side.required) for side, snapshot in both], StepId(episode, 0)
         lost: Collection[Seat] = ()

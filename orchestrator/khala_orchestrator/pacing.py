@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class Pacing(Protocol):
     """When the game may go on."""
 
-    def begin(self, loop: int) -> None:
-        """Begin an episode at a game loop."""
+    def begin(self) -> None:
+        """Begin an episode."""
 
     async def until(self, loop: int) -> float:
         """Wait until it is time for a game loop; return the seconds that the game is behind."""
@@ -29,7 +29,7 @@ class Pacing(Protocol):
 class AtOnce:
     """A game that goes on as soon as all is said, as in replays and with clocks that wait for the agents."""
 
-    def begin(self, loop: int) -> None:
+    def begin(self) -> None:
         """Do nothing."""
 
     async def until(self, loop: int) -> float:  # noqa: ARG002  # there is nothing to wait for
@@ -42,22 +42,25 @@ class WallClock:
 
     def __init__(self, speed: float) -> None:
         self._loops_per_s = LOOPS_PER_S * speed
-        self._loop, self._at_s, self._lag_s = 0, 0.0, 0.0
+        self._before: tuple[int, float] | None = None
+        """The game loop that was last waited for, and when it was due."""
+        self._lag_s = 0.0
 
-    def begin(self, loop: int) -> None:
-        """Start the clock."""
-        self._loop, self._at_s, self._lag_s = loop, asyncio.get_running_loop().time(), 0.0
+    def begin(self) -> None:
+        """Start the clock with the next step."""
+        self._before, self._lag_s = None, 0.0
 
     async def until(self, loop: int) -> float:
         """Wait until it is time for a game loop; return the seconds lost since the beginning."""
         now = asyncio.get_running_loop().time
-        due_s = self._at_s + (loop - self._loop) / self._loops_per_s
+        earlier, at_s = self._before or (loop, now())
+        due_s = at_s + (loop - earlier) / self._loops_per_s
         if (ahead_s := due_s - now()) > 0:
             await asyncio.sleep(ahead_s)
         else:
             self._lag_s -= ahead_s
             due_s = now()
-        self._loop, self._at_s = loop, due_s
+        self._before = loop, due_s
         return self._lag_s
 
 

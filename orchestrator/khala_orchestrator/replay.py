@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.config import MatchConfig
-from khala_orchestrator.host import sides_of
 from khala_orchestrator.match import Match, SilentObserver
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
@@ -38,7 +38,8 @@ def recorded_config(recording: Recording) -> MatchConfig:
     if run is None:
         raise RecordingError(f"{recording.path} has no run card: it was ended before the match began")
     task = TaskConfig.model_validate(run.config)
-    return MatchConfig(task=task, run=run.run, seed=run.seed, episodes=run.episodes)
+    game, _, _version = run.game.rpartition(" ")
+    return MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes)
 
 
 async def replay(recording: Recording, game: Sides) -> list[Difference]:
@@ -57,7 +58,7 @@ async def replay(recording: Recording, game: Sides) -> list[Difference]:
     try:
         async for _ in match.play():
             pass
-    except _EndOfRecording:
+    except EndOfRecording:
         pass
     return turn.differences
 
@@ -65,9 +66,11 @@ async def replay(recording: Recording, game: Sides) -> list[Difference]:
 class RecordedTurn:
     """An `AgentPool` from a recording: the recorded answers arrive at once, in the step in which they were taken."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, *, first_episode: int = 0) -> None:
+        """Take a recording, and the number of the first episode that is played."""
         self.differences: list[Difference] = []
-        self._steps: Iterator[RecordedStep] = recording.by_step()
+        self._sides = len({report.side for report in recording.of(Report)} or {None})
+        self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
         self._replies: dict[tuple[int, int, Seat], Reply] = {}
         for reply in recording.of(Reply):
             self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
@@ -84,11 +87,11 @@ class RecordedTurn:
         """
         observations = [question.observation for question in questions]
         step = next(self._steps, None)
-        if step is None or not step.of(Report):
-            raise _EndOfRecording
+        if step is None or len(step.of(Report)) < self._sides:
+            raise EndOfRecording
         self._compare(step, observations)
         if self.differences:
-            raise _EndOfRecording
+            raise EndOfRecording
         return Answers(dict(self._settled_by(step, observations) if wait else self._taken_in(step)))
 
     def _settled_by(self, step: RecordedStep, observations: Iterable[Observation]) -> Iterator[tuple[Seat, Answer]]:
@@ -97,14 +100,22 @@ class RecordedTurn:
             seat = Seat(observation.side, observation.agent)
             outcome = self._outcomes.get((step.episode, step.step, seat))
             if outcome is None:  # the recording ends before this decision took effect
-                raise _EndOfRecording
-            yield seat, self._answer(step.episode, step.step, seat, outcome)
+                yield seat, self._arrived(step.episode, step.step, seat)
+            else:
+                yield seat, self._answer(step.episode, step.step, seat, outcome)
 
     def _taken_in(self, step: RecordedStep) -> Iterator[tuple[Seat, Answer]]:
         """Yield the answers that arrived in this step, whenever their questions were asked."""
         for agent in (agent for report in step.of(Report) for agent in report.agents):
             seat, asked = Seat(agent.side, agent.agent), agent.asked_step
             yield seat, self._answer(step.episode, step.step if asked is None else asked, seat, agent)
+
+    def _arrived(self, episode: int, asked: int, seat: Seat) -> Answer:
+        """Return the answer to a question of which there is no report."""
+        reply = self._replies.get((episode, asked, seat))
+        if reply is None:
+            return Answer("late", detail="no reply before the deadline")
+        return Answer(reply.status, reply, reply.detail, reply.latency_s)
 
     def _answer(self, episode: int, asked: int, seat: Seat, agent: AgentReport) -> Answer:
         reply = self._replies[episode, asked, seat] if agent.status in {"ok", "fallback"} else None
@@ -126,5 +137,5 @@ class RecordedTurn:
         self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
 
 
-class _EndOfRecording(Exception):
+class EndOfRecording(Exception):
     """There is nothing more to compare."""

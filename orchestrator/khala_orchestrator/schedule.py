@@ -40,7 +40,7 @@ class Cadence(NamedTuple):
     """
 
     every_loops: int = 0
-    when: Collection[Trigger] = ()
+    when: tuple[Trigger, ...] = ()
 
     def is_due(self, waited_loops: int, happened: Callable[[], Collection[Trigger]]) -> bool:
         """Return whether it is time to ask; `happened` is called only if that decides."""

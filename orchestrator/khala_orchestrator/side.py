@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe import AgentObservation, SideObservation
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
+    from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.mailbox import Post
     from khala_orchestrator.schedule import Decision, StepId
     from khala_protocol.messages import Fate, Timings, Trigger
@@ -208,6 +209,11 @@ class Side:
         """Return the reports of decisions that did not take effect before the end of the episode."""
         own = (decision for decision in decisions if decision.seat.side == self.name)
         return [_reported(at, decision, loop, fate="dropped") for decision in own]
+
+
+def sides_of(config: MatchConfig) -> list[Side]:
+    """Return the sides of a match, in the order of the game's players."""
+    return [Side(task, config.run) for task in config.task.per_side()]
 
 
 def _reported(

@@ -258,13 +258,12 @@ def snapshot() -> Callable[..., Snapshot]:
 def config() -> Callable[..., MatchConfig]:
     """A match of Stalkers and Zealots on one side, of three steps in one episode, if nothing else is said."""
 
-    def make(
-        *, episodes: int = 1, assemble_s: float = 60.0, record: Any = None, required: bool = True, **changes: Any
-    ) -> MatchConfig:
+    def make(*, required: bool = True, **changes: Any) -> MatchConfig:
+        match = {name: changes.pop(name) for name in ("episodes", "assemble_s", "record", "game") if name in changes}
         task = change(load_task("2s3z_pair"), **{"max_steps": 3, "max_wait_s": 10.0} | changes)
         agents = tuple(agent.model_copy(update={"required": required}) for agent in task.agents)
         task = task.model_copy(update={"agents": agents})
-        return MatchConfig(task=task, run=RUN, episodes=episodes, assemble_s=assemble_s, record=record)
+        return MatchConfig(task=task, run=RUN, **match)
 
     return make
 
@@ -347,9 +346,13 @@ class Hall:
         *,
         bus: MemoryBus | None = None,
         watch: Callable[[Wire], None] = lambda _: None,
+        by: Callable[..., Awaitable[list[Result]]] = host,
         **agents: Callable[[Peer, Observation], Awaitable[None]] | None,
     ) -> list[Result]:
-        """Host a match; agents that are not given order nothing, those that are None do not come."""
+        """Host a match, or play it `by` another function.
+
+        Agents that are not given order nothing, those that are None do not come.
+        """
         given = {agent.name: agents.get(agent.name, agree) for agent in config.task.agents}
         reactions = {name: react for name, react in given.items() if react is not None}
         peers = [Peer(self.broker.session(), Seat("blue", name)) for name in reactions]
@@ -362,7 +365,7 @@ class Hall:
             watch(message)
 
         try:
-            return await host(config, self.side, bus or self.broker.session(), watch=see)
+            return await by(config, self.side, bus or self.broker.session(), watch=see)
         finally:
             for task in tasks:
                 task.cancel()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_orchestrator.host import sides_of
 from khala_orchestrator.match import Match, SilentObserver, Stopwatch
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Briefing, Message, Received, Reply, Report, Result, Timings, Usage
 

@@ -41,7 +41,8 @@ def play(
         until: game loop after which it ends.
     """
     schedule.begin()
-    moments, loop, thinking = [], 0, set[Seat]()
+    moments: list[tuple[int, list[str], list[str]]] = []
+    loop, thinking = 0, set[Seat]()
     while loop <= until:
         asked = schedule.ask(StepId(0, len(moments)), loop, nothing)
         thinking |= {*asked}

@@ -627,7 +627,7 @@ async def test_an_inbox_that_fails_ends_the_match(broker: MemoryBroker, peer: Ma
         def fail(*_: object) -> None:
             raise Full
 
-        turn._take_reply = fail  # type: ignore[method-assign]
+        turn._take_reply = fail  # type: ignore[method-assign,assignment]
         await zealots.reply("too much")
         with pytest.raises(Full):
             await asked

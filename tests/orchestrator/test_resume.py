@@ -1,0 +1,127 @@
+"""A host that was killed goes on from its recording; on a clock that jumps."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from khala_orchestrator.host import host
+from khala_orchestrator.resume import ResumeError, unfinished
+from khala_protocol.bus import Delivery
+from khala_protocol.messages import Observation, Reply, Report, Run
+from khala_protocol.recording import Recorder, Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+    from pathlib import Path
+
+    from khala_bridge.game.game import Sides
+    from khala_orchestrator.config import MatchConfig
+    from khala_protocol.messages import Result
+    from tests.orchestrator.conftest import Hall, Peer, StillGame
+
+    MakeConfig = Callable[..., MatchConfig]
+    Start = Callable[[StillGame], Awaitable[Sides]]
+
+CLOCK = "jumps"
+
+ATTACK = "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xb)>\n<MessageTo(Zealots, 'step {}')>"
+GAME = "Khala simulator 0.1.0, as"
+EVENTS: dict[int, dict[str, Any]] = {2: {"dead": [0xB]}}
+CLOCKS: list[dict[str, Any]] = [
+    {"rule": "frozen"},
+    {"rule": "budget", "thinking_loops": 20},
+    {"rule": "token"},
+    {"rule": "realtime", "speed": 10.0},
+]
+
+
+async def stalkers(peer: Peer, seen: Observation) -> None:
+    await peer.answer(seen, ATTACK.format(seen.step), usage={"requests": 1})
+
+
+def killed_after(whole: Path, reports: int, path: Path) -> Recording:
+    """Write what a host leaves that is killed before its next report."""
+    with Recorder(path) as recorder:
+        for sample in Recording.open(whole):
+            reports -= isinstance(sample.message, Report)
+            if reports < 0:
+                break
+            recorder.write(sample.key, sample.payload)
+    return Recording.open(path)
+
+
+def digest(recording: Recording) -> str:
+    """Hash everything that agents saw, in its order."""
+    texts = (seen.model_dump_json() for seen in recording.of(Observation))
+    return hashlib.sha256("".join(texts).encode()).hexdigest()
+
+
+@pytest.mark.parametrize("clock", CLOCKS, ids=lambda clock: clock["rule"])
+async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
+    hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any]
+) -> None:
+    hall.game.after = EVENTS
+    match = config(game=GAME, episodes=2, max_steps=5, step_loops=8, **clock)
+    whole = tmp_path / "whole.mcap"
+    results = await hall.play(match.model_copy(update={"record": whole}), Stalkers=stalkers)
+    for reports in range(10):
+        past = unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
+        assert (past.episode, past.steps) == divmod(reports, 5)
+        path = tmp_path / f"resumed-{reports}.mcap"
+        again = await _resume(hall, past.config.model_copy(update={"record": path}), past)
+        if clock["rule"] != "realtime":  # where the moment of an arrival decides
+            assert [_plain(result) for result in again] == [_plain(result) for result in results]
+            assert digest(Recording.open(path)) == digest(Recording.open(whole))
+        assert [report.step for report in Recording.open(path).of(Report)] == [0, 1, 2, 3, 4] * 2
+
+
+async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:
+    async def played(*arguments: Any, **options: Any) -> list[Result]:
+        return await host(*arguments, **options, past=past)
+
+    return await hall.play(config, by=played, Stalkers=stalkers)
+
+
+def _plain(result: Result) -> dict[str, Any]:
+    return result.model_dump(exclude={"wall_s", "latency_p50_s", "latency_p95_s", "lag_s"})
+
+
+async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    whole = tmp_path / "whole.mcap"
+    await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=stalkers)
+    past = unfinished(killed_after(whole, 2, tmp_path / "killed.mcap"))
+    heard = await hall.broker.session().subscribe("**/Zealots/*", Delivery.STATE)
+    await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
+    await heard.close()
+    topics = [sample.key.rsplit("/", 1)[1] async for sample in heard]
+    assert topics == ["briefing", "observation", "reply", "observation", "reply"]
+
+
+async def test_a_game_that_goes_another_way_is_found_out(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.mcap"
+    await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=stalkers)
+    hall.game.after = {1: {"dead": [0x2]}}
+    past = unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
+    with pytest.raises(ResumeError, match="differs from the recorded one at step 2 of episode 0"):
+        await _resume(hall, past.config, past)
+
+
+async def test_what_cannot_be_resumed_is_refused(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.mcap"
+    await hall.play(config(game=GAME, max_steps=2, record=whole), Stalkers=stalkers)
+    with pytest.raises(ResumeError, match="is over: begin a new one"):
+        unfinished(Recording.open(whole))
+    real = tmp_path / "real.mcap"
+    with Recorder(real) as recorder:
+        for sample in Recording.open(whole):
+            payload = sample.payload
+            if isinstance(sample.message, Run):
+                payload = payload.replace(b"Khala simulator", b"StarCraft II")
+            recorder.write(sample.key, payload)
+    with pytest.raises(ResumeError, match="does not play the same game twice"):
+        unfinished(Recording.open(real))
