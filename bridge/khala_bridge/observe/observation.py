@@ -1,7 +1,7 @@
 """The observation of a side at one moment: the views of its agents, and what the host needs to carry out replies.
 
 Cameras, tags and the snapshot stay on the host; a view has no world coordinates. `khala_bridge.observe.observer` makes
-observations; they are values.
+observations; they are values. An agent may decide on its observation long after the side has moved on.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from khala_bridge.observe.events import Witnessed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from khala_bridge.frames import Camera, MapFrame
     from khala_bridge.observe.picture import Picture
@@ -41,6 +41,8 @@ class AgentObservation:
     """The observation of one agent; `text` is empty until it is written."""
 
     agent: AgentConfig
+    game_loop: int
+    """Of the snapshot that it shows."""
     view: View
     teams: tuple[TeamObservation, ...]
     idle_teams: tuple[str, ...]
@@ -52,9 +54,21 @@ class AgentObservation:
 
 @dataclass(frozen=True, slots=True)
 class SideObservation:
-    """The observation of a side: the snapshot, and the observations of its agents."""
+    """The observation of a side: what is known without any agent's observation, and these observations."""
 
     snapshot: Snapshot
     map: MapFrame
+    configs: Mapping[str, AgentConfig]
+    """By name of an agent, in the order of the task."""
+    teams: Mapping[str, Sequence[Team]]
+    """By name of an agent, its teams that have units now and its `side` teams."""
+    died: Mapping[int, int]
+    """By tag of a unit that died in this episode, the game loop of the snapshot that reported its death."""
     agents: Mapping[str, AgentObservation]
-    """By name, in the order of the task."""
+    """By name, in the order of the task. Each is made on first access, while the moment is the present one; later there
+    are only those that were made."""
+
+    def team_of(self, tag: int) -> str | None:
+        """Return the name of the team that has an own unit; None if no team has it."""
+        teams = (team for its in self.teams.values() for team in its)
+        return next((team.name for team in teams if tag in team.tags), None)
