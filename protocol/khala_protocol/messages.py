@@ -50,6 +50,8 @@ AgentStatus = Literal[
     "malformed",  # something arrived that is not a valid reply
 ]
 
+Fate = Literal["fresh", "stale", "adapted", "refused"]  # of a decision, see `khala_bridge.act.actor.fate`
+
 
 class Frozen(BaseModel):
     """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON lacks) are errors."""

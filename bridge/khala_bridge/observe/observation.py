@@ -7,6 +7,7 @@ observations; they are values. An agent may decide on its observation long after
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.events import Witnessed
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig
-    from khala_protocol.messages import TeamView, View
+    from khala_protocol.messages import TeamView, UnitView, View
 
 __all__ = ["AgentObservation", "SideObservation", "TeamObservation"]
 
@@ -34,6 +35,12 @@ class TeamObservation:
     view: TeamView
     tags: Witnessed = field(default_factory=Witnessed)
     """Tags of the units in the view."""
+
+    def seen(self, tag: int) -> UnitView | None:
+        """Return the view of a unit of the team or on its screen, except resources; None if it was not there."""
+        wanted = hex(tag)
+        units = chain(self.view.units, self.view.allies, self.view.enemies)
+        return next((unit for unit in units if unit.tag == wanted), None)
 
 
 @dataclass(frozen=True, slots=True)
