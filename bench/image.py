@@ -13,6 +13,7 @@ screen. The aim is 5 ms.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import statistics
 import time
@@ -78,7 +79,7 @@ def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
     took_ms, worked_ms, sizes, units = [], [], [], 0
     for shown in snapshots:
         seen = next(iter(observer.observe(shown).agents.values()))
-        seen = type(seen)(task.agents[0], seen.view, seen.teams, seen.idle_teams)
+        seen = dataclasses.replace(seen, agent=task.agents[0])
         began, worked = time.perf_counter(), time.thread_time()
         pictures = Album(shown, shown.info.frame(Frames())).pictures(seen)
         took_ms.append(1000 * (time.perf_counter() - began))

@@ -4,8 +4,9 @@
     python bench/observe.py --json     one JSON object on stdout
 
 `observe` is everything from a snapshot to views and text of one agent with its teams, all units in sight of all
-teams, half of them hurt since the turn before. `act` is everything from the text of a reply, with three calls for
-each team, to commands. No game runs; the snapshots are made here.
+teams, half of them hurt since the turn before. `unseen` is what a snapshot costs at which no agent looks. `act` is
+everything from the text of a reply, with three calls for each team, to commands. No game runs; the snapshots are made
+here.
 
 The last rows are a full game's twelve agents with 15 teams and 100 units, half of them enemies: in one place, where
 every team sees all of them, and at four places, as in a fight of many fronts. The aim is 8 ms.
@@ -36,6 +37,7 @@ from khala_protocol.speech import parse
 BATTLES = {  # task: own units, enemy units
     "2s3z": ({"Stalker": 2, "Zealot": 3}, {"Stalker": 2, "Zealot": 3}),
     "1c3s5z": ({"Colossus": 1, "Stalker": 3, "Zealot": 5}, {"Colossus": 1, "Stalker": 3, "Zealot": 5}),
+    "3s5z_vs_3s6z": ({"Stalker": 3, "Zealot": 5}, {"Stalker": 3, "Zealot": 6}),
     "2c_vs_64zg": ({"Colossus": 2}, {"Zergling": 64}),
 }
 ROUNDS = 200
@@ -134,6 +136,16 @@ def crowd(places: int, loop: int) -> Snapshot:
     return dataclasses.replace(made, abilities=generals)
 
 
+def unseen_ms(task: TaskConfig, snapshots: list[Snapshot]) -> float:
+    """Return the cost of an observation at which no agent looks."""
+    observer, took_ms = Observer(task), []
+    for round_ in range(ROUNDS):
+        began = time.perf_counter()
+        observer.observe(snapshots[round_ % 2])
+        took_ms.append(1000 * (time.perf_counter() - began))
+    return round(statistics.median(took_ms), 3)
+
+
 def measure_full_game(places: int) -> dict[str, Any]:
     """Return the cost of one observation of all twelve agents."""
     observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
@@ -151,6 +163,7 @@ def measure_full_game(places: int) -> dict[str, Any]:
         "text_kB": round(sum(len(agent.text) for agent in observation.agents.values()) / 1000, 1),
         "observe_ms": round(statistics.median(observe_ms), 2),
         "observe_p95_ms": round(statistics.quantiles(observe_ms, n=20)[-1], 2),
+        "unseen_ms": unseen_ms(full_game(), snapshots),
         "act_ms": "",
     }
 
@@ -183,6 +196,7 @@ def measure(name: str) -> dict[str, Any]:
         "text_kB": round(len(agent.text) / 1000, 1),
         "observe_ms": round(statistics.median(observe_ms), 2),
         "observe_p95_ms": round(quantile, 2),
+        "unseen_ms": unseen_ms(task, snapshots),
         "act_ms": round(statistics.median(act_ms), 2),
     }
 

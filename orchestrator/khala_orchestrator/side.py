@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act import Actor
 from khala_bridge.observe import Feedback, Observer
+from khala_bridge.observe.triggers import triggers, vitals
 from khala_orchestrator.mailbox import Mailbox
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Question
@@ -60,6 +61,8 @@ class Side:
     _now: SideObservation = field(init=False)
     _seen: dict[str, AgentObservation] = field(init=False, default_factory=dict)
     """By agent, the observation that it decides on."""
+    _vitals: dict[str, dict[int, float]] = field(init=False, default_factory=dict)
+    """By agent, health of its units at its last observation."""
     _pending: dict[str, Feedback] = field(init=False, default_factory=dict)
     """By agent, what it finds in its next observation."""
 
@@ -93,6 +96,7 @@ class Side:
         self.observer.begin()
         self.mailbox.clear()
         self._seen.clear()
+        self._vitals.clear()
         self._pending = {agent.name: Feedback() for agent in self.task.agents}
 
     # --- seeing -------------------------------------------------------------------------------------
@@ -103,7 +107,7 @@ class Side:
 
     def happened(self, agent: str) -> Collection[Trigger]:
         """Return what happened to an agent since its last observation."""
-        found: set[Trigger] = set()
+        found: set[Trigger] = set(triggers(self._now, agent, self._vitals.get(agent, {})))
         if self._pending[agent].messages:
             found.add("message")
         return found
@@ -112,6 +116,7 @@ class Side:
         """Return an agent's observation of the present state, with all that was to be said to it."""
         seen, heard = self._now.agents[agent], self._pending[agent]
         self._seen[agent], self._pending[agent] = seen, Feedback()
+        self._vitals[agent] = vitals(self._now, agent)
         observation = Observation(
             run=self.run,
             agent=agent,
@@ -133,8 +138,8 @@ class Side:
 
     def act(self, at: StepId, decisions: Sequence[Decision]) -> Played:
         """Return what comes of the decisions that take effect now."""
-        speeches = {decision.seat.agent: speech for decision in decisions if (speech := self._speech(decision))}
-        joint = self.actor.joint(self._now, speeches)
+        speeches = {decision.seat.agent: speech for decision in decisions if (speech := self._speech(decision)) is not None}
+        joint = self.actor.joint(self._now, speeches, self._seen)
         messages = [
             Message(
                 run=self.run,
@@ -154,13 +159,13 @@ class Side:
         return Played(decisions, joint, messages, self.mailbox.deliver(messages))
 
     def _speech(self, decision: Decision) -> Speech | None:
-        """Return what an agent says: the only place where a reply is parsed. None if it says nothing.
+        """Return what an agent says: the only place where a reply is parsed. None if it failed, and nothing stands in.
 
         The default reply stands in for an agent that failed, and not for one that chose to say nothing.
         """
         answer = decision.answer
-        text = answer.text if answer.status == "ok" else answer.text or self.task.default_reply
-        speech = parse(text) if text else None
+        text = answer.text if answer.status == "ok" else answer.text or self.task.default_reply or None
+        speech = None if text is None else parse(text)
         if speech is None or not self._is_too_old(decision):
             return speech
         faults = [_too_old(decision, call.name, call.start) for call in speech.calls[:1]]
@@ -202,7 +207,7 @@ class Side:
 
     def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
         agent, loop = decision.seat.agent, self._now.snapshot.game_loop
-        fate: Fate | None = "refused" if self._is_too_old(decision) else "fresh"
+        fate: Fate | None = "refused" if self._is_too_old(decision) else played.joint.fates.get(agent)
         return _reported(at, decision, loop, fate=fate, accepted=heard.accepted, rejections=heard.rejections)
 
     def dropped(self, at: StepId, decisions: Sequence[Decision], loop: int) -> Sequence[AgentReport]:

@@ -31,8 +31,7 @@ def first_team(task: Task) -> Callable[..., TeamObservation]:
 
     def see(*snapshots: Snapshot, **changed: Any) -> TeamObservation:
         observer = Observer(task("3s_vs_3z", **changed))
-        observations = [observer.observe(snapshot) for snapshot in snapshots]
-        return observations[-1].agents[AGENT].teams[0]
+        return [observer.observe(snapshot).agents[AGENT].teams[0] for snapshot in snapshots][-1]
 
     return see
 

@@ -49,8 +49,8 @@ def page(task: Task, snapshot: Snap) -> Callable[..., str]:
     def write(name: str, agent: str, *armies: list[raw_pb2.Unit], feedback: Feedback | None = None, **info: Any) -> str:
         observer = Observer(task(name))
         told = {} if feedback is None else {agent: feedback}
-        sights = [observer.observe(snapshot(army, **(info if army is armies[-1] else {})), told) for army in armies]
-        return sights[-1].agents[agent].text
+        moments = (observer.observe(snapshot(army, **(info if army is armies[-1] else {})), told) for army in armies)
+        return [moment.agents[agent].text for moment in moments][-1]
 
     return write
 

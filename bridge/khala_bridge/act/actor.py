@@ -3,6 +3,9 @@
     joint = Actor(task).joint(observation, {"Zealots": parse(text), …})      what every agent wants, checked
     plan = executor.plan(joint.commands, observation.snapshot, loops)        played by khala_bridge.game.game
 
+An agent may have decided on an earlier observation than the present one. Its words mean what it saw: its teams, their
+units and their screens then. What they do is judged now: who is alive, what is in sight, what can be paid.
+
 All calls of a turn share the same minerals, vespene, supply and workers, in the order of the agents in the task and
 of their words. The host's own orders come last, for units that no agent ordered. An actor keeps nothing between two
 turns. The layer above decides which replies count and when one is too late.
@@ -11,7 +14,7 @@ turns. The layer above decides which replies count and when one is too late.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act.addressee import Addressees
 from khala_bridge.act.raw import RawExecutor
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
+    from khala_protocol.messages import Fate
     from khala_protocol.speech import Speech
 
 
@@ -42,6 +46,33 @@ class JointAction:
     """By agent, `Stalker-1 <Attack_Unit(0x1)>`."""
     rejections: Mapping[str, tuple[Rejection, ...]] = field(default_factory=dict)
     """By agent, in the order of the text; malformed calls among them."""
+    fates: Mapping[str, Fate] = field(default_factory=dict)
+    """By agent."""
+
+
+def fate(*, older: bool, accepted: bool, rejected: bool, hindered: bool) -> Fate:
+    """Return the fate of a decision.
+
+    Args:
+        older: it was made on an earlier observation than the present one.
+        accepted: a call of it is carried out.
+        rejected: a call of it is not, for any reason.
+        hindered: a call that was understood is not carried out, or not by all units that it was meant for.
+    """
+    if rejected and not accepted:
+        return "refused"
+    if not older:
+        return "fresh"
+    return "adapted" if hindered else "stale"
+
+
+class _Outcome(NamedTuple):
+    """The result of one agent's calls."""
+
+    commands: list[Command]
+    accepted: list[str]
+    faults: list[Rejection]
+    hindered: bool
 
 
 class Actor:
@@ -52,12 +83,18 @@ class Actor:
         self._task = task
         self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
 
-    def joint(self, observation: SideObservation, replies: Mapping[str, Speech]) -> JointAction:
+    def joint(
+        self,
+        observation: SideObservation,
+        speeches: Mapping[str, Speech],
+        seen: Mapping[str, AgentObservation] | None = None,
+    ) -> JointAction:
         """Return the joint action of a turn.
 
         Args:
-            observation: what the agents see at the moment when their replies take effect.
-            replies: by agent; the units of an agent without a reply continue.
+            observation: of the moment at which the words take effect.
+            speeches: by agent; the units of an agent without one continue.
+            seen: by agent, the observation on which it decided; an agent that is not in it decided on the present one.
         """
         translator = Translator(
             observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents}
@@ -65,26 +102,33 @@ class Actor:
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}
-        for name, agent in observation.agents.items():
-            speech = replies.get(name)
+        fates: dict[str, Fate] = {}
+        for name in observation.agents:
+            speech = speeches.get(name)
             if speech is None:
                 continue
-            ordered, said, faults = self._one(translator, agent, speech)
+            saw = seen[name] if seen and name in seen else observation.agents[name]
+            ordered, said, faults, hindered = self._one(translator, saw, speech)
             commands += ordered
             accepted[name] = tuple(said)
             rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
+            fates[name] = fate(
+                older=saw.game_loop < observation.snapshot.game_loop,
+                accepted=bool(said),
+                rejected=bool(rejections[name]),
+                hindered=hindered,
+            )
         for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
-        return JointAction(tuple(commands), accepted, rejections)
+        return JointAction(tuple(commands), accepted, rejections, fates)
 
-    def _one(
-        self, translator: Translator, agent: AgentObservation, speech: Speech
-    ) -> tuple[list[Command], list[str], list[Rejection]]:
-        words = self._words[agent.agent.name]
-        addressees = Addressees(agent, words)
+    def _one(self, translator: Translator, saw: AgentObservation, speech: Speech) -> _Outcome:
+        words = self._words[saw.agent.name]
+        addressees = Addressees(saw, words)
         commands: list[Command] = []
         accepted: list[str] = []
         faults: list[Rejection] = []
+        hindered = False
         for call in speech.calls:
             recognised = recognise(call, words, addressees)
             if isinstance(recognised, Rejection):
@@ -94,10 +138,12 @@ class Actor:
                 translated = translator.translate(said)
                 if isinstance(translated, Rejection):
                     faults.append(translated)
+                    hindered = True
                 else:
                     commands += translated
                     accepted.append(said.text)
-        return commands, accepted, faults
+                    hindered = hindered or translator.lacks_units(said)
+        return _Outcome(commands, accepted, faults, hindered)
 
 
 def executor_of(task: TaskConfig) -> Executor:

@@ -44,7 +44,7 @@ class Addressees:
     """The teams of one agent, as its calls may address them."""
 
     def __init__(self, agent: AgentObservation, words: Vocabulary) -> None:
-        """Take the agent's present observation, which names its teams, and the names that it may use."""
+        """Take the observation on which the agent decided, which names its teams, and the names that it may use."""
         self._agent = agent
         self._words = words
         self._by_name = {squashed(team.view.name): team for team in agent.teams}

@@ -28,7 +28,6 @@ from khala_bridge.act.plan import GameRefusal, Plan, PlanStep, Played, refuse, r
 from khala_bridge.act.select import Hand, Missed
 from khala_bridge.catalogue.functions import raw_forms
 from khala_bridge.compat import actions as pysc2
-from khala_bridge.frames import WorldPoint
 from khala_bridge.state.requests import camera_move
 
 if TYPE_CHECKING:
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from khala_bridge.act.aim import Pixel
     from khala_bridge.act.plan import GameAction
     from khala_bridge.act.translate import Command
+    from khala_bridge.frames import WorldPoint
     from khala_bridge.state import Snapshot, Unit
 
 SAME_PLACE = 0.25
@@ -83,6 +83,7 @@ class _Tour:
 
     def __init__(self, snapshot: Snapshot, groups: dict[int, frozenset[int]]) -> None:
         self.now = snapshot
+        self._start = snapshot
         self.loops = 0
         self.functions: list[str] = []
         self.refusals: list[GameRefusal] = []
@@ -112,7 +113,7 @@ class _Tour:
 
     def visit(self, commands: Sequence[Command]) -> Generator[PlanStep, Snapshot, None]:
         """Carry out the commands of one team."""
-        home = _home(commands[0])
+        home = self._home(commands[0])
         if home is not None:
             yield from self.look_at(home)
         for command in commands:
@@ -141,6 +142,13 @@ class _Tour:
                     arguments.append((yield from self._pixel(command)))
         yield from self.function(function.name, *arguments)
 
+    def _home(self, command: Command) -> WorldPoint | None:
+        """Return where a team's head was at the start of the tour; None for a team without a screen of its own."""
+        if command.said is None or command.said.team.camera is None:
+            return None
+        heads = (tag for tag in command.said.team.team.tags if tag in self._start.units)
+        return next((self._start.units[tag].pos for tag in heads), None)
+
     # --- the target -------------------------------------------------------------------------------------------
 
     def _place(self, command: Command) -> WorldPoint:
@@ -158,7 +166,7 @@ class _Tour:
 
     def _pixel(self, command: Command) -> Generator[PlanStep, Snapshot, Pixel]:
         """Return where to click for the target, with the camera moved if that is needed."""
-        for place in (None, _home(command), self._place(command)):
+        for place in (None, self._home(command), self._place(command)):
             if place is not None:
                 yield from self.look_at(place)
             if RealScreen(self.now).pixel(self._place(command)) is not None:
@@ -176,10 +184,3 @@ class _Tour:
         if pixel is None:
             raise Missed("the target cannot be clicked, something stands over it")
         return pixel
-
-
-def _home(command: Command) -> WorldPoint | None:
-    """Return where a team's camera is; None for one without a screen of its own."""
-    if command.said is None or command.said.team.camera is None:
-        return None
-    return WorldPoint(command.said.team.camera.x, command.said.team.camera.y)

@@ -3,17 +3,22 @@
 A team aims at units on its screen and at its own units anywhere. A rule of `khala_bridge.auto` takes anything that the
 side knows, such as a mineral field in the fog. A rejection names near misses of a tag, but none is taken: the wrong
 target may be the worst one. This module knows nothing of the acting units' abilities, except what their targets may be.
+
+A call may be older than the present moment. Its points are those of the screen that its agent saw, and what stood there
+is a valid target wherever it is now, as long as the side sees it. Answers are in the present frames, since the agent
+reads them with its next observation.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.filters import needs_sight, unfit
 from khala_bridge.act.rejected import CallRejected
-from khala_bridge.frames import CAMERA_WIDTH, MinimapPoint, ScreenPoint, WorldPoint
+from khala_bridge.frames import CAMERA_WIDTH, Camera, MinimapPoint, ScreenPoint, WorldPoint
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import SEEN_NOW
@@ -22,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from khala_bridge.act.recognise import Recognised
-    from khala_bridge.frames import Camera
     from khala_bridge.observe.observation import SideObservation
     from khala_bridge.state import Unit
 
@@ -40,22 +44,38 @@ SHORTEST = 6
 
 
 class Targets:
-    """The possible targets at the moment of an observation."""
+    """The possible targets at the present moment."""
 
     def __init__(self, observation: SideObservation) -> None:
         self._observation = observation
         self._units = observation.snapshot.units
 
+    def end_of(self, tag: int) -> str | None:
+        """Return the end of a unit in words, `died 40 loops ago`; None if it is not known to be dead."""
+        if tag not in self._observation.died:
+            return None
+        loops = self._observation.snapshot.game_loop - self._observation.died[tag]
+        return f"died {loops} loop{'s' if loops > 1 else ''} ago" if loops else "is dead"
+
+    def end_of_all(self, tags: Iterable[int]) -> str:
+        """Return the end of a team that is gone, in words."""
+        died = self._observation.died
+        last = max(tags, key=lambda tag: died.get(tag, math.inf))
+        end = self.end_of(last)
+        return f"its last unit {end}" if end else "its units are not on the map"
+
     def named(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that the first arguments name.
 
         Raises:
-            CallRejected: one of them is not a unit of the team, or is named twice.
+            CallRejected: one of them is not a unit of the team, is gone, or is named twice.
         """
         tags = said.tags[: said.action.named]
         for tag in tags:
             if tag not in said.team.team.tags:
                 raise self._not_of_team(said, tag)
+            if tag not in self._units:
+                raise self._gone(tag)
         if twice := [tag for place, tag in enumerate(tags) if tag in tags[:place]]:
             what = f"{said.action.name} takes two different units, {hex(twice[0])} stands there twice."
             raise CallRejected("wrong_arguments", what)
@@ -71,7 +91,8 @@ class Targets:
         unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
         if unit is None:
             raise self._nowhere(said, tag)
-        if not (anywhere or tag in said.team.team.tags or _shows(said.team.camera, unit)):
+        own = tag in said.team.team.tags
+        if not (anywhere or own or _shows(said.team.camera, unit) or said.team.seen(tag)):
             raise self._out_of_sight(said, unit)
         if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
             what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
@@ -95,13 +116,21 @@ class Targets:
 
     def instead(self, said: Recognised, place: WorldPoint) -> str:
         """Return a valid place as the end of a sentence: on the team's screen if it is there, else on the minimap."""
-        camera = said.team.camera
+        camera = self._camera_now(said)
         if camera is not None:
             x, y = camera.screen(place.x, place.y)
             if 0 <= x < camera.size and 0 <= y < camera.size:
                 return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
         x, y = self._observation.map.minimap(place.x, place.y)
         return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
+
+    def _camera_now(self, said: Recognised) -> Camera | None:
+        """Return the present camera of a call's team; None if the team has no screen, or no unit any more."""
+        then, teams = said.team.camera, self._observation.teams[said.team.team.agent]
+        team = next((team for team in teams if team.name == said.team.team.name), None)
+        if then is None or team is None:
+            return None
+        return Camera(*self._units[team.head].pos, then.size)
 
     def _is_seen(self, point: WorldPoint) -> bool:
         """Return True if the player sees a place now, or if the game sent no map."""
@@ -120,7 +149,8 @@ class Targets:
         x, y = self._in_frame(said, "screen", camera.size, "minimap", self._observation.map.minimap_size)
         point = camera.world(ScreenPoint(x, y))
         if not self._observation.map.holds(point):
-            x0, y0, x1, y1 = (f"{value:g}" for value in said.team.view.bounds)
+            bounds = (self._camera_now(said) or camera).bounds(self._observation.map)
+            x0, y0, x1, y1 = (f"{round(value, 1):g}" for value in bounds)
             inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
             raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
         return point
@@ -145,7 +175,7 @@ class Targets:
                 "out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}."
             )
         sister = said.action.name.replace(frame.capitalize(), other.capitalize())
-        agent = self._observation.agents[said.team.team.agent].agent
+        agent = self._observation.configs[said.team.team.agent]
         has_sister = sister in {action.name for action in agent.catalogue()}
         hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
         where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
@@ -159,22 +189,22 @@ class Targets:
         return self._observation.snapshot.known
 
     def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
-        if tag in self._observation.snapshot.dead:
-            return CallRejected("dead_target", f"The unit {hex(tag)} is dead; choose another target.")
+        if end := self.end_of(tag):
+            return CallRejected("dead_target", f"The unit {hex(tag)} {end}; choose another target.")
+        if was := said.team.seen(tag):
+            what = f"The {was.alliance} {was.type} {was.tag} is out of sight now"
+            where = f"it was at [{was.minimap[0]:.0f}, {was.minimap[1]:.0f}] of the minimap when you saw it"
+            return CallRejected("unknown_target", f"{what}; {where}.")
         wanted = said.action.target
-        fits = [unit.tag for unit in self._units.values() if self._may_be_meant(said, unit, wanted)]
+        camera = self._camera_now(said)
+        fits = [unit.tag for unit in self._units.values() if _may_be_meant(camera, unit, wanted)]
         hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
         return CallRejected("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
 
-    def _may_be_meant(self, said: Recognised, unit: Unit, wanted: str | None) -> bool:
-        if said.team.camera is not None and not _shows(said.team.camera, unit):
-            return False
-        return wanted is None or unit.is_enemy == (wanted == "enemy")
-
     def _not_of_team(self, said: Recognised, tag: int) -> CallRejected:
-        name, own = said.team.view.name, said.team.team.tags
-        if tag in self._observation.snapshot.dead:
-            return CallRejected("dead_target", f"The unit {hex(tag)} is dead; it does nothing any more.")
+        name, own = said.team.view.name, [tag for tag in said.team.team.tags if tag in self._units]
+        if self.end_of(tag):
+            return self._gone(tag)
         units = f"units of team {name} are {', '.join(map(hex, own))}"
         unit = self._units.get(tag)
         if unit is None:
@@ -184,13 +214,16 @@ class Targets:
         if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
             right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
             return CallRejected("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
-        owner = self._team_of(tag)
+        owner = self._observation.team_of(tag)
         whose = f" of team {owner}" if owner else ""
         return CallRejected("not_yours", f"{what}{whose} and not one of team {name}; {units}.")
 
-    def _team_of(self, tag: int) -> str | None:
-        teams = (team for agent in self._observation.agents.values() for team in agent.teams)
-        return next((team.view.name for team in teams if tag in team.team.tags), None)
+    def _gone(self, tag: int) -> CallRejected:
+        if end := self.end_of(tag):
+            return CallRejected("dead_target", f"The unit {hex(tag)} {end}; it does nothing any more.")
+        return CallRejected(
+            "not_available", f"The unit {hex(tag)} is not on the map now; it may be inside another one."
+        )
 
     def _near_miss(self, tag: int, tags: Iterable[int]) -> str | None:
         """Return the tag that was most likely meant, as the end of a sentence; None if no tag is similar."""
@@ -221,6 +254,12 @@ def _slips(wanted: str, known: str) -> int | None:
     shorter, longer = sorted((wanted, known), key=len)
     dropped = (longer[:place] + longer[place + 1 :] for place in range(2, len(longer)))
     return 1 if len(longer) == len(shorter) + 1 and shorter in dropped else None
+
+
+def _may_be_meant(camera: Camera | None, unit: Unit, wanted: str | None) -> bool:
+    if camera is not None and not _shows(camera, unit):
+        return False
+    return wanted is None or unit.is_enemy == (wanted == "enemy")
 
 
 def _shows(camera: Camera | None, unit: Unit) -> bool:

@@ -1,9 +1,10 @@
-"""Recognised actions → commands to the game, checked against the present state.
+"""Recognised actions → commands to the game, checked against the present state, also if they were meant earlier.
 
 A command holds units, a function, a unit or a world point as its target, and whether it waits behind earlier orders.
 It has no frame: the two executors play the same commands.
 
-    units     those of the team, those that are named, or those that a rule of `khala_bridge.auto` finds
+    units     those that the team had when it was seen, as far as they exist; those that are named; or those that a
+              rule of `khala_bridge.auto` finds
     possible  `khala_bridge.rules`; only the units that can do it get the order
     target    `khala_bridge.act.targets`
 
@@ -79,6 +80,10 @@ class Translator:
         except CallRejected as refused:
             return reject(said.call, refused, said.team.view.name)
         return [command for order in orders for command in self.commands(order, said)]
+
+    def lacks_units(self, said: Recognised) -> bool:
+        """Return True if some units that a call meant are gone since its agent saw them."""
+        return not said.action.named and any(tag not in self._snapshot.units for tag in said.team.team.tags)
 
     def commands(self, order: RuleOrder, said: Recognised | None = None) -> list[Command]:
         """Return the commands of an order, behind the earlier orders of its units in this turn."""
@@ -168,12 +173,12 @@ class Translator:
         tags = self._targets.named(said) if said.action.named else said.team.team.tags
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
-            raise self._cannot(said, ["it has no units" if not tags else "it is gone"])
+            raise self._cannot(said, [self._targets.end_of_all(tags) if tags else "it has no units"])
         return found
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
         """Return the units that have the action by the task."""
-        listed = self._observation.agents[said.team.team.agent].agent.actions
+        listed = self._observation.configs[said.team.team.agent].actions
         types = {tag: self._snapshot.units[tag].name for tag in tags}
         found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
         if not found:

@@ -1,26 +1,29 @@
-"""A side's memory of an episode: the enemies that it has seen, and its units at the last observation.
+"""A side's memory of an episode: the enemies that it has seen, who died when, and a log of what happened.
 
 The game reports what is in sight and what has died. This module remembers which enemies were there, and how many of
-each type. An enemy that dies out of sight counts as alive, as a player would assume. `khala_bridge.observe.side` makes
-views of it; below are bodies.
+each type. An enemy that dies out of sight counts as alive, as a player would assume. It takes in every snapshot, also
+those at which no agent looks; so it reads the snapshot itself and makes no views, which take 50 times as long.
+`khala_bridge.observe.side` makes views of it, `khala_bridge.observe.changes` what is new to an agent.
 """
 
 from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from itertools import takewhile
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.knowledge import knowledge
-from khala_bridge.observe.events import event
-from khala_bridge.state import Alliance
+from khala_bridge.observe.body import rounded
 from khala_protocol.messages import EnemyCount, Event
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Sequence
 
-    from khala_bridge.observe.body import Body
-    from khala_protocol.messages import Point, UnitView
+    from khala_bridge.frames import MapFrame
+    from khala_bridge.observe.events import EventKind
+    from khala_bridge.state import Snapshot, Unit
+    from khala_protocol.messages import Alliance
 
 PASSING = frozenset(
     {
@@ -52,12 +55,26 @@ COUNTED_ANYWAY = frozenset({"Larva", "Egg", "Cocoon"})
 """Of these, the ones whose number matters to producers."""
 
 
+class Entry(NamedTuple):
+    """What one observation of the side brought."""
+
+    number: int
+    """Of the observation, from 0."""
+    events: tuple[Event, ...]
+    """Events of the side since the observation before."""
+    alerts: tuple[str, ...]
+    """The game's alerts, by the API's names."""
+    dead: frozenset[int]
+    """Tags of the units that died since then."""
+    fallen: tuple[Unit, ...]
+    """The player's own units among them, as they were at the observation before."""
+
+
 @dataclass(slots=True)
 class _Known:
     """An enemy unit as it was last seen."""
 
-    name: str
-    minimap: Point
+    unit: Unit
     seen: int
     """Number of the last observation that showed it."""
     dead: bool = False
@@ -67,40 +84,49 @@ class _Known:
 class Chronicle:
     """The memory of one episode."""
 
+    number: int = -1
+    """Of the last observation; the first one is 0."""
+    died: dict[int, int] = field(default_factory=dict)
+    """By tag of a dead unit, the game loop of the observation that reported its death."""
     _enemies: dict[int, _Known] = field(default_factory=dict)
-    _finished: dict[int, UnitView] = field(default_factory=dict)
+    _own: dict[int, Unit] = field(default_factory=dict)
     """Own units at the last observation, by tag."""
     _upgrades: frozenset[str] = frozenset()
-    _count: int = 0
-    """Number of observations so far."""
-    events: tuple[Event, ...] = ()
-    """Events of the side between the last two observations."""
+    _log: list[Entry] = field(default_factory=list)
+    """Of the observations that brought something."""
 
-    def note(self, bodies: Mapping[int, Body], upgrades: Sequence[str], dead: Iterable[int]) -> None:
+    def note(self, snapshot: Snapshot) -> None:
         """Take in an observation."""
-        gone = frozenset(dead)
-        own = {tag: body.view for tag, body in bodies.items() if body.is_own and body.name not in PASSING}
-        finished = {tag: view for tag, view in own.items() if view.build_progress >= 1}
-        new = self._new_enemies(bodies)
-        killed = self._killed(gone)
-        if self._count:
-            made = [event("finished", view, "own") for tag, view in finished.items() if tag not in self._finished]
-            lost = [event("died", view, "own") for tag, view in self._finished.items() if tag in gone]
-            learnt = [name for name in upgrades if name not in self._upgrades]
+        self.number += 1
+        before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
+        new, killed = self._new_enemies(snapshot), self._killed(snapshot.dead)
+        events: tuple[Event, ...] = ()
+        if self.number:
+            made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if _is_new(unit, before.get(tag))]
+            learnt = [name for name in snapshot.upgrades if name not in self._upgrades]
             researched = [Event(what="researched", tag="", type=name, alliance="own") for name in learnt]
-            self.events = (*made, *researched, *lost, *killed, *new)
-        self._finished, self._upgrades = finished, frozenset(upgrades)
-        self._count += 1
+            lost = [_of(unit, "died", "own") for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit)]
+            events = (*made, *researched, *lost, *killed, *new)
+        self._upgrades = frozenset(snapshot.upgrades)
+        fallen = tuple(before[tag] for tag in sorted(snapshot.dead & before.keys()))
+        if events or snapshot.alerts or snapshot.dead:
+            self._log.append(Entry(self.number, events, snapshot.alerts, snapshot.dead, fallen))
+        for tag in sorted(snapshot.dead):
+            self.died.setdefault(tag, snapshot.game_loop)
 
-    def _new_enemies(self, bodies: Mapping[int, Body]) -> list[Event]:
+    def since(self, number: int) -> Sequence[Entry]:
+        """Return what happened after an observation, the earliest first; after -1 is all of the episode."""
+        return list(takewhile(lambda entry: entry.number > number, reversed(self._log)))[::-1]
+
+    def _new_enemies(self, snapshot: Snapshot) -> list[Event]:
         """Return events for new enemies, and remember all that are in sight."""
         new = []
-        for tag, body in bodies.items():
-            if body.alliance is not Alliance.ENEMY or body.name in PASSING or body.view.hallucination:
+        for tag, unit in snapshot.units.items():
+            if not unit.is_enemy or unit.name in PASSING or unit.is_hallucination:
                 continue
             if tag not in self._enemies:
-                new.append(event("appeared", body.view, "enemy"))
-            self._enemies[tag] = _Known(body.name, body.view.minimap, self._count)
+                new.append(_of(unit, "appeared", "enemy"))
+            self._enemies[tag] = _Known(unit, self.number)
         return new
 
     def _killed(self, dead: frozenset[int]) -> list[Event]:
@@ -109,25 +135,40 @@ class Chronicle:
             known = self._enemies[tag]
             if not known.dead:
                 known.dead = True
-                killed.append(Event(what="died", tag=hex(tag), type=known.name, alliance="enemy"))
+                killed.append(_of(known.unit, "died", "enemy"))
         return killed
 
-    def enemies(self) -> tuple[EnemyCount, ...]:
+    def enemies(self, world: MapFrame) -> tuple[EnemyCount, ...]:
         """Return the known number of each type of enemy; units before structures, each in alphabetical order."""
         by_type: dict[str, list[_Known]] = {}
         for known in self._enemies.values():
-            by_type.setdefault(known.name, []).append(known)
-        return tuple(self._counted(name, by_type[name]) for name in sorted(by_type, key=_units_first))
+            by_type.setdefault(known.unit.name, []).append(known)
+        return tuple(self._counted(name, by_type[name], world) for name in sorted(by_type, key=_units_first))
 
-    def _counted(self, name: str, known: Sequence[_Known]) -> EnemyCount:
+    def _counted(self, name: str, known: Sequence[_Known], world: MapFrame) -> EnemyCount:
         alive = [enemy for enemy in known if not enemy.dead]
+        last = max(alive, key=lambda enemy: enemy.seen).unit.pos if alive else None
         return EnemyCount(
             type=name,
             seen=len(known),
-            in_sight=sum(enemy.seen == self._count - 1 for enemy in alive),
+            in_sight=sum(enemy.seen == self.number for enemy in alive),
             dead=len(known) - len(alive),
-            minimap=max(alive, key=lambda enemy: enemy.seen).minimap if alive else None,
+            minimap=rounded(world.minimap(*last), world.minimap_size) if last else None,
         )
+
+
+def _of(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
+    return Event(what=what, tag=hex(unit.tag), type=unit.name, alliance=alliance)
+
+
+def _is_done(unit: Unit) -> bool:
+    """Return True if an own unit is finished, as its view says it, and worth an event."""
+    return unit.name not in PASSING and round(unit.build_progress, 2) >= 1
+
+
+def _is_new(unit: Unit, before: Unit | None) -> bool:
+    """Return True if an own unit is finished, and was not at the observation before."""
+    return _is_done(unit) and (before is None or not _is_done(before))
 
 
 def _units_first(name: str) -> tuple[bool, str]:

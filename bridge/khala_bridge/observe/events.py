@@ -1,7 +1,7 @@
 """Events between two observations: of the units on a team's screen, and of the whole side.
 
 Compares two views of the same team, with the game's list of dead units, which no view has. An enemy that is neither in
-sight nor among the dead has walked out of sight, which is another event.
+sight nor among the dead has walked out of sight, which is another event. `khala_bridge.observe.changes` is above.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class Witnessed(NamedTuple):
 
 
 class Events:
-    """The events of one moment; an event that several teams witness is made once."""
+    """The events since one moment; an event that several teams witness is made once."""
 
     def __init__(self, before: Mapping[str, float], now: Mapping[str, UnitView], dead: frozenset[str]) -> None:
         """Take health and shield by tag at the observation before, every unit now, and the tags of the dead since."""
-        self.dead = dead
+        self._dead = dead
         self._now = now
         totals = ((tag, unit.health + unit.shield - before[tag]) for tag, unit in now.items() if tag in before)
         changes = {tag: change for tag, change in totals if abs(change) >= MIN_CHANGE}
@@ -60,8 +60,11 @@ class Events:
         found += self._of(now.enemies, old, "appeared", "enemy")
         if gone := old.difference(now.own, now.allies, now.enemies):
             units = (unit for unit in chain(before.units, before.allies, before.enemies) if unit.tag in gone)
-            found += [event("died" if unit.tag in self.dead else "disappeared", unit, unit.alliance) for unit in units]
+            found += [_event(self._end_of(unit), unit, unit.alliance) for unit in units]
         return tuple(found)
+
+    def _end_of(self, unit: UnitView) -> EventKind:
+        return "died" if unit.tag in self._dead else "disappeared"
 
     def _of(self, tags: Iterable[str], old: Container[str], arrival: EventKind, alliance: Alliance) -> list[Event]:
         """Return the events of some units that came, were hurt or were healed."""
@@ -69,7 +72,7 @@ class Events:
         found = []
         for tag in tags:
             if tag not in old:
-                found.append(event(arrival, self._now[tag], alliance))
+                found.append(_event(arrival, self._now[tag], alliance))
             elif tag in changed:
                 found.append(changed[tag])
         return found
@@ -80,11 +83,11 @@ class Events:
             made = {}
             for tag, change in self.changes.items():
                 what: EventKind = "hurt" if change < 0 else "healed"
-                made[tag] = event(what, self._now[tag], alliance, round(abs(change), 1))
+                made[tag] = _event(what, self._now[tag], alliance, round(abs(change), 1))
             self._changed[alliance] = made
         return self._changed[alliance]
 
 
-def event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
+def _event(what: EventKind, unit: UnitView, alliance: Alliance, amount: float | None = None) -> Event:
     """Return an event of a unit; unchecked, since a battle has hundreds in each step."""
     return _NOTHING.having({"what": what, "tag": unit.tag, "type": unit.type, "alliance": alliance, "amount": amount})

@@ -3,35 +3,42 @@
     observer.begin()                                     a new episode
     seen = observer.observe(snapshot, feedback)          seen.agents["Zealots"].text, .view
 
-An observer remembers the units of each team, its last observation, the enemies that were seen and the stages of the
-task that were reached, and nothing else: its result is a function of the snapshots and feedbacks since `begin`. No
-clock, no bus.
+It takes in every snapshot, and makes the observations of those agents alone that are asked for: all of them at every
+step, or each at its own pace. "Since the last observation" is since that of the same agent. An observer remembers the
+units of each team, the last observation of each agent, what happened to the side and the stages of the task that were
+reached, and nothing else: its result is a function of the snapshots, feedbacks and accesses since `begin`. No clock,
+no bus.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.observe import landmarks, side
+from khala_bridge.observe.body import rounded
+from khala_bridge.observe.changes import Changes
 from khala_bridge.observe.chronicle import Chronicle
 from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.scene import Scene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Feedback, Page, render, sections_of
 from khala_bridge.state.teams import TeamRoster
+from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from khala_bridge.frames import Camera, MapFrame
     from khala_bridge.observe.image.album import Album
+    from khala_bridge.observe.observation import TeamObservation
     from khala_bridge.observe.text.page import Part, Section
     from khala_bridge.state import Snapshot
+    from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig, TaskConfig
-    from khala_protocol.messages import Landmark, TeamView, View
+    from khala_protocol.messages import Landmark, View
 
 
 class Observer:
@@ -45,6 +52,7 @@ class Observer:
         """
         self._task = task
         self._new_roster = roster
+        self._configs = {agent.name: agent for agent in task.agents}
         self._sections = {agent.name: sections_of(agent) for agent in task.agents}
         self._parts = {name: _parts(sections) for name, sections in self._sections.items()}
         self.begin()
@@ -57,68 +65,84 @@ class Observer:
         """Return what the side sees now, with the feedback on each agent's last reply.
 
         An agent's observation is made on the first access through `agents`, so that one agent can think while the
-        host still observes for the others. Unused ones are made when the next observation begins.
+        host still observes for the others. One that nobody asks for costs nothing.
 
         Args:
             snapshot: the state of the game.
             feedback: by agent; an agent that is not in it gets none.
         """
-        episode = self._episode
-        earlier = episode.complete()
+        episode, world = self._episode, snapshot.info.frame(self._task.frames)
         episode.roster.update(snapshot.own, snapshot.player)
-        scene = Scene(snapshot, self._task.frames, episode.scene)
-        episode.chronicle.note(scene.bodies, snapshot.upgrades, snapshot.dead)
-        moment = _Moment(episode, scene, earlier, feedback or {}, self._album(snapshot, scene.world))
-        agents = _WhenAsked(self._task.agents, partial(self._agent, moment))
-        episode.scene, episode.last = scene, SideObservation(snapshot, scene.world, agents)
-        return episode.last
-
-    def _album(self, snapshot: Snapshot, world: MapFrame) -> Album | None:
-        """Return the album of the moment; None if no agent has pictures, so that OpenCV is loaded only when needed."""
-        if not any(agent.images for agent in self._task.agents):
-            return None
-        from khala_bridge.observe.image.album import Album  # noqa: PLC0415  # see above
-
-        return Album(snapshot, world)
+        episode.chronicle.note(snapshot)
+        teams = {name: episode.roster.teams(name) for name in self._configs}
+        moment = episode.now = _Moment(self._task, snapshot, episode, teams, feedback or {})
+        moment.reach(world)
+        agents = _WhenAsked(self._configs, partial(self._agent, moment))
+        return SideObservation(snapshot, world, self._configs, teams, dict(episode.chronicle.died), agents)
 
     def _agent(self, moment: _Moment, agent: AgentConfig) -> AgentObservation:
-        """Return the observation of one agent, in words and pictures."""
-        seen = self._seen(moment, agent)
-        page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), moment.conditions)
+        """Return the observation of one agent, in words and pictures.
+
+        Raises:
+            RuntimeError: the side has moved on.
+        """
+        if self._episode.now is not moment:
+            raise RuntimeError(
+                f"{agent.name} was not observed at game loop {moment.snapshot.game_loop}, and that moment is over; "
+                f"ask for agents[{agent.name!r}] before the next observe()"
+            )
+        changes = moment.since(moment.episode.last.get(agent.name, _NOTHING))
+        seen = self._seen(moment, agent, changes)
+        page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), changes.conditions)
         text = render(page, self._sections[agent.name], agent.text_tokens)
+        moment.episode.last[agent.name] = moment.as_last(seen)
         return replace(seen, text=text, pictures=moment.album.pictures(seen) if moment.album else ())
 
-    def _seen(self, moment: _Moment, agent: AgentConfig) -> AgentObservation:
-        episode, scene = moment.episode, moment.scene
-        before = moment.earlier.agents.get(agent.name) if moment.earlier else None
-        earlier = {team.view.name: team for team in before.teams} if before else {}
+    def _seen(self, moment: _Moment, agent: AgentConfig, changes: Changes) -> AgentObservation:
+        before = moment.episode.last.get(agent.name, _NOTHING).teams
         builds = "resources" in self._parts[agent.name] and agent.kind == "builder"
         teams = []
-        for team in episode.roster.teams(agent.name):
-            seen = scene.team(agent, team, earlier.get(team.name), resources=builds)
-            task = episode.stages.task(team, seen.view.minimap, scene.view.time_s)
+        for team in moment.teams[agent.name]:
+            seen = moment.scene.team(agent, team, before.get(team.name), changes.events, resources=builds)
+            task = moment.tasks.get((agent.name, team.name))
             teams.append(replace(seen, view=seen.view.but(task=task)) if task else seen)
-        view = self._view(moment, agent, [team.view for team in teams], teams[0].camera if teams else None)
-        return AgentObservation(agent, view, tuple(teams), episode.roster.idle_teams(agent.name))
+        view = self._view(moment, agent, changes, teams)
+        idle = moment.episode.roster.idle_teams(agent.name)
+        return AgentObservation(agent, moment.snapshot.game_loop, view, tuple(teams), idle)
 
-    def _view(self, moment: _Moment, agent: AgentConfig, teams: Sequence[TeamView], camera: Camera | None) -> View:
+    def _view(self, moment: _Moment, agent: AgentConfig, changes: Changes, teams: Sequence[TeamObservation]) -> View:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
-        scene, parts, chronicle = moment.scene, self._parts[agent.name], moment.episode.chronicle
-        view = scene.view.but(teams=tuple(teams))
+        scene, parts = moment.scene, self._parts[agent.name]
+        view = scene.view.but(teams=tuple(team.view for team in teams))
         more: dict[str, object] = {}
         if "counts" in parts:
-            more["counts"] = side.counts(scene, chronicle)
+            more["counts"] = side.counts(scene, moment.episode.chronicle)
         if "events" in parts:
-            more["events"] = chronicle.events
+            more["events"] = changes.of_side
         if "alerts" in parts:
-            more["alerts"], more["warnings"] = side.alerts(scene), side.warnings(scene)
+            more["alerts"], more["warnings"] = side.alerts(scene, changes), side.warnings(changes)
         if "others" in parts:
-            more["others"] = side.others(scene, moment.episode.roster, self._task, agent.name)
+            more["others"] = side.others(scene, moment.teams, agent.name)
         if "power" in parts:
             more["warp_gates"] = side.warp_gates(scene)
-        if marks := tuple(_landmarks(scene, parts, camera)):
+        if marks := tuple(_landmarks(scene, parts, teams[0].camera if teams else None)):
             more["landmarks"] = marks
         return view.but(**more) if more else view
+
+
+class _Last(NamedTuple):
+    """What an agent's next observation needs of its last one: not the scene, so that no scene outlives its moment."""
+
+    number: int
+    """Of the side's observation, from 0."""
+    totals: Mapping[str, float]
+    """Health and shield of all units in sight then, by tag."""
+    teams: Mapping[str, TeamObservation]
+    """By name."""
+
+
+_NOTHING = _Last(-1, {}, {})
+"""In the place of the last observation, for an agent that had none in the episode."""
 
 
 @dataclass(slots=True)
@@ -128,44 +152,70 @@ class _Episode:
     roster: TeamRoster
     chronicle: Chronicle = field(default_factory=Chronicle)
     stages: Stages = field(default_factory=Stages)
-    scene: Scene | None = None
-    last: SideObservation | None = None
-
-    def complete(self) -> SideObservation | None:
-        """Return the last observation, with all its lazy parts made."""
-        if self.last is not None:
-            tuple(self.last.agents.values())
-        return self.last
+    last: dict[str, _Last] = field(default_factory=dict)
+    """By agent."""
+    now: _Moment | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False)
 class _Moment:
-    """The common input of all agents' observations at one moment."""
+    """The common input of all agents' observations at one moment; what costs time is made when the first one is."""
 
+    task: TaskConfig
+    snapshot: Snapshot
     episode: _Episode
-    scene: Scene
-    earlier: SideObservation | None
+    teams: Mapping[str, Sequence[Team]]
+    """By agent."""
     feedback: Mapping[str, Feedback]
-    album: Album | None
-    conditions: dict[str, str] = field(default_factory=dict)
-    """By tag, the written condition of a unit."""
+    tasks: dict[tuple[str, str], str] = field(default_factory=dict)
+    """By agent and team, the present task of a team with stages."""
+    _changes: dict[int, Changes] = field(default_factory=dict)
+
+    def reach(self, world: MapFrame) -> None:
+        """Move the teams on to the stages that they have reached, whether anybody looks or not."""
+        time_s = round(self.snapshot.game_loop / LOOPS_PER_S, 3)
+        for team in (team for teams in self.teams.values() for team in teams if team.config.stages):
+            head = self.snapshot.units[team.head].pos if team.tags else None
+            middle = rounded(world.minimap(*head), world.minimap_size) if head else None
+            self.tasks[team.agent, team.name] = self.episode.stages.task(team, middle, time_s)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene."""
+        return Scene(self.snapshot, self.task.frames)
+
+    @cached_property
+    def album(self) -> Album | None:
+        """The album; None if no agent has pictures, so that OpenCV is loaded only when needed."""
+        if not any(agent.images for agent in self.task.agents):
+            return None
+        from khala_bridge.observe.image.album import Album  # noqa: PLC0415  # see above
+
+        return Album(self.snapshot, self.scene.world)
+
+    def since(self, last: _Last) -> Changes:
+        """Return the changes since an agent's last observation; agents with the same one share them."""
+        if last.number not in self._changes:
+            log = self.episode.chronicle.since(last.number)
+            self._changes[last.number] = Changes(last.totals, self.scene, log)
+        return self._changes[last.number]
+
+    def as_last(self, seen: AgentObservation) -> _Last:
+        """Return what an agent's next observation needs of this one."""
+        return _Last(self.episode.chronicle.number, self.scene.totals, {team.view.name: team for team in seen.teams})
 
 
 class _WhenAsked(Mapping[str, AgentObservation]):
     """The observation of each agent, in the order of the task; made on first access."""
 
-    def __init__(self, agents: Sequence[AgentConfig], make: Callable[[AgentConfig], AgentObservation]) -> None:
-        self._agents = {agent.name: agent for agent in agents}
+    def __init__(self, agents: Mapping[str, AgentConfig], make: Callable[[AgentConfig], AgentObservation]) -> None:
+        self._agents = agents
+        self._make = make
         self._made: dict[str, AgentObservation] = {}
-        self._make: Callable[[AgentConfig], AgentObservation] | None = make
 
     def __getitem__(self, name: str) -> AgentObservation:
-        agent = self._agents[name]
         if name not in self._made:
-            assert self._make is not None
-            self._made[name] = self._make(agent)
-            if len(self._made) == len(self._agents):
-                self._make = None  # it holds the observation before, which holds the one before that
+            self._made[name] = self._make(self._agents[name])
         return self._made[name]
 
     def __iter__(self) -> Iterator[str]:

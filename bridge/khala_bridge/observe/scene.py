@@ -22,7 +22,7 @@ import numpy as np
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, Camera
 from khala_bridge.observe.body import body, rounded
-from khala_bridge.observe.events import Events, Witnessed
+from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.observation import TeamObservation
 from khala_bridge.observe.offers import Possible
 from khala_bridge.state import Alliance
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.auto.warp import PowerField
     from khala_bridge.observe.body import Body
+    from khala_bridge.observe.events import Events
     from khala_bridge.observe.offers import Choice
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
@@ -54,20 +55,18 @@ _NO_DETAILS = UnitDetails()
 class Scene:
     """A snapshot, and the common part of all teams' views."""
 
-    def __init__(self, snapshot: Snapshot, frames: Frames, before: Scene | None = None) -> None:
-        """Take a snapshot, the frames of its views, and the scene before, which it does not keep."""
+    def __init__(self, snapshot: Snapshot, frames: Frames) -> None:
+        """Take a snapshot, and the frames of its views."""
         self.snapshot = snapshot
         self.world = snapshot.info.frame(frames)
         self._screen_size = frames.screen
         units = [unit for unit in snapshot.units.values() if not unit.is_neutral]
         self.bodies: dict[int, Body] = {unit.tag: body(unit, self.world) for unit in units}
         """Every unit in sight but the neutral ones, in ascending order of tags."""
-        self.fallen = {tag: before.bodies[tag] for tag in snapshot.dead if before and tag in before.bodies}
-        """Those who died since the scene before, as they were in it."""
-        views = {b.view.tag: b.view for b in self.bodies.values()}
-        self.totals = {tag: view.health + view.shield for tag, view in views.items()}
+        self.views = {b.view.tag: b.view for b in self.bodies.values()}
+        """Their views, by tag."""
+        self.totals = {tag: view.health + view.shield for tag, view in self.views.items()}
         """Health and shield by tag."""
-        self.events = Events(before.totals if before else {}, views, frozenset(map(hex, snapshot.dead)))
         self.possible = Possible(snapshot)
         self._arrange()
 
@@ -118,14 +117,15 @@ class Scene:
         )
 
     def team(
-        self, agent: AgentConfig, team: Team, before: TeamObservation | None, *, resources: bool = False
+        self, agent: AgentConfig, team: Team, before: TeamObservation | None, events: Events, *, resources: bool = False
     ) -> TeamObservation:
         """Return the observation of one team.
 
         Args:
             agent: whose team it is.
             team: its units; they are in the snapshot.
-            before: the team's observation before, for events; None if there is none.
+            before: the team's last observation; None if there is none.
+            events: of all units since then.
             resources: whether it gets minerals and geysers.
         """
         if not team.tags:
@@ -148,8 +148,8 @@ class Scene:
             bounds=_edges(camera.bounds(self.world)),
         )
         tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
-        events = self.events.of_team(before.view, before.tags, tags) if before else ()
-        return TeamObservation(team, camera, view.but(events=events), tags)
+        happened = events.of_team(before.view, before.tags, tags) if before else ()
+        return TeamObservation(team, camera, view.but(events=happened), tags)
 
     def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
         return tuple([self._tags[row] for row in rows.tolist()])

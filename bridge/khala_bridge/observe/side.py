@@ -1,7 +1,8 @@
 """Views of a whole side, for agents that lead or build it: its units, production, knowledge of the enemy, and alerts.
 
-Functions of a scene (`khala_bridge.observe.scene`) and of the memory of the episode (`khala_bridge.observe.chronicle`);
-each makes one part of a `View`. The sections of an agent's text decide which parts the agent gets.
+Functions of a scene (`khala_bridge.observe.scene`), of the memory of the episode (`khala_bridge.observe.chronicle`) and
+of what has changed (`khala_bridge.observe.changes`); each makes one part of a `View`. The sections of an agent's text
+decide which parts the agent gets.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING, is_structure
 from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeCount, WarpGates
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from khala_bridge.observe.body import Body
+    from khala_bridge.observe.changes import Changes
     from khala_bridge.observe.chronicle import Chronicle
     from khala_bridge.observe.scene import Scene
-    from khala_bridge.state.teams import TeamRoster
-    from khala_bridge.task.config import TaskConfig
+    from khala_bridge.state.teams import Team
     from khala_protocol.messages import Point, UnitView
 
 SAME_PLACE = 10.0
@@ -44,7 +45,7 @@ def counts(scene: Scene, chronicle: Chronicle) -> Counts:
         structures=tuple(count for count in counted if is_structure(count.type)),
         production=tuple(_production(body.view for body in scene.bodies.values() if body.is_own)),
         planned=scene.planned,
-        enemies=chronicle.enemies(),
+        enemies=chronicle.enemies(scene.world),
     )
 
 
@@ -85,24 +86,24 @@ def _production(own: Iterable[UnitView]) -> Iterator[Production]:
         yield Production(order=name, progress=progress, queued=queued[name])
 
 
-def alerts(scene: Scene) -> tuple[Alert, ...]:
-    """Return alerts where own units lost health or died since the observation before, in the order of their tags."""
-    changes, dead = scene.events.changes, scene.events.dead
-    hurt = [body for body in scene.bodies.values() if body.is_own and changes.get(body.view.tag, 0) < 0]
-    fallen = [body for tag, body in sorted(scene.fallen.items()) if body.is_own and hex(tag) in dead]
+def alerts(scene: Scene, changes: Changes) -> tuple[Alert, ...]:
+    """Return alerts where own units lost health or died, in the order of their tags."""
+    lost = changes.events.changes
+    hurt = [body for body in scene.bodies.values() if body.is_own and lost.get(body.view.tag, 0) < 0]
     groups: list[list[Body]] = []
-    for body in (*hurt, *fallen):
+    for body in (*hurt, *changes.fallen.values()):
         near = next((g for g in groups if math.dist((g[0].x, g[0].y), (body.x, body.y)) <= SAME_PLACE), None)
         if near is None:
             groups.append([body])
         else:
             near.append(body)
-    return tuple(_alert(scene, group) for group in groups)
+    return tuple(_alert(scene, changes, group) for group in groups)
 
 
-def _alert(scene: Scene, bodies: Sequence[Body]) -> Alert:
-    fallen = sum(body.tag in scene.fallen for body in bodies)
-    lost = sum(-scene.events.changes.get(body.view.tag, 0) for body in bodies if body.tag not in scene.fallen)
+def _alert(scene: Scene, changes: Changes, bodies: Sequence[Body]) -> Alert:
+    by, gone = changes.events.changes, changes.fallen
+    fallen = sum(body.tag in gone for body in bodies)
+    lost = sum(-by.get(body.view.tag, 0) for body in bodies if body.tag not in gone)
     return Alert(
         minimap=_middle(scene, bodies),
         units=dict(sorted(Counter(body.name for body in bodies).items())),
@@ -111,15 +112,15 @@ def _alert(scene: Scene, bodies: Sequence[Body]) -> Alert:
     )
 
 
-def warnings(scene: Scene) -> tuple[str, ...]:
+def warnings(changes: Changes) -> tuple[str, ...]:
     """Return the game's own warnings, each once."""
-    return tuple(dict.fromkeys(alert for alert in scene.snapshot.alerts if alert in WARNINGS))
+    return tuple(dict.fromkeys(alert for alert in changes.alerts if alert in WARNINGS))
 
 
-def others(scene: Scene, roster: TeamRoster, task: TaskConfig, agent: str) -> tuple[TeamReport, ...]:
+def others(scene: Scene, teams: Mapping[str, Sequence[Team]], agent: str) -> tuple[TeamReport, ...]:
     """Return the teams of all other agents, in the order of the task."""
-    teams = (team for other in task.agents if other.name != agent for team in roster.teams(other.name))
-    return tuple(_report(t.agent, t.name, [scene.bodies[tag] for tag in t.tags]) for t in teams if t.tags)
+    foreign = (team for other, its in teams.items() if other != agent for team in its)
+    return tuple(_report(t.agent, t.name, [scene.bodies[tag] for tag in t.tags]) for t in foreign if t.tags)
 
 
 def _report(agent: str, name: str, bodies: Sequence[Body]) -> TeamReport:

@@ -215,7 +215,7 @@ def pages(base: Any, look: Any, base_task: TaskConfig) -> Callable[..., dict[str
     def write(feedback: Mapping[str, Feedback] | None = None, **limits: int) -> dict[str, str]:
         agents = tuple(a.model_copy(update={"text_tokens": limits.get(a.name)}) for a in base_task.agents)
         observer = Observer(base_task.model_copy(update={"agents": agents}))
-        observer.observe(look(base(earlier=True), loop=4464, upgrades=()))
+        tuple(observer.observe(look(base(earlier=True), loop=4464, upgrades=())).agents.values())
         observation = observer.observe(look(base(), upgrades=(87,), dead=frozenset({FOES[2]})), feedback)
         return {name: agent.text for name, agent in observation.agents.items()}
 

@@ -67,6 +67,7 @@ def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservati
         answer = client.ask(query=question(blind)).query
         snapshot = read_snapshot(response, blind.info, abilities=available(answer))
         observations.append(observer.observe(snapshot))
+        tuple(observations[-1].agents.values())  # while it is the present one
         _train_a_worker(client, snapshot)
         client.step(LOOPS)
     return task, observations

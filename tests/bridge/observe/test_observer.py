@@ -10,7 +10,7 @@ from khala_bridge.observe import Feedback, Observer
 from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from khala_bridge.observe import AgentObservation
     from khala_bridge.state import Snapshot
@@ -32,8 +32,8 @@ def moments(unit: Make, snapshot: Snap) -> list[Snapshot]:
     ]
 
 
-def words(agents: Mapping[str, AgentObservation]) -> dict[str, str]:
-    return {name: agents[name].text for name in PAIR}
+def words(agents: Mapping[str, AgentObservation], order: Iterable[str] = PAIR) -> dict[str, str]:
+    return {name: agents[name].text for name in order}
 
 
 def test_agents_are_observed_when_they_are_asked_for_and_once(unit: Make, snapshot: Snap) -> None:
@@ -52,9 +52,10 @@ def test_the_order_of_asking_and_the_moment_of_asking_change_nothing(unit: Make,
     for moment in moments(unit, snapshot):
         in_order.append(words(at_once.observe(moment, feedback).agents))
         kept.append(later.observe(moment, feedback))
+        words(kept[-1].agents, reversed(PAIR))
     assert "0:00" in in_order[0]["Stalkers"]
     assert len({text for texts in in_order for text in texts.values()}) == 6
-    assert [{name: seen.agents[name].text for name in reversed(PAIR)} for seen in reversed(kept)] == in_order[::-1]
+    assert [words(seen.agents) for seen in reversed(kept)] == in_order[::-1]
 
 
 def test_an_observer_keeps_no_more_than_its_last_observation(unit: Make, snapshot: Snap) -> None:

@@ -50,7 +50,8 @@ class Page:
     task: TaskConfig
     feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)
-    """By tag, the written condition of a unit: the pages of one moment share it, see `units`."""
+    """By tag, the written condition of a unit, and its changes: pages of one moment that tell of the same changes share
+    it, see `units`."""
 
     @property
     def view(self) -> View:
