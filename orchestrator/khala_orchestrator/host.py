@@ -14,7 +14,7 @@ from khala_orchestrator.announce import Announcer
 from khala_orchestrator.cards import run_card
 from khala_orchestrator.match import Match
 from khala_orchestrator.pacing import AtOnce, pacing_of
-from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.record import BestEffort, Listener, RecordingBus
 from khala_orchestrator.resume import ResumedTurn
 from khala_orchestrator.roster import Roster
 from khala_orchestrator.side import sides_of
@@ -22,11 +22,13 @@ from khala_orchestrator.turn import Turn
 from khala_protocol.recording import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
+    from collections.abc import AsyncIterator, Callable, Sequence
+    from pathlib import Path
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
+    from khala_orchestrator.roster import Seat
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Briefing, Message, Report, Result, Wire
 
@@ -61,15 +63,14 @@ async def host(
     async with contextlib.AsyncExitStack() as stack:
         flush = _nothing
         if config.record is not None:
-            recorder = stack.enter_context(Recorder(config.record))
+            recorder = stack.enter_context(_recorder(config, config.record))
             for sample in past.kept() if past else ():
                 recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
             bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
-        grace_s = config.task.clock.grace_s
-        turn = await stack.enter_async_context(Turn(bus, config.run, roster, required=required, grace_s=grace_s))
+        turn = await stack.enter_async_context(_turn(config, bus, roster, required))
         await announcer.run(card)
         watch(card)
         await roster.assemble(required, config.assemble_s)
@@ -79,6 +80,21 @@ async def host(
         if past is None:
             return [result async for result in match.play()]
         return [*past.results, *[result async for result in _resumed(match, past, observer)]]
+
+
+def _recorder(config: MatchConfig, path: Path) -> Recorder | BestEffort:
+    recorder = Recorder(path)
+    return BestEffort(recorder) if config.task.faults.recording_lost == "go_on" else recorder
+
+
+def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat]) -> Turn:
+    match config.task.faults.agent_gone:
+        case "wait":
+            return Turn(bus, config.run, roster, required=required, grace_s=config.task.clock.grace_s)
+        case "end":
+            return Turn(bus, config.run, roster, required=required)
+        case "go_on":
+            return Turn(bus, config.run, roster)
 
 
 def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:

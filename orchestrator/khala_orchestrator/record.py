@@ -9,18 +9,73 @@ else.
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Self
+import contextlib
+import logging
+from typing import TYPE_CHECKING, Protocol, Self
 
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Bus, Delivery, Liveness, Publisher, Sample, Subscription, Token
-from khala_protocol.errors import WrongKey
+from khala_protocol.errors import RecordingError, WrongKey
 from khala_protocol.keys import Topic, every_agent, parse
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterable
+    from collections.abc import AsyncIterator, Callable, Iterable, Iterator
     from types import TracebackType
 
     from khala_protocol.recording import Recorder
+
+log = logging.getLogger(__name__)
+
+
+class Sink(Protocol):
+    """Where a recording is written to."""
+
+    def write(self, key: str, payload: bytes, *, log_time_ns: int | None = None) -> None:
+        """Write one sample."""
+
+    def flush(self) -> None:
+        """Keep what was written from being lost."""
+
+
+class BestEffort:
+    """A recorder that gives up when it cannot write, for matches that are worth more than their recordings.
+
+    A context manager around the recorder, which it closes.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._lost = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._giving_up():
+            self._recorder.close()
+
+    def write(self, key: str, payload: bytes, *, log_time_ns: int | None = None) -> None:
+        """Write one sample, as long as that is possible."""
+        if not self._lost:
+            with self._giving_up():
+                self._recorder.write(key, payload, log_time_ns=log_time_ns)
+
+    def flush(self) -> None:
+        """Flush the recording, as long as that is possible."""
+        if not self._lost:
+            with self._giving_up():
+                self._recorder.flush()
+
+    @contextlib.contextmanager
+    def _giving_up(self) -> Iterator[None]:
+        try:
+            yield
+        except RecordingError as error:
+            if not self._lost:
+                log.error("the match goes on without its recording: %s", error)
+            self._lost = True
 
 
 class RecordingBus:
@@ -30,7 +85,7 @@ class RecordingBus:
     65 535 keys, and anybody who may write can make up more.
     """
 
-    def __init__(self, bus: Bus, recorder: Recorder, seats: Iterable[Seat]) -> None:
+    def __init__(self, bus: Bus, recorder: Sink, seats: Iterable[Seat]) -> None:
         self._bus = bus
         self._recorder = recorder
         self._seats = frozenset(seats)
@@ -87,7 +142,7 @@ class Listener:
 
 
 class _RecordingPublisher:
-    def __init__(self, publisher: Publisher, recorder: Recorder) -> None:
+    def __init__(self, publisher: Publisher, recorder: Sink) -> None:
         self._publisher = publisher
         self._recorder = recorder
 
@@ -104,7 +159,7 @@ class _RecordingPublisher:
 
 
 class _RecordingSubscription:
-    def __init__(self, subscription: Subscription[Sample], recorder: Recorder, is_known: Callable[[str], bool]) -> None:
+    def __init__(self, subscription: Subscription[Sample], recorder: Sink, is_known: Callable[[str], bool]) -> None:
         self._subscription = subscription
         self._recorder = recorder
         self._is_known = is_known

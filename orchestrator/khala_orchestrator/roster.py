@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+NEWS_S = 1.0
+"""Time after our link is back within which all agents that are still there have been reported."""
+
 
 class Seat(NamedTuple):
     """The place of one agent in a run."""
@@ -53,6 +56,9 @@ class Roster:
         self._bus = bus
         self._run = run
         self._instances: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
+        self._cut = False
+        self._doubtful: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
+        """Instances that were there when our link went down, and of which nothing was heard since."""
         self._changed = asyncio.Condition()
         self._gone: Callable[[Seat], None] = _ignore
         self._here: Callable[[Seat], Awaitable[None]] = _ignore_here
@@ -72,15 +78,22 @@ class Roster:
         await self._pump
 
     def present(self, seat: Seat) -> bool:
-        """Return whether at least one instance of this agent is present."""
+        """Return whether at least one instance of this agent is present, as far as is known."""
         return bool(self._instances[seat])
+
+    def reachable(self, seat: Seat) -> bool:
+        """Return whether an agent is present and our own link is up."""
+        return self.present(seat) and not self._cut
 
     def missing(self) -> tuple[Seat, ...]:
         """Return the seats that no agent has taken."""
         return tuple(seat for seat in self.seats if not self.present(seat))
 
     def on_change(self, *, gone: Callable[[Seat], None], here: Callable[[Seat], Awaitable[None]]) -> None:
-        """Call `gone` whenever the last instance of an agent leaves, and `here` whenever one comes, or is back."""
+        """Call `gone` whenever the last instance of an agent leaves, and `here` whenever one comes.
+
+        With our own link down, all of them leave; those that are still there come again when it is back.
+        """
         self._gone, self._here = gone, here
 
     async def assemble(self, required: Iterable[Seat], timeout_s: float) -> None:
@@ -98,10 +111,10 @@ class Roster:
 
     async def _follow(self, tokens: Subscription[Liveness]) -> None:
         async for token in tokens:
-            if token.alive or token.link_up:  # with our own link down, every agent seems to leave at once
-                await self._note(token)
-                async with self._changed:
-                    self._changed.notify_all()
+            self._cut = not (token.alive or token.link_up)
+            await self._note(token)
+            async with self._changed:
+                self._changed.notify_all()
 
     async def _note(self, token: Liveness) -> None:
         try:
@@ -115,14 +128,34 @@ class Roster:
         if instances is None:
             log.warning("agent %s is not in this match", seat)
         elif token.alive:
+            self._be_sure_soon()
+            self._doubtful[seat].discard(address.instance)
             instances.add(address.instance)
             if len(instances) > 1:
                 log.error("%d processes are agent %s: the first reply of a step counts, all pay", len(instances), seat)
             await self._here(seat)
-        elif address.instance in instances:
-            instances.remove(address.instance)
-            if not instances:
+        elif self._cut:  # with our own link down, every agent seems to leave at once
+            self._doubtful[seat].add(address.instance)
+            self._gone(seat)
+        else:
+            self._remove(seat, {address.instance})
+
+    def _remove(self, seat: Seat, left: set[str]) -> None:
+        if self._instances[seat] & left:
+            self._instances[seat] -= left
+            if not self._instances[seat]:
                 self._gone(seat)
+
+    def _be_sure_soon(self) -> None:
+        """Count as gone, in a moment, the instances that are not there any more now that our link is back."""
+        if any(self._doubtful.values()):
+            asyncio.get_running_loop().call_later(NEWS_S, self._be_sure)
+
+    def _be_sure(self) -> None:
+        for seat, left in self._doubtful.items():
+            if left and not self._cut:
+                self._remove(seat, left.copy())
+                left.clear()
 
 
 def _ignore(seat: Seat) -> None:

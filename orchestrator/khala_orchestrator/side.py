@@ -138,7 +138,8 @@ class Side:
 
     def act(self, at: StepId, decisions: Sequence[Decision]) -> Played:
         """Return what comes of the decisions that take effect now."""
-        speeches = {decision.seat.agent: speech for decision in decisions if (speech := self._speech(decision)) is not None}
+        heard = {decision.seat.agent: self._speech(decision) for decision in decisions}
+        speeches = {agent: speech for agent, speech in heard.items() if speech is not None}
         joint = self.actor.joint(self._now, speeches, self._seen)
         messages = [
             Message(

@@ -185,7 +185,7 @@ class Turn:
         await self._show(seat, question.pictures)
         self._open[seat] = asked = _Question(observation, encode(observation), now)
         await self._publishers[seat].put(asked.payload)
-        if not self._roster.present(seat):
+        if not self._roster.reachable(seat):
             self._gone(seat)
         return asked
 
@@ -198,14 +198,14 @@ class Turn:
             await self._frames[seat, place].put(picture)
 
     def _gone(self, seat: Seat) -> None:
-        """Stop waiting for an agent; wait for a required one until its grace is over."""
+        """Wait for a required agent until its grace is over, and no longer for another one that is not there."""
         asked = self._open.get(seat)
-        if asked is None or not asked.waiting:
+        if asked is None or not asked.waiting or asked.held:
             return
         if seat in self._required:
             asked.held, asked.until = True, asyncio.get_running_loop().time() + self._grace_s
             log.error("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
-        else:
+        elif not self._roster.present(seat):
             asked.waiting = False
         self._changed.set()
 

@@ -182,6 +182,21 @@ async def test_a_match_without_a_required_agent_ends_and_is_not_valid(
     assert Recording.open(path).results == tuple(results)
 
 
+@pytest.mark.parametrize(("rule", "steps", "outcome"), [("go_on", 5, "draw"), ("end", 2, "aborted")])
+async def test_the_task_says_what_becomes_of_a_match_without_an_agent(
+    hall: Hall, config: MakeConfig, rule: str, steps: int, outcome: str
+) -> None:
+    async def dies(peer: Peer, seen: Observation) -> None:
+        if seen.step == 1:
+            peer.bus.kill()
+        else:
+            await peer.answer(seen)
+
+    (result,) = await hall.play(config(max_steps=5, faults={"agent_gone": rule}), Stalkers=dies)
+    assert now_s() == 0
+    assert (result.steps, result.outcome) == (steps, outcome)
+
+
 async def test_a_match_that_no_model_ever_answered_is_not_valid(hall: Hall, config: MakeConfig) -> None:
     hall.game.after = {2: {"outcome": "win"}}
     fails = taking(0, ATTACK, status="fallback", detail="http 401")

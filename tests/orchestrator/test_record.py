@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.record import BestEffort, Listener, RecordingBus
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery, Sample
 from khala_protocol.codec import encode
@@ -190,3 +190,15 @@ async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBr
             await agent.put(b"at the last moment")
         await agent.put(b"after the end")
     assert recorded(tmp_path / "run.mcap") == [(EXCHANGE, b"at the last moment")]
+
+
+def test_a_match_may_go_on_without_its_recording(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    class FullDisk(Recorder):
+        def write(self, key: str, payload: bytes, *, log_time_ns: int | None = None) -> None:
+            raise RecordingError("no space left on device")
+
+    with BestEffort(FullDisk(tmp_path / "run.mcap")) as recorder:
+        for _ in range(2):
+            recorder.write(OBSERVATION, b"")
+            recorder.flush()
+    assert caplog.messages == ["the match goes on without its recording: no space left on device"]

@@ -10,7 +10,7 @@ import pytest
 from khala_orchestrator.host import host
 from khala_orchestrator.resume import ResumeError, unfinished
 from khala_protocol.bus import Delivery
-from khala_protocol.messages import Observation, Reply, Report, Run
+from khala_protocol.messages import Observation, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:

@@ -205,10 +205,27 @@ async def test_with_the_own_link_down_nobody_is_gone(broker: MemoryBroker, peer:
         await settle()
         session.cut()
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (True, [])
+        assert (roster.present(ZEALOTS), roster.reachable(ZEALOTS), gone) == (True, False, [ZEALOTS])
         session.mend()
+        await asyncio.sleep(2)
+        assert (roster.present(ZEALOTS), roster.reachable(ZEALOTS), gone) == (True, True, [ZEALOTS])
+
+
+async def test_one_that_leaves_while_our_link_is_down_is_gone_when_it_is_back(
+    broker: MemoryBroker, peer: MakePeer
+) -> None:
+    session, zealots = broker.session(), peer(ZEALOTS)
+    await zealots.arrive()
+    await peer(STALKERS).arrive()
+    async with Roster(session, RUN, [ZEALOTS, STALKERS]) as roster:
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (True, [])
+        session.cut()
+        await settle()
+        zealots.bus.kill()
+        await settle()
+        session.mend()
+        await asyncio.sleep(2)
+        assert roster.missing() == (ZEALOTS,)
 
 
 def test_a_seat_is_written_as_it_stands_in_a_key() -> None:

@@ -587,6 +587,25 @@ async def test_one_whose_link_is_back_is_asked_again(broker: MemoryBroker, peer:
         assert (await asked).by_seat[ZEALOTS].text == "once more"
 
 
+async def test_while_our_own_link_is_down_the_clock_stands_still(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    zealots, host = peer(ZEALOTS), broker.session()
+    await zealots.arrive()
+    async with Roster(host, RUN, [ZEALOTS]) as roster, Turn(host, RUN, roster, required=[ZEALOTS], grace_s=30) as turn:
+        await roster.assemble([ZEALOTS], 1)
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=5)))
+        await zealots.observed()
+        host.cut()
+        await asyncio.sleep(20)
+        host.mend()
+        await zealots.observed()
+        await zealots.reply("I never left")
+        answers = await asked
+        assert asyncio.get_running_loop().time() == 20
+    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("I never left", [])
+
+
 # --- without waiting ------------------------------------------------------------------------------------
 
 

@@ -239,6 +239,19 @@ class SideConfig(Frozen):
     max_actions: int | None = Field(default=None, ge=1)
 
 
+class FaultRules(Frozen):
+    """What the host does when a part of a match fails; see [faults](../how-to/faults.md)."""
+
+    agent_gone: Literal["wait", "go_on", "end"] = "wait"
+    """A required agent went away, or the host's link did: hold the game for the clock's `grace_s` and then end the match,
+    go on without the agent, or end the match at once."""
+    game_lost: Literal["restart", "end"] = "restart"
+    """The game died or does not answer: start it again and play the recorded decisions into it, or end the match. Only
+    the simulator can be restarted, and only with a recording."""
+    recording_lost: Literal["end", "go_on"] = "end"
+    """The recording cannot be written, because the disk is full for example."""
+
+
 class Opponent(Frozen):
     """The computer player; values that are missing come from the map table."""
 
@@ -273,6 +286,7 @@ class TaskConfig(Frozen):
     clock: Clock = Clock()
     frames: Frames = Frames()
     auto: AutoConfig = AutoConfig()
+    faults: FaultRules = FaultRules()
     default_reply: str = ""
     """Reply of an agent that did not answer in time; empty: its units continue."""
     max_actions: int = Field(default=3, ge=1)
