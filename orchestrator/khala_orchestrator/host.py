@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.record import OwnedSink
     from khala_orchestrator.resume import Unfinished
     from khala_orchestrator.roster import Seat
     from khala_protocol.bus import Bus
@@ -82,7 +83,7 @@ async def host(
         return [*past.results, *[result async for result in _resumed(match, past, observer)]]
 
 
-def _recorder(config: MatchConfig, path: Path) -> Recorder | BestEffort:
+def _recorder(config: MatchConfig, path: Path) -> OwnedSink:
     recorder = Recorder(path)
     return BestEffort(recorder) if config.task.faults.recording_lost == "go_on" else recorder
 

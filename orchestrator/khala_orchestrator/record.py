@@ -37,6 +37,19 @@ class Sink(Protocol):
         """Keep what was written from being lost."""
 
 
+class OwnedSink(Sink, Protocol):
+    """A sink that is closed by leaving it."""
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+
+
 class BestEffort:
     """A recorder that gives up when it cannot write, for matches that are worth more than their recordings.
 
@@ -74,7 +87,7 @@ class BestEffort:
             yield
         except RecordingError as error:
             if not self._lost:
-                log.error("the match goes on without its recording: %s", error)
+                log.warning("the match goes on without its recording: %s", error)
             self._lost = True
 
 

@@ -243,8 +243,8 @@ class FaultRules(Frozen):
     """What the host does when a part of a match fails; see [faults](../how-to/faults.md)."""
 
     agent_gone: Literal["wait", "go_on", "end"] = "wait"
-    """A required agent went away, or the host's link did: hold the game for the clock's `grace_s` and then end the match,
-    go on without the agent, or end the match at once."""
+    """A required agent went away, or the host's link did: hold the game for the clock's `grace_s` and then end the
+    match, go on without the agent, or end the match at once."""
     game_lost: Literal["restart", "end"] = "restart"
     """The game died or does not answer: start it again and play the recorded decisions into it, or end the match. Only
     the simulator can be restarted, and only with a recording."""
