@@ -176,7 +176,9 @@ EDGE = {S1: ("Stalker", 90.0, 90.0), S2: ("Stalker", 91.0, 90.0)}
 def test_a_refusal_tells_of_the_screen_that_the_agent_sees_next(late: Any) -> None:
     joint = late(said("<Move_Screen([20, 12])>"), then=EDGE, moved={S1: ("Stalker", 92, 86)})
     (fault,) = joint.rejections["A"]
-    inside = "for team Stalker-1 x is from 0 to 16 and y from 2 to 24"  # around [92, 86]; it was from 0 to 18, 6 to 24
+    inside = (
+        "for team Stalker-1 x is now from 0 to 16 and y from 2 to 24"  # around [92, 86]; it was from 0 to 18, 6 to 24
+    )
     assert fault.message == f"[20, 12] lies beyond the edge of the map; {inside}."
 
 

@@ -149,9 +149,10 @@ class Targets:
         x, y = self._in_frame(said, "screen", camera.size, "minimap", self._observation.map.minimap_size)
         point = camera.world(ScreenPoint(x, y))
         if not self._observation.map.holds(point):
-            bounds = (self._camera_now(said) or camera).bounds(self._observation.map)
-            x0, y0, x1, y1 = (f"{round(value, 1):g}" for value in bounds)
-            inside = f"for team {name} x is from {x0} to {x1} and y from {y0} to {y1}"
+            now = self._camera_now(said) or camera
+            x0, y0, x1, y1 = (f"{round(value, 1):g}" for value in now.bounds(self._observation.map))
+            verb = "is" if now == camera else "is now"
+            inside = f"for team {name} x {verb} from {x0} to {x1} and y from {y0} to {y1}"
             raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
         return point
 
