@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
+from pydantic import Field
+
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.task.maps import MapSpec  # noqa: TC001  # pydantic evaluates it
@@ -54,6 +56,8 @@ class GameConfig(Frozen):
     """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
     start_timeout_s: int = 120
     """Time limit until the game listens."""
+    environment: dict[str, str] | None = Field(default=None, repr=False)
+    """Environment of the game's process; None: ours, with all that is in it."""
 
     @property
     def camera_width(self) -> float:
