@@ -237,7 +237,7 @@ def start() -> Callable[[StillGame], Awaitable[OneSide]]:
     """Starts a game in the loop's own thread."""
 
     async def started(game: StillGame) -> OneSide:
-        thread = GameThread(lambda: game, hang_s=None)
+        thread = GameThread(lambda: game)
         thread._threads = _Here()
         return await OneSide(thread, RawExecutor(), step_loops=11).__aenter__()
 
