@@ -13,7 +13,6 @@ from typing import Annotated
 import typer
 
 from khala_protocol.commandline import run_command
-from khala_protocol.parent_watch import end_with_parent
 
 DEFAULT_LLM_PORT = 8765
 
@@ -74,7 +73,6 @@ def agent(
 
     Keys of models are taken from the environment only; the model file says which variable.
     """
-    end_with_parent()
     from khala_agents import commands  # noqa: PLC0415  # see there
 
     commands.play(
@@ -116,7 +114,6 @@ def llm(
     distance, raids and builds; focus-fire fires with all teams on the weakest enemy, random-legal does anything that
     is allowed, silent orders nothing.
     """
-    end_with_parent()
     from khala_agents import commands  # noqa: PLC0415  # see there
 
     commands.serve(
