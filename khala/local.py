@@ -97,13 +97,16 @@ async def play(
         bus = await open_bus(BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),)))
         stack.push_async_callback(bus.close)
         children = await stack.enter_async_context(Children(directory))
-        await _start_agents(children, config, minds, bus)
+        started = await _start_agents(children, config, minds, bus)
         side = await stack.enter_async_context(one_side(config, sc2path))
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
             if isinstance(message, Report):
                 begun.set()
+                for share in started:
+                    share.spend(message)
+                    children.start_again_with(share.process, *share.arguments)
             watch(message)
 
         return await _unless_one_dies(host(config, side, bus, watch=see), children, begun)
@@ -139,18 +142,39 @@ def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[s
     return [list(agents[first::processes]) for first in range(min(processes, len(agents)))]
 
 
-async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> None:
-    base_url = minds.base_url
-    if minds.needs_endpoint:
-        base_url = await start_endpoint(children, minds.latency_s)
+@dataclass(slots=True)
+class _Share:
+    """The agents of one process, and what they may still spend, also after the process was started again."""
+
+    process: str
+    names: list[str]
+    options: list[str]
+    left_usd: float | None
+
+    @property
+    def arguments(self) -> list[str]:
+        """The command line of the process."""
+        budget = [] if self.left_usd is None else ["--budget-usd", str(max(self.left_usd, 0.0))]
+        return ["agent", *self.names, *self.options, *budget]
+
+    def spend(self, report: Report) -> None:
+        """Take off what a step has cost."""
+        if self.left_usd is not None:
+            self.left_usd -= sum(a.usage.cost_usd or 0.0 for a in report.agents if a.agent in self.names)
+
+
+async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> list[_Share]:
+    base_url = await start_endpoint(children, minds.latency_s) if minds.needs_endpoint else minds.base_url
     options = ["--run", config.run, "--side", config.task.side, "--connect", bus.endpoints[0]]
     options += ["--policy", minds.policy] if minds.policy else ["--model", minds.model]
     for option, value in (("--base-url", base_url), ("--model-name", minds.model_name)):
         options += [option, value] if value and not minds.policy else []
     groups = shares([agent.name for agent in config.task.agents])
-    for number, names in enumerate(groups):
-        budget = ["--budget-usd", str(minds.budget_usd / len(groups))] if minds.budget_usd is not None else []
-        await children.start(f"agents-{number}", "agent", *names, *options, *budget, environ=minds.environ)
+    each_usd = None if minds.budget_usd is None else minds.budget_usd / len(groups)
+    started = [_Share(f"agents-{number}", names, options, each_usd) for number, names in enumerate(groups)]
+    for share in started:
+        await children.start(share.process, *share.arguments, environ=minds.environ)
+    return started
 
 
 async def start_endpoint(children: Children, latency_s: float) -> str:

@@ -12,20 +12,24 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import httpx
 import pytest
 
 from khala import environment
 from khala.children import ChildDied, Children
-from khala.local import start_endpoint
+from khala.local import _Share, start_endpoint
 from khala_agents.config import ModelConfig
 from khala_protocol import parent_watch
+from khala_protocol.messages import Usage
 from khala_simulator.process import parent_watch as simulator_watch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from khala_protocol.messages import Report
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 GONE_S = 2.0
@@ -178,6 +182,14 @@ async def test_the_scripted_endpoint_comes_back_at_its_address(tmp_path: Path, m
         async with httpx.AsyncClient(transport=transport) as client:
             assert (await client.get(f"{base_url}/models")).status_code == 200
         keeping.cancel()
+
+
+def test_a_process_that_is_started_again_may_spend_what_its_agents_left() -> None:
+    share = _Share("agents-0", ["A", "B"], ["--run", "r"], 0.5)
+    usages = {"A": 0.125, "B": None, "C": 9.0}
+    agents = [SimpleNamespace(agent=name, usage=Usage(cost_usd=cost)) for name, cost in usages.items()]
+    share.spend(cast("Report", SimpleNamespace(agents=agents)))
+    assert share.arguments == ["agent", "A", "B", "--run", "r", "--budget-usd", "0.375"]
 
 
 ENVIRON = {
