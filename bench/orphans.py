@@ -1,4 +1,4 @@
-"""How long the processes of a match live after their host is killed, at random moments from its start on.
+"""How long the processes of a match live after their host is killed, at random moments after it started the first one.
 
     python -m bench.orphans --kills 20
 
@@ -20,7 +20,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-LATEST_S = 20.0
+LATEST_S = 10.0
 GIVEN_UP_S = 30.0
 LOOK_S = 0.01
 
@@ -49,9 +49,10 @@ def processes_of(mark: str) -> set[int]:
 def kill_after(seconds: float, directory: Path, cache: Path) -> Killed:
     """Start a match of two agents, kill its host, and wait until its processes are gone."""
     command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.1", "--episodes", "9"]
-    mark = {"TMPDIR": str(directory)}
-    environ = os.environ | mark | {"KHALA_CACHE": str(cache)}
+    environ = os.environ | {"TMPDIR": str(directory), "KHALA_CACHE": str(cache)}
     with subprocess.Popen(command, cwd=directory, env=environ, stderr=subprocess.DEVNULL) as host:
+        while not processes_of(f"TMPDIR={directory}") - {host.pid} and host.poll() is None:
+            time.sleep(LOOK_S)
         time.sleep(seconds)
         children = processes_of(f"TMPDIR={directory}") - {host.pid}
         host.kill()
