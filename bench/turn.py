@@ -32,6 +32,7 @@ from bench.original import step_s
 from khala import games
 from khala.children import Children
 from khala.local import one_side, shares
+from khala.local_bus import LOOPBACK, local_endpoint
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
 from khala_bridge.state.teams import Team, TeamRoster
@@ -225,7 +226,7 @@ async def battle(task: TaskConfig) -> Snapshot:
     return snapshot
 
 
-async def measure(agents: list[int], steps: int, original_steps: int) -> list[Measured]:
+async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool) -> list[Measured]:
     """Measure every number of agents, ours and the original's way."""
     task = load_task("2s3z")
     snapshot = await battle(task)
@@ -234,7 +235,8 @@ async def measure(agents: list[int], steps: int, original_steps: int) -> list[Me
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         children = await stack.enter_async_context(Children(logs))
         llm = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S))
-        bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+        endpoint = LOOPBACK if tcp else stack.enter_context(local_endpoint())
+        bus = await open_bus(BusConfig(mode="router", listen=(endpoint,)))
         stack.push_async_callback(bus.close)
         options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
         for count in agents:
@@ -263,9 +265,10 @@ def main() -> None:
     parser.add_argument("--agents", type=int, nargs="+", default=list(GOALS_MS))
     parser.add_argument("--steps", type=int, default=10)
     parser.add_argument("--original-steps", type=int, default=8)
+    parser.add_argument("--tcp", action="store_true", help="over loopback TCP instead of a unix socket")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
-    measured = asyncio.run(measure(arguments.agents, arguments.steps, arguments.original_steps))
+    measured = asyncio.run(measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp))
     rows = [one.row(LATENCY_S) for one in measured]
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:

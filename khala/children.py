@@ -1,7 +1,8 @@
-"""The processes that a match on one machine needs next to its host: started, watched, and ended with it.
+"""The processes that a match on one machine needs next to its host: started, watched, started again, ended with it.
 
-Each child leads its own session, so that Ctrl-C reaches the host alone, which ends the others in order. The output of
-a child goes to its log file; its last lines are quoted when it ends too early.
+Each child leads its own session, so that Ctrl-C reaches the host alone, which ends the others in order; if the host is
+killed, they end by themselves (`khala_protocol.parent_watch`). The output of a child goes to its log file; its last
+lines are quoted when it ends too early.
 """
 
 from __future__ import annotations
@@ -9,21 +10,31 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import signal
 import subprocess
 import sys
 from collections import deque
 from typing import TYPE_CHECKING, Any, Self
 
+from khala import environment
 from khala_protocol.errors import KhalaError
+from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
     from types import TracebackType
+
+log = logging.getLogger(__name__)
 
 END_S = 3.0
 """Time that a child gets to end after SIGTERM."""
 QUOTED_LINES = 3
+PAUSES_S = (0.2, 1.0, 5.0)
+"""Before each new start of a child that failed; after the last one, a failure is for good."""
+STEADY_S = 60.0
+"""A child that ran for so long has recovered: its failures are counted from the beginning again."""
 
 
 class ChildDied(KhalaError):
@@ -35,7 +46,7 @@ class Children:
 
     def __init__(self, logs: Path) -> None:
         self._logs = logs
-        self._processes: dict[str, asyncio.subprocess.Process] = {}
+        self._children: dict[str, _Child] = {}
 
     async def __aenter__(self) -> Self:
         return self
@@ -43,75 +54,126 @@ class Children:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for process in self._processes.values():
-            with contextlib.suppress(ProcessLookupError):
-                process.send_signal(signal.SIGTERM)
-        await asyncio.gather(*(_ended(process) for process in self._processes.values()))
+        await asyncio.gather(*(child.end() for child in self._children.values()))
 
-    async def start(self, name: str, *arguments: str) -> None:
-        """Start `khala <arguments>`; `name` is that of its log."""
-        await self._start(name, arguments, subprocess.DEVNULL)
+    async def start(self, name: str, *arguments: str, environ: Mapping[str, str] | None = None) -> None:
+        """Start `khala <arguments>`.
+
+        Args:
+            name: of the child and of its log.
+            arguments: of the command.
+            environ: its environment; None for one without keys.
+        """
+        await self._add(name, arguments, environ).start()
 
     async def start_ready(self, name: str, *arguments: str, within_s: float = 30.0) -> Any:
-        """Start `khala <arguments>`, and return its first line on stdout, read as JSON.
+        """Start `khala <arguments>` without keys, and return its first line on stdout, read as JSON.
 
         Raises:
             ChildDied: it ended, or printed nothing in time.
         """
-        process = await self._start(name, arguments, subprocess.PIPE)
+        child = self._add(name, arguments, None)
+        process = await child.start(subprocess.PIPE)
         assert process.stdout is not None
         try:
             async with asyncio.timeout(within_s):
                 line = await process.stdout.readline()
         except TimeoutError:
-            raise ChildDied(f"`khala {arguments[0]}` was not ready within {within_s:g} s{self._quote(name)}") from None
+            raise ChildDied(f"`khala {arguments[0]}` was not ready within {within_s:g} s{child.quote()}") from None
         if not line:
-            raise ChildDied(f"`khala {arguments[0]}` did not start{self._quote(name)}")
+            raise ChildDied(f"`khala {arguments[0]}` did not start{child.quote()}")
         return json.loads(line)
 
-    async def first_failure(self) -> ChildDied:
-        """Wait until a child ends with an error, and return that error; wait for ever if none does."""
-        failed: asyncio.Future[ChildDied] = asyncio.get_running_loop().create_future()
+    def start_again_with(self, name: str, *arguments: str) -> None:
+        """Have a child that fails started again with other arguments, such as the port that it got."""
+        self._children[name].arguments = arguments
 
-        async def follow(name: str, process: asyncio.subprocess.Process) -> None:
-            if (code := await process.wait()) and not failed.done():
-                failed.set_result(ChildDied(f"process {name} ended with code {code}{self._quote(name)}"))
+    async def keep(self, begun: asyncio.Event) -> None:
+        """Start a child again that fails once `begun` is set; return when all have ended without an error.
 
-        follows = [asyncio.create_task(follow(name, process)) for name, process in self._processes.items()]
-        try:
-            return await failed
-        finally:
-            for task in follows:
-                task.cancel()
+        Raises:
+            ChildDied: one failed before, or again and again.
+        """
+        await asyncio.gather(*(child.keep(begun) for child in self._children.values()))
 
-    async def _start(self, name: str, arguments: tuple[str, ...], stdout: int) -> asyncio.subprocess.Process:
-        with self._log(name).open("ab") as log:
-            process = await asyncio.create_subprocess_exec(
+    def _add(self, name: str, arguments: tuple[str, ...], environ: Mapping[str, str] | None) -> _Child:
+        environ = environment.plain() if environ is None else environ
+        child = _Child(name, arguments, {**environ, **named_parent()}, self._logs / f"{name}.log")
+        self._children[name] = child
+        return child
+
+
+class _Child:
+    """One process, and what it takes to start it again."""
+
+    def __init__(self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path) -> None:
+        self.arguments = arguments
+        self._name = name
+        self._environ = environ
+        self._log = log
+        self._process: asyncio.subprocess.Process | None = None
+        self._started_s = 0.0
+        self._begins_at = 0
+        self._failures = 0
+
+    async def start(self, stdout: int = subprocess.DEVNULL) -> asyncio.subprocess.Process:
+        """Start the process."""
+        self._log.touch(0o600)
+        with self._log.open("ab") as log:
+            self._begins_at = log.tell()
+            self._started_s = asyncio.get_running_loop().time()
+            self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
                 "khala",
-                *arguments,
+                *self.arguments,
                 stdin=subprocess.DEVNULL,
                 stdout=stdout,
                 stderr=log,
+                env=self._environ,
                 start_new_session=True,
             )
-        self._processes[name] = process
-        return process
+        return self._process
 
-    def _log(self, name: str) -> Path:
-        return self._logs / f"{name}.log"
+    async def keep(self, begun: asyncio.Event) -> None:
+        """Start the process again when it fails, see `Children.keep`."""
+        while self._process and (code := await self._process.wait()):
+            failure = f"process {self._name} ended with code {code}{self.quote()}"
+            pause_s = self._pause_s()
+            if pause_s is None or not begun.is_set():
+                raise ChildDied(failure)
+            log.warning("%s; it is started again", failure)
+            await asyncio.sleep(pause_s)
+            self._note(f"started again, {self._failures} of {len(PAUSES_S)} times: it had ended with code {code}")
+            await self.start()
 
-    def _quote(self, name: str) -> str:
-        with self._log(name).open(encoding="utf-8", errors="replace") as log:
-            last = deque((line.strip() for line in log if line.strip()), QUOTED_LINES)
-        return f": {' / '.join(last)}" if last else f"; see {self._log(name)}"
+    async def end(self) -> None:
+        """End the process in order, or kill it."""
+        if self._process is None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            self._process.send_signal(signal.SIGTERM)
+        try:
+            async with asyncio.timeout(END_S):
+                await self._process.wait()
+        except TimeoutError:
+            self._process.kill()
+            await self._process.wait()
 
+    def quote(self) -> str:
+        """Return the last lines that the process wrote, to be appended to what happened."""
+        with self._log.open("rb") as log:
+            log.seek(self._begins_at)
+            lines = (line.decode(errors="replace").strip() for line in log)
+            last = deque(filter(None, lines), QUOTED_LINES)
+        return f": {' / '.join(last)}" if last else f"; see {self._log}"
 
-async def _ended(process: asyncio.subprocess.Process) -> None:
-    try:
-        async with asyncio.timeout(END_S):
-            await process.wait()
-    except TimeoutError:
-        process.kill()
-        await process.wait()
+    def _pause_s(self) -> float | None:
+        """Count a failure; return the pause before the next start, or None if there is none any more."""
+        ran_s = asyncio.get_running_loop().time() - self._started_s
+        self._failures = 1 if ran_s > STEADY_S else self._failures + 1
+        return PAUSES_S[self._failures - 1] if self._failures <= len(PAUSES_S) else None
+
+    def _note(self, text: str) -> None:
+        with self._log.open("a", encoding="utf-8") as log:
+            log.write(f"{text}\n")

@@ -5,6 +5,7 @@ import itertools
 import json
 import logging
 import os
+import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
@@ -33,8 +34,8 @@ from khala_protocol.keys import check_name
 from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells expect it."""
+SIGNALLED = 128
+"""Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
 NOT_VALID = 3
 """Exit code after a match with an episode that says nothing about its agents."""
 
@@ -231,7 +232,7 @@ def front_door(
 ) -> None:
     """Set up logging before any command."""
     logging.basicConfig(
-        level=logging.INFO if verbose else logging.ERROR,
+        level=logging.INFO if verbose else logging.WARNING,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
         stream=sys.stderr,
     )
@@ -291,9 +292,9 @@ def _until_interrupted(
     screen = stderr_console()
     with Progress(screen, config.task.max_steps) as progress:
         results = asyncio.run(cancelled_by_signal(play(progress)))
-    if results is None:
+    if isinstance(results, signal.Signals):
         screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(SIGNALLED + results)
     screen.print(f"recorded: `khala replay {config.record}` tells it", soft_wrap=True)
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
-from khala import games
+from khala import environment, games
 from khala.children import Children
+from khala.local_bus import local_endpoint
 from khala_agents.build import Workshop
-from khala_agents.config import WorkerSpec
+from khala_agents.config import WorkerSpec, load_model
 from khala_bridge.act import executor_of
 from khala_bridge.game.game import GameConfig, GameThread, Sides
 from khala_bridge.game.pysc2_game import PySC2Game
@@ -23,6 +26,7 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import Report
+from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
@@ -62,6 +66,11 @@ class Minds:
         Workshop(budget_usd=self.budget_usd, overrides=overrides).policy(spec)
 
     @property
+    def environ(self) -> dict[str, str]:
+        """The environment of the agents: all of ours for a policy, which is code of the user."""
+        return dict(os.environ) if self.policy else environment.with_model(load_model(self.model))
+
+    @property
     def needs_endpoint(self) -> bool:
         """Whether the scripted endpoint is needed."""
         return self.policy is None and self.base_url is None and self.model == SCRIPTED
@@ -85,16 +94,19 @@ async def play(
     minds.check()
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
-        bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+        bus = await open_bus(BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),)))
         stack.push_async_callback(bus.close)
         children = await stack.enter_async_context(Children(directory))
-        await _start_agents(children, config, minds, bus)
+        started = await _start_agents(children, config, minds, bus)
         side = await stack.enter_async_context(one_side(config, sc2path))
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
             if isinstance(message, Report):
                 begun.set()
+                for share in started:
+                    share.spend(message)
+                    children.start_again_with(share.process, *share.arguments)
             watch(message)
 
         return await _unless_one_dies(host(config, side, bus, watch=see), children, begun)
@@ -117,7 +129,12 @@ def one_side(config: MatchConfig, sc2path: Path) -> Sides:
     task = config.task
     sides = task.per_side()
     started = GameConfig(
-        sc2path=sc2path, map=task.map_spec, players=2 if task.sides else 1, seed=config.seed, render_px=task.render_px
+        sc2path=sc2path,
+        map=task.map_spec,
+        players=len(sides),
+        seed=config.seed,
+        render_px=task.render_px,
+        environment=environment.plain() | named_parent(),
     )
     return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(side) for side in sides])
 
@@ -127,43 +144,70 @@ def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[s
     return [list(agents[first::processes]) for first in range(min(processes, len(agents)))]
 
 
-async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> None:
-    base_url = minds.base_url
-    if minds.needs_endpoint:
-        ready = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(minds.latency_s))
-        base_url = ready["base_url"]
+@dataclass(slots=True)
+class _Share:
+    """The agents of one process, and what they may still spend, also after the process was started again."""
+
+    process: str
+    names: list[str]
+    options: list[str]
+    left_usd: float | None
+
+    @property
+    def arguments(self) -> list[str]:
+        """The command line of the process."""
+        budget = [] if self.left_usd is None else ["--budget-usd", str(max(self.left_usd, 0.0))]
+        return ["agent", *self.names, *self.options, *budget]
+
+    def spend(self, report: Report) -> None:
+        """Take off what a step has cost."""
+        if self.left_usd is not None:
+            self.left_usd -= sum(a.usage.cost_usd or 0.0 for a in report.agents if a.agent in self.names)
+
+
+async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> list[_Share]:
+    base_url = await start_endpoint(children, minds.latency_s) if minds.needs_endpoint else minds.base_url
     options = ["--run", config.run, "--side", config.task.side, "--connect", bus.endpoints[0]]
     options += ["--policy", minds.policy] if minds.policy else ["--model", minds.model]
     for option, value in (("--base-url", base_url), ("--model-name", minds.model_name)):
         options += [option, value] if value and not minds.policy else []
     groups = shares([agent.name for agent in config.task.agents])
-    for number, names in enumerate(groups):
-        budget = ["--budget-usd", str(minds.budget_usd / len(groups))] if minds.budget_usd is not None else []
-        await children.start(f"agents-{number}", "agent", *names, *options, *budget)
+    each_usd = None if minds.budget_usd is None else minds.budget_usd / len(groups)
+    started = [_Share(f"agents-{number}", names, options, each_usd) for number, names in enumerate(groups)]
+    for share in started:
+        await children.start(share.process, *share.arguments, environ=minds.environ)
+    return started
+
+
+async def start_endpoint(children: Children, latency_s: float) -> str:
+    """Start the scripted model, and return its address, which it keeps if it has to be started again."""
+    options = ("--json", "--latency", str(latency_s))
+    ready = await children.start_ready("llm", "llm", "--port", "0", *options)
+    base_url = str(ready["base_url"])
+    children.start_again_with("llm", "llm", "--port", str(urlsplit(base_url).port), *options)
+    return base_url
 
 
 async def _unless_one_dies(
     match: Coroutine[Any, Any, list[Result]], children: Children, begun: asyncio.Event
 ) -> list[Result]:
-    """Return the results of the match. A child's failure before the first step ends it; the match handles others."""
-    playing = asyncio.create_task(match)
-    failing = asyncio.create_task(children.first_failure())
-    beginning = asyncio.create_task(begun.wait())
+    """Return the results of the match. A child that fails before the first step, or for good, ends it."""
+    playing, keeping = asyncio.create_task(match), asyncio.create_task(children.keep(begun))
     try:
-        await asyncio.wait({playing, failing, beginning}, return_when=asyncio.FIRST_COMPLETED)
-        if failing.done() and not begun.is_set() and not playing.done():
-            raise failing.result()
+        await asyncio.wait({playing, keeping}, return_when=asyncio.FIRST_COMPLETED)
+        if not playing.done():
+            await keeping
         return await playing
     finally:
-        for task in (playing, failing, beginning):
+        for task in (playing, keeping):
             task.cancel()
-        await asyncio.wait({playing, failing, beginning})
+        await asyncio.wait({playing, keeping})
 
 
 def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
     """Return the match with the name of its game, and the path of the game; create the directory."""
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{directory} cannot be made: {error.strerror}; --out names another place") from None
     sc2path, name = games.find(game)

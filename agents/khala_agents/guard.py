@@ -98,7 +98,7 @@ class Guard:
         if not task.done():
             task.cancel()
             self._abandoned.add(task)
-            task.add_done_callback(self._forget)
+        task.add_done_callback(self._forget)  # also if it failed in the moment in which it was cancelled
 
     def _forget(self, task: asyncio.Task[Said]) -> None:
         self._abandoned.discard(task)

@@ -23,7 +23,7 @@ def page() -> str:
     )
     sections = (_section(path, command) for path, command in found)
     intro = "Every command says the same with `--help`. Exit codes: 0, 1 with one sentence on stderr, 2 for a wrong "
-    intro += "command line, 130 after Ctrl-C."
+    intro += "command line, 130 after Ctrl-C, 143 after SIGTERM."
     return join(head("Command line", "the help of the commands"), intro, contents, *sections)
 
 

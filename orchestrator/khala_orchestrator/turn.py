@@ -204,7 +204,7 @@ class Turn:
             return
         if seat in self._required:
             asked.held, asked.until = True, asyncio.get_running_loop().time() + self._grace_s
-            log.error("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
+            log.warning("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
         elif not self._roster.present(seat):
             asked.waiting = False
         self._changed.set()
@@ -217,7 +217,7 @@ class Turn:
         if asked.held:
             asked.held, asked.until = False, None
             asked.wait_until_answered(asyncio.get_running_loop().time())
-            log.error("required agent %s is back", seat)
+            log.warning("required agent %s is back", seat)
             self._changed.set()
         await self._publishers[seat].put(asked.payload)
 

@@ -31,20 +31,20 @@ def stop_on_signal() -> asyncio.Event:
     return stop
 
 
-async def cancelled_by_signal(work: Coroutine[Any, Any, T]) -> T | None:
-    """Return the result of `work`, or None if a signal cancelled it."""
+async def cancelled_by_signal(work: Coroutine[Any, Any, T]) -> T | signal.Signals:
+    """Return the result of `work`, or the first signal if one cancelled it."""
     task = asyncio.ensure_future(work)
-    signalled = asyncio.Event()
+    came: list[signal.Signals] = []
 
-    def end() -> None:
-        signalled.set()
+    def end(number: signal.Signals) -> None:
+        came.append(number)
         task.cancel()
 
     for number in SIGNALS:
-        asyncio.get_running_loop().add_signal_handler(number, end)
+        asyncio.get_running_loop().add_signal_handler(number, end, number)
     try:
         return await task
     except asyncio.CancelledError:
-        if signalled.is_set():
-            return None
+        if came:
+            return came[0]
         raise

@@ -78,6 +78,9 @@ def main(argv: list[str] | None = None) -> None:
         sock = listen(arguments.host, arguments.port)
     except (OSError, OverflowError) as error:
         sys.exit(f"StarCraft II simulator: cannot listen on {arguments.host}:{arguments.port}: {error}")
+    from khala_simulator.process.parent_watch import end_with_parent  # noqa: PLC0415  # after the socket listens
+
+    end_with_parent()
     from khala_simulator.process.server import run  # noqa: PLC0415  # after the socket listens, see above
 
     run(

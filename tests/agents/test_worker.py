@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala_agents.guard import Guard
 from khala_agents.llm.client import LLMError, RequestRefused
 from khala_agents.llm.limits import Budget, Limits
 from khala_agents.llm.pricing import Prices
@@ -261,6 +263,24 @@ async def test_a_newer_observation_supersedes_the_one_that_is_being_decided(
     assert reply.step == 1
     assert policy.cancelled == [0]
     assert (await players.end()).superseded == 1
+
+
+async def test_a_decision_that_fails_in_the_moment_in_which_it_is_superseded_is_not_reported_by_asyncio() -> None:
+    async def decide() -> Said:
+        raise ValueError("too late")
+
+    reported: list[dict[str, Any]] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: reported.append(context))
+    answering = asyncio.create_task(Guard(AGENT).within(None, decide()))
+    await asyncio.sleep(0)  # it waits for the decision,
+    await asyncio.sleep(0)  # which fails,
+    answering.cancel()  # and is cancelled before it can look
+    with pytest.raises(asyncio.CancelledError):
+        await answering
+    del answering
+    await asyncio.sleep(0)
+    gc.collect()
+    assert reported == []
 
 
 # --- policies that fail -----------------------------------------------------------------------------------

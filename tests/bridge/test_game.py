@@ -14,7 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.act import JointAction, PlanStep, Played
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
-from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Sides, StepResult, find_sc2
+from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Patience, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.task.maps import known_maps
@@ -33,7 +33,7 @@ class FakeGame:
 
     def __init__(self, snapshot: Callable[..., Snapshot], *, hangs: bool = False) -> None:
         self._snapshot = snapshot
-        self._hangs = hangs
+        self.hangs = hangs
         self._killed = threading.Event()
         self._loop = 0
         self.calls: list[str] = []
@@ -50,7 +50,7 @@ class FakeGame:
 
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         self._note("act")
-        if self._hangs:
+        if self.hangs:
             self._killed.wait()
             raise GameError("the game died")
         (plan,) = plans
@@ -93,9 +93,29 @@ async def test_the_game_has_a_thread_of_its_own(snapshot: Callable[..., Snapshot
     assert threading.get_ident() not in fake.threads
 
 
+@pytest.mark.parametrize(
+    ("slowest_s", "limit_s"), [(None, 120), (0.001, 10), (0.5, 10), (1, 20), (3, 60), (6, 120), (60, 120)]
+)
+def test_the_limit_for_a_step_suits_what_the_game_has_shown(slowest_s: float | None, limit_s: float) -> None:
+    assert Patience().limit_s(slowest_s) == limit_s
+
+
+async def test_a_game_that_has_played_is_given_less_time_to_answer(
+    snapshot: Callable[..., Snapshot], caplog: pytest.LogCaptureFixture
+) -> None:
+    fake = FakeGame(snapshot)
+    async with GameThread(lambda: fake, patience=Patience(least_s=0.2, times_slowest=0, remark_s=0.1)) as game:
+        await game.act([RawExecutor().plan([], snapshot([]), 8)])
+        assert caplog.messages == []
+        fake.hangs = True
+        with pytest.raises(GameHangs, match=r"within 0.2 s"):
+            await game.act([RawExecutor().plan([], snapshot([]), 8)])
+    assert caplog.messages == ["the game has not answered for 0.1 s"]
+
+
 async def test_a_game_that_hangs_is_killed_and_named(snapshot: Callable[..., Snapshot]) -> None:
     fake = FakeGame(snapshot, hangs=True)
-    async with GameThread(lambda: fake, hang_s=0.05) as game:
+    async with GameThread(lambda: fake, patience=Patience(unknown_s=0.05)) as game:
         with pytest.raises(GameHangs, match=r"^the game did not answer within 0.05 s and was ended; try again"):
             await game.act([RawExecutor().plan([], snapshot([]), 8)])
     assert fake.calls == ["act", "kill", "close"]

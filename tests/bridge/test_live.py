@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 from typing import TYPE_CHECKING
 
 import pytest
 
 from khala_bridge.act import Actor, executor_of
-from khala_bridge.errors import GameError
-from khala_bridge.game.game import GameConfig, StepResult
+from khala_bridge.errors import GameError, GameHangs
+from khala_bridge.game.game import GameConfig, GameThread, OneSide, Patience, StepResult
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer
 from khala_bridge.task.maps import known_maps
@@ -178,3 +180,28 @@ def test_a_game_that_dies_is_an_error_and_can_be_closed(start: Play) -> None:
         battle.turn(lambda _: "")
     battle.game.close()
     battle.game.close()
+
+
+@pytest.mark.slow
+async def test_a_stopped_game_is_noticed_killed_and_named(
+    sc2path: Path, task: Callable[..., TaskConfig], caplog: pytest.LogCaptureFixture
+) -> None:
+    games: list[PySC2Game] = []
+
+    def begin() -> PySC2Game:
+        games.append(PySC2Game(GameConfig(sc2path=sc2path, map=task("2s3z").map_spec, seed=3)))
+        return games[0]
+
+    thread = GameThread(begin, patience=Patience(least_s=4.0))
+    async with OneSide(thread, executor_of(task("2s3z")), step_loops=11) as side:
+        await side.reset()
+        for _ in range(3):
+            await side.act([])
+        (process,) = games[0]._env._sc2_procs
+        pid = process.pid
+        os.kill(pid, signal.SIGSTOP)
+        with pytest.raises(GameHangs, match=r"^the game did not answer within \d[.\d]* s and was ended"):
+            await side.act([])
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+    assert caplog.messages[0] == "the game has not answered for 2 s"

@@ -189,7 +189,12 @@ def test_an_agent_that_cannot_begin_ends_the_match_with_its_own_words(tmp_path: 
 
 
 @pytest.mark.game
-def test_ctrl_c_ends_everything_and_leaves_a_readable_recording(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("sent", "code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
+)
+def test_a_signal_ends_everything_and_leaves_a_readable_recording(
+    tmp_path: Path, sent: signal.Signals, code: int
+) -> None:
     command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.05", "--run", "cut"]
     environ = os.environ | {"KHALA_CACHE": str(tmp_path / "cache")}
     with subprocess.Popen(command, cwd=tmp_path, env=environ, stderr=subprocess.PIPE, text=True) as process:
@@ -197,12 +202,14 @@ def test_ctrl_c_ends_everything_and_leaves_a_readable_recording(tmp_path: Path) 
         for line in process.stderr:
             if line.startswith("step 0"):
                 break
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         rest = process.stderr.read()
-        assert process.wait(30) == 130
+        assert process.wait(30) == code
     assert "interrupted" in rest
     assert "Traceback" not in rest
-    assert list(Recording.open(tmp_path / "runs" / "cut" / "recording.mcap").of(Report))
+    recording = tmp_path / "runs" / "cut" / "recording.mcap"
+    assert list(Recording.open(recording).of(Report))
+    assert [path.stat().st_mode & 0o777 for path in (recording, recording.parent)] == [0o600, 0o700]
     assert _processes_of("cut") == []
 
 

@@ -237,7 +237,7 @@ def start() -> Callable[[StillGame], Awaitable[Sides]]:
     """Starts a game in the loop's own thread."""
 
     async def started(game: StillGame) -> Sides:
-        thread = GameThread(lambda: game, hang_s=None)
+        thread = GameThread(lambda: game)
         thread._threads = _Here()
         return await Sides(thread, [RawExecutor()]).__aenter__()
 

@@ -13,11 +13,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import logging
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeVar
+
+from pydantic import Field
 
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
     from khala_bridge.act import Command, Executor
     from khala_bridge.act.plan import Plan, Played
     from khala_bridge.state import Snapshot
+
+log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -56,6 +61,8 @@ class GameConfig(Frozen):
     """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
     start_timeout_s: int = 120
     """Time limit until the game listens."""
+    environment: dict[str, str] | None = Field(default=None, repr=False)
+    """Environment of the game's process; None: ours, with all that is in it."""
 
     @property
     def camera_width(self) -> float:
@@ -104,21 +111,45 @@ class Game(Protocol):
         """End the game in good order; may be called twice."""
 
 
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long a game may take to answer before it is taken to hang; what it has shown so far decides."""
+
+    unknown_s: float = 120.0
+    """To load a map, and to play for the first time; the longest limit at all."""
+    least_s: float = 10.0
+    times_slowest: float = 20.0
+    """Times the slowest step so far; steps grow with the armies, 3.5-fold in the first 177 on Simple64."""
+    remark_s: float = 2.0
+    """When a log line says that a step takes long, unless steps of half that time are usual here."""
+
+    def limit_s(self, slowest_s: float | None) -> float:
+        """Return the limit for a step of a game whose slowest one took so long; None if there was none."""
+        if slowest_s is None:
+            return self.unknown_s
+        return min(self.unknown_s, max(self.least_s, self.times_slowest * slowest_s))
+
+    def remark_after_s(self, slowest_s: float | None) -> float:
+        """Return after which time to remark on a step."""
+        return max(self.remark_s, 2 * (slowest_s or 0.0))
+
+
 class GameThread:
     """A game in a thread of its own; an async context manager.
 
     Entering it starts the game, leaving it closes the game. The calls are not reentrant: one at a time.
     """
 
-    def __init__(self, start: Callable[[], Game], *, hang_s: float | None = 120.0) -> None:
+    def __init__(self, start: Callable[[], Game], *, patience: Patience | None = None) -> None:
         """Prepare a game without starting it.
 
         Args:
             start: makes the game; runs in the thread.
-            hang_s: longest time that one call may take before the game is ended and `GameHangs` is raised.
+            patience: longest time that one call may take before the game is ended and `GameHangs` is raised.
         """
         self._start = start
-        self._hang_s = hang_s
+        self._patience = patience or Patience()
+        self._slowest_s: float | None = None
         self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")
         self._game: Game | None = None
 
@@ -137,7 +168,7 @@ class GameThread:
         """Close the game, or kill it if it does not close."""
         try:
             with contextlib.suppress(GameHangs):  # it is gone, as wanted
-                await self._run(self._playing.close)
+                await self._run(self._playing.close, self._patience.limit_s(self._slowest_s))
         finally:
             self._threads.shutdown(wait=False)
 
@@ -148,28 +179,37 @@ class GameThread:
 
     async def reset(self) -> tuple[Snapshot, ...]:
         """Begin an episode; return a snapshot for each player."""
-        return await self._run(self._playing.reset)
+        return await self._run(self._playing.reset, self._patience.unknown_s)
 
     async def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Play one plan of each player to its end, or to the end of the episode."""
-        return await self._run(functools.partial(self._playing.act, plans))
+        play = functools.partial(self._playing.act, plans)
+        loop = asyncio.get_running_loop()
+        began_s, remark_s = loop.time(), self._patience.remark_after_s(self._slowest_s)
+        remark = loop.call_later(remark_s, log.warning, "the game has not answered for %g s", remark_s)
+        try:
+            played = await self._run(play, self._patience.limit_s(self._slowest_s))
+        finally:
+            remark.cancel()
+        self._slowest_s = max(self._slowest_s or 0.0, loop.time() - began_s)
+        return played
 
     @property
     def _playing(self) -> Game:
         assert self._game is not None, "the game is entered before it is used"
         return self._game
 
-    async def _run(self, call: Callable[[], T]) -> T:
+    async def _run(self, call: Callable[[], T], limit_s: float) -> T:
         work = asyncio.get_running_loop().run_in_executor(self._threads, call)
         try:
-            async with asyncio.timeout(self._hang_s):
+            async with asyncio.timeout(limit_s):
                 return await asyncio.shield(work)
         except TimeoutError:
             self._playing.kill()
             await asyncio.wait([work])  # it fails soon: its process is gone
             work.exception()
             raise GameHangs(
-                f"the game did not answer within {self._hang_s:g} s and was ended; try again, or another game or map"
+                f"the game did not answer within {limit_s:g} s and was ended; try again, or another game or map"
             ) from None
 
 

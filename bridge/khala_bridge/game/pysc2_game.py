@@ -153,6 +153,19 @@ class PySC2Game:
         )
 
 
+class _Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
+    """`SC2Env` whose game gets an environment of its own, where PySC2 passes on ours, with every key that is in it."""
+
+    environment: dict[str, str] | None = None
+
+    def _launch_game(self) -> None:
+        if self.environment is not None:
+            ours = self._run_config.env or {}  # on Linux, with the libraries of the game
+            libraries = {name: ours[name] for name in ("LD_LIBRARY_PATH",) if name in ours}
+            self._run_config.env = self.environment | libraries
+        super()._launch_game()
+
+
 class _Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
     """A map as PySC2 takes it. The class has no file name, which keeps it out of PySC2's global table of maps."""
 
@@ -231,7 +244,8 @@ def _start(config: GameConfig) -> Any:
     if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
         flags.FLAGS.mark_as_parsed()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
-    env = object.__new__(sc2_env.SC2Env)  # kept while it starts, so that a start that fails leaves no process
+    env: Any = object.__new__(_Env)  # kept while it starts, so that a start that fails leaves no process
+    env.environment = config.environment
     try:
         with _sc2path(config.sc2path), _explained("the game could not be started"):
             env.__init__(

@@ -133,7 +133,8 @@ def _writing(path: Path) -> Iterator[None]:
 def _create(path: Path) -> IO[bytes]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("xb")
+        path.touch(0o600, exist_ok=False)  # prompts and replies are for its user alone
+        return path.open("wb")
     except FileExistsError:
         if path.is_dir():
             raise RecordingError(f"{path} is a directory: name a file in it, such as {path / 'run.mcap'}") from None

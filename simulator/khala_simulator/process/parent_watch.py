@@ -1,21 +1,42 @@
-"""Exit when the parent process is gone and no client is connected for a minute.
+"""Exit when the parent process is gone: at once if it is known to be the client, else a minute after the last client.
 
 A killed client (SIGKILL, the out-of-memory killer) does not end its game, and the next client starts another one, so
-that games would pile up. A game that was started by hand lives as long as the shell that started it, or its clients.
+that games would pile up. A parent that is the only client says so in `KHALA_PARENT`. Of any other parent nothing is
+known: a game that was started by hand lives as long as the shell that started it, or its clients.
 """
 
 from __future__ import annotations
 
 import asyncio
 import os
+import threading
+import time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+PARENT = "KHALA_PARENT"
+"""The variable with the process id of a parent without which nobody wants the game."""
+PARENT_LOOK_S = 0.25
 LOOK_S = 5.0
 PATIENCE_LOOKS = 12
 """Clients may drop a connection and open another: PySC2's remote agents do so three times."""
+
+
+def end_with_parent() -> None:
+    """End this process as soon as the parent is gone that the environment names; there is nothing to save."""
+    parent = os.environ.get(PARENT, "")
+    if parent.isdigit():
+        threading.Thread(target=_watch, args=(int(parent),), name="parent watch", daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    # A thread: in the middle of a thousand steps the event loop would look too late. The id cannot mislead: that of the
+    # process which adopts an orphan was taken while the parent lived.
+    while os.getppid() == parent:
+        time.sleep(PARENT_LOOK_S)
+    os._exit(1)
 
 
 async def orphaned(

@@ -1,0 +1,94 @@
+"""How long the processes of a match live after their host is killed, at random moments after it started the first one.
+
+    python -m bench.orphans --kills 20
+
+Every process is found by its environment, in `/proc`: Linux only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+LATEST_S = 10.0
+GIVEN_UP_S = 30.0
+LOOK_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Killed:
+    """One killed match."""
+
+    after_s: float
+    children: int
+    """Processes next to the host when it was killed."""
+    gone_s: float
+    """Until none of them was left."""
+
+
+def processes_of(mark: str) -> set[int]:
+    """Return the processes that have this text among the variables of their environment."""
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if mark.encode() in entry.read_bytes().split(b"\0"):
+                found.add(int(entry.parent.name))
+    return found
+
+
+def kill_after(seconds: float, directory: Path, cache: Path) -> Killed:
+    """Start a match of two agents, kill its host, and wait until its processes are gone."""
+    command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.1", "--episodes", "9"]
+    environ = os.environ | {"TMPDIR": str(directory), "KHALA_CACHE": str(cache)}
+    with subprocess.Popen(command, cwd=directory, env=environ, stderr=subprocess.DEVNULL) as host:
+        while not processes_of(f"TMPDIR={directory}") - {host.pid} and host.poll() is None:
+            time.sleep(LOOK_S)
+        time.sleep(seconds)
+        children = processes_of(f"TMPDIR={directory}") - {host.pid}
+        host.kill()
+        began_s = time.monotonic()
+    while processes_of(f"TMPDIR={directory}") and time.monotonic() - began_s < GIVEN_UP_S:
+        time.sleep(LOOK_S)
+    return Killed(seconds, len(children), time.monotonic() - began_s)
+
+
+def measure(kills: int, seed: int) -> list[Killed]:
+    """Kill as many matches, one after the other."""
+    moments = random.Random(seed)
+    found = []
+    with tempfile.TemporaryDirectory() as cache:
+        for _ in range(kills):
+            with tempfile.TemporaryDirectory() as directory:
+                found.append(kill_after(moments.uniform(0.0, LATEST_S), Path(directory), Path(cache)))
+    return found
+
+
+def main() -> None:
+    """Measure, and print each kill and the summary, or a JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    arguments = parser.parse_args()
+    found = measure(arguments.kills, arguments.seed)
+    gone_s = [killed.gone_s for killed in found]
+    if arguments.json:
+        print(json.dumps({"gone_s": gone_s, "after_s": [killed.after_s for killed in found]}))
+        return
+    for killed in found:
+        print(f"killed after {killed.after_s:5.2f} s: {killed.children} children, gone after {killed.gone_s:.2f} s")
+    print(f"{len(found)} kills: median {statistics.median(gone_s):.2f} s, longest {max(gone_s):.2f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,46 @@
+"""End a process as soon as the one that started it is gone, however that ended: SIGKILL leaves no time to say so.
+
+A parent names itself in the environment of the processes that must not outlive it. A process that was started by hand
+finds no such name, and lives as long as it likes. The simulator, which stands alone, reads the same variable.
+
+Above: `python -m khala`, as which `khala run` starts its processes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from typing import Final
+
+PARENT: Final = "KHALA_PARENT"
+"""The variable with the process id of the parent."""
+LOOK_S = 0.25
+UNWIND_S = 1.0
+"""Time to end in order; a process that is too busy for it ends anyway."""
+
+
+def named_parent() -> dict[str, str]:
+    """Return what a process adds to the environment of one that must not outlive it."""
+    return {PARENT: str(os.getpid())}
+
+
+def end_with_parent() -> None:
+    """End this process soon after its parent, if the environment names one.
+
+    The name is taken out of the environment: processes that this one starts have another parent.
+    """
+    parent = os.environ.pop(PARENT, "")
+    if parent.isdigit():
+        threading.Thread(target=_watch, args=(int(parent),), name="parent watch", daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    # Not a task of the loop, which code of the user may block. The id cannot mislead: that of the process which adopts
+    # an orphan was taken while the parent lived.
+    while os.getppid() == parent:
+        time.sleep(LOOK_S)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(UNWIND_S)
+    os._exit(1)
