@@ -19,7 +19,7 @@ from khala_bridge.catalogue.catalogue import alias_of, catalogue, chosen
 from khala_bridge.knowledge import knowledge
 from khala_bridge.knowledge.forms import forms_of
 from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
-from khala_bridge.task.maps import Difficulty, MapSpec, Race, known_maps
+from khala_bridge.task.maps import MOST_LOOPS, Difficulty, MapSpec, Race, known_maps
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 T = TypeVar("T")
+
+MOST_ACTIONS = 1000
+"""Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
 AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
@@ -169,7 +172,7 @@ class AgentConfig(Frozen):
     group that the type has. A form (sieged, burrowed, …) that is not listed has the actions of its type."""
     task: str = ""
     """Its task in addition to the task of all."""
-    max_actions: int | None = Field(default=None, ge=1)
+    max_actions: int | None = Field(default=None, ge=1, le=MOST_ACTIONS)
     """Limit of actions for one of its teams in one reply; None for the task's limit."""
     required: bool = True
     """Whether the match waits for it at the start."""
@@ -237,9 +240,9 @@ class TaskConfig(Frozen):
     auto: AutoConfig = AutoConfig()
     default_reply: str = ""
     """Reply of an agent that did not answer in time; empty: its units continue."""
-    max_actions: int = Field(default=3, ge=1)
+    max_actions: int = Field(default=3, ge=1, le=MOST_ACTIONS)
     """Limit of actions for one team in one reply."""
-    max_steps: int | None = Field(default=None, ge=1)
+    max_steps: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Decisions after which an episode ends without a result; None: the map decides."""
 
     @field_validator("clock")
