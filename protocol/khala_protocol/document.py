@@ -193,11 +193,10 @@ class _Composer:
         self._nodes += 1
         if fault := self._fault(event, depth):
             raise ConfigError(fault, source=self._source, line=event.start_mark.line + 1)
-        match event:
-            case yaml.AliasEvent():
-                return self._anchors[event.anchor]
-            case yaml.ScalarEvent():
-                return self._scalar(event)
+        if isinstance(event, yaml.AliasEvent):
+            return self._anchors[str(event.anchor)]
+        if isinstance(event, yaml.ScalarEvent):
+            return self._scalar(event)
         return self._collection(event, depth)
 
     def _fault(self, event: Any, depth: int) -> str:
