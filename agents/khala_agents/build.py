@@ -7,14 +7,17 @@ agents share the budget. Each agent has its own client, and so its own connectio
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import sys
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
+from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.limits import Budget, Limits
 from khala_agents.llm.openai_compatible import OpenAICompatible
@@ -36,6 +39,9 @@ if TYPE_CHECKING:
     from khala_protocol.messages import ModelCall
 
 
+log = logging.getLogger(__name__)
+
+
 def client_for(config: ModelConfig) -> LLMClient:
     """Return a client for one agent.
 
@@ -43,6 +49,11 @@ def client_for(config: ModelConfig) -> LLMClient:
         ConfigError: the key that the model file names is missing.
     """
     key = read_key(config.api_key_env) if config.api_key_env else None
+    if key is not None and sends_openly(config.base_url):
+        _warn_once(
+            f"the key in {config.api_key_env} goes to {config.base_url} unencrypted: everyone on the way can read it; "
+            "use https://"
+        )
     if config.profile == "anthropic":
         return Anthropic(
             model=config.model,
@@ -65,6 +76,11 @@ def client_for(config: ModelConfig) -> LLMClient:
         extra=config.extra,
         detail=config.images.detail if config.images else "auto",
     )
+
+
+@cache
+def _warn_once(sentence: str) -> None:
+    log.error("%s", sentence)  # the level that is shown without -v
 
 
 class Workshop:
