@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING
 from pydantic import ValidationError
 
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
+from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.limits import Budget, Limits
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.profiles import PROFILES
@@ -28,7 +30,8 @@ from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import LastSteps
 from khala_agents.policy import Policy, as_policy
-from khala_agents.scripted.policies import Silent
+from khala_agents.scripted.players import PLAYERS
+from khala_agents.scripted.policies import Player, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
 
@@ -97,6 +100,7 @@ class Workshop:
         self._budget = Budget(budget_usd, source="the budget of this process")
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+        self._breakers: dict[str, Breaker] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
         """Return the policy of one agent.
@@ -108,14 +112,16 @@ class Workshop:
             return load_policy(spec.policy)
         assert spec.model is not None
         config, limits = self._model(spec.model)
-        return LLMPolicy(
+        model = LLMPolicy(
             client_for(config),
             memory=LastSteps(spec.memory) if spec.memory else None,
             retry=config.retry,
             limits=limits,
             try_timeout_s=config.try_timeout_s,
             vision=config.vision,
+            breaker=self._breakers.setdefault(config.base_url, Breaker(config.base_url, config.breaker)),
         )
+        return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
         if name not in self._models:
@@ -169,7 +175,7 @@ def _vision_of(exchanges: Iterable[ModelCall]) -> Vision | None:
 
 
 def load_policy(name: str) -> Policy:
-    """Return the policy called `silent`, or the function, class or policy at `module:name`.
+    """Return the scripted player of this name, or the function, class or policy at `module:name`.
 
     Modules are also looked for in the current directory.
 
@@ -178,9 +184,11 @@ def load_policy(name: str) -> Policy:
     """
     if name == "silent":
         return Silent()
+    if name in PLAYERS:
+        return Player(name)
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
-        raise ConfigError(f"'{name}' is no policy: write 'silent' or module:name, such as my_agent:decide")
+        raise ConfigError(f"'{name}' is no policy: write {', '.join(PLAYERS)} or module:name, such as my_agent:decide")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
