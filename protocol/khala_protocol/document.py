@@ -16,7 +16,7 @@ Place = tuple[str | int, ...]
 """Keys and indices from the top of the document to a value."""
 
 MAX_DEPTH = 32
-MAX_VALUES = 10_000
+MAX_VALUES = 5_000
 """Values of a document, those of aliases included; the largest shipped file has some 300."""
 MAX_NUMBER_CHARACTERS = 64
 """Characters of a value that is no text; Python converts long numbers in quadratic time."""

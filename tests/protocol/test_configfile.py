@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from khala_protocol.configfile import load, loads
+from khala_protocol.configfile import UnknownName, load, loads
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -112,9 +112,27 @@ BOMBS = {
 @pytest.mark.parametrize("kind", BOMBS)
 def test_a_text_that_unfolds_to_millions_of_values_is_refused_at_once(kind: str) -> None:
     began = time.process_time()
-    with pytest.raises(ConfigError, match=r"m\.yaml:\d+: there are more than 10000 values here"):
+    with pytest.raises(ConfigError, match=r"m\.yaml:\d+: there are more than 5000 values here"):
         loads(f"a: &a {{x: 1}}\n{BOMBS[kind]}\n", Match, source="m.yaml")
     assert time.process_time() - began < 0.25
+
+
+class Named(BaseModel):
+    names: list[str]
+
+    @field_validator("names")
+    @classmethod
+    def known(cls, names: list[str]) -> list[str]:
+        raise UnknownName("unit", names[0], [f"Stalker{number}" for number in range(1000)])
+
+
+def test_the_nearest_name_is_looked_for_when_the_error_is_shown() -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads("names: [Stalkr7]", Named, source="m.yaml")
+    assert str(caught.value) == "m.yaml:1 (names): there is no unit 'Stalkr7', did you mean 'Stalker7'?"
+    with pytest.raises(ConfigError) as caught:
+        loads(f"names: [{'x' * 5000}]", Named, source="m.yaml")
+    assert str(caught.value) == f"m.yaml:1 (names): there is no unit '{'x' * 56}…"
 
 
 @pytest.mark.parametrize(("text", "code"), [("task: x\nteams: \0", "0000"), ("task: x\nteams: \x1b", "001B")])

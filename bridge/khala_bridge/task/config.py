@@ -7,7 +7,6 @@ names, so that a wrong name is an error with its line, not a surprise in the gam
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
@@ -20,12 +19,13 @@ from khala_bridge.knowledge import knowledge
 from khala_bridge.knowledge.forms import forms_of
 from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
 from khala_bridge.task.maps import MOST_LOOPS, Difficulty, MapSpec, Race, known_maps
+from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
 T = TypeVar("T")
 
@@ -43,13 +43,10 @@ def _key_name(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-def _known(name: str, known: Iterable[str], what: str) -> str:
-    names = list(known)
-    if name in names:
+def _known(name: str, known: Collection[str], what: str) -> str:
+    if name in known:
         return name
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ""
-    raise ValueError(f"there is no {what} '{name}'{hint}")
+    raise UnknownName(what, name, known)
 
 
 def _known_action(name: str) -> str:
@@ -180,6 +177,7 @@ class AgentConfig(Frozen):
     @field_validator("actions")
     @classmethod
     def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        actions = {unit_type: tuple(dict.fromkeys(names)) for unit_type, names in actions.items()}
         found = {unit_type: chosen(names, unit_type) for unit_type, names in actions.items()}
         for unit_type, names in found.items():
             if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
