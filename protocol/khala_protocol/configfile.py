@@ -145,6 +145,14 @@ def _known_place(document: Document, fault: ErrorDetails) -> Place:
     return (*place, fault["loc"][-1]) if fault["type"] == "missing" else place
 
 
+def words_of(fault: ErrorDetails) -> str:
+    """Return what a validator said, with the nearest name if a name is unknown; pydantic's words for other faults."""
+    error = fault.get("ctx", {}).get("error")
+    if not isinstance(error, ValueError):
+        return fault["msg"]
+    return str(error) + (error.hint() if isinstance(error, UnknownName) else "")
+
+
 def _sentence(fault: ErrorDetails, model: type[BaseModel]) -> str:
     context = fault.get("ctx", {})
     match fault["type"]:
@@ -155,8 +163,7 @@ def _sentence(fault: ErrorDetails, model: type[BaseModel]) -> str:
         case "literal_error" | "enum":
             return f"{shown(fault['input'])} is none of {context['expected']}"
         case "value_error":
-            error = context["error"]
-            return str(error) + (error.hint() if isinstance(error, UnknownName) else "")
+            return words_of(fault)
         case "model_type" | "model_attributes_type" | "dict_type":
             return f"fields are wanted here, not {shown(fault['input'])}"
     message = fault["msg"]
