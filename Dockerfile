@@ -8,7 +8,7 @@
 ARG PYTHON_IMAGE=python:3.12-slim
 
 FROM ${PYTHON_IMAGE} AS source
-RUN pip install --no-cache-dir --disable-pip-version-check 'uv>=0.9'
+RUN pip install --no-cache-dir --disable-pip-version-check 'uv==0.13.9'
 ENV UV_PROJECT_ENVIRONMENT=/opt/khala \
     UV_PYTHON_DOWNLOADS=never \
     UV_COMPILE_BYTECODE=1 \

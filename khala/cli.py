@@ -121,6 +121,13 @@ def run(
     policy: Annotated[
         str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
     ] = None,
+    fallback: Annotated[
+        str | None,
+        typer.Option(
+            help="Policy where the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
+            metavar="NAME",
+        ),
+    ] = None,
     budget_usd: Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")] = None,
     latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
     game: Game = "simulator",
@@ -152,7 +159,7 @@ def run(
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
-    minds = Minds(model, model_name, base_url, policy, budget_usd, latency)
+    minds = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
     _until_interrupted(config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch))
 
 

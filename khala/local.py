@@ -54,6 +54,8 @@ class Minds:
     budget_usd: float | None = None
     latency_s: float = 0.0
     """Latency of the scripted endpoint, if it is started."""
+    fallback: str | None = None
+    """Policy that decides where the model has no reply."""
 
     def check(self) -> None:
         """Check that an agent could decide this way, before anything is started.
@@ -61,7 +63,7 @@ class Minds:
         Raises:
             ConfigError: a model file, a key or a policy is missing or wrong.
         """
-        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model)
+        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
         overrides = {"model": self.model_name, "base_url": self.base_url}
         Workshop(budget_usd=self.budget_usd, overrides=overrides).policy(spec)
 
@@ -169,7 +171,11 @@ async def _start_agents(children: Children, config: MatchConfig, minds: Minds, b
     base_url = await start_endpoint(children, minds.latency_s) if minds.needs_endpoint else minds.base_url
     options = ["--run", config.run, "--side", config.task.side, "--connect", bus.endpoints[0]]
     options += ["--policy", minds.policy] if minds.policy else ["--model", minds.model]
-    for option, value in (("--base-url", base_url), ("--model-name", minds.model_name)):
+    for option, value in (
+        ("--base-url", base_url),
+        ("--model-name", minds.model_name),
+        ("--fallback", minds.fallback),
+    ):
         options += [option, value] if value and not minds.policy else []
     groups = shares([agent.name for agent in config.task.agents])
     each_usd = None if minds.budget_usd is None else minds.budget_usd / len(groups)

@@ -18,7 +18,7 @@ from khala_orchestrator.replay import recorded_config, replay
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
     from pathlib import Path
 
     from khala_protocol.recording.difference import Difference
@@ -26,17 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["replay_agents", "replay_host"]
 
 
-async def replay_host(path: Path | str, *, game: str = "simulator") -> list[Difference]:
+async def replay_host(path: Path | str, *, game: str = "simulator", modules: Collection[str] = ()) -> list[Difference]:
     """Play a recording again with its replies: the host must publish the recorded observations, byte for byte.
 
     Args:
         path: a recording.
         game: `simulator`, `starcraft2`, or a directory; only the simulator is expected to repeat itself.
+        modules: Python modules of sections that the recording may name; it imports no others.
     """
     recording = Recording.open(path)
     sc2path, _ = games.find(game)
-    async with one_side(recorded_config(recording), sc2path) as side:
-        return await replay(recording, side)
+    async with one_side(recorded_config(recording, modules=modules), sc2path) as side:
+        return await replay(recording, side, modules=modules)
 
 
 async def replay_agents(path: Path | str, policies: Mapping[str, object] | None = None) -> list[Difference]:

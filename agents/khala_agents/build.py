@@ -7,15 +7,20 @@ agents share the budget. Each agent has its own client, and so its own connectio
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import sys
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
+from khala_agents.fallback import Fallback
+from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.limits import Budget, Limits
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.profiles import PROFILES
@@ -25,7 +30,8 @@ from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import LastSteps
 from khala_agents.policy import Policy, as_policy
-from khala_agents.scripted.policies import Silent
+from khala_agents.scripted.players import PLAYERS
+from khala_agents.scripted.policies import Player, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
 
@@ -36,6 +42,9 @@ if TYPE_CHECKING:
     from khala_protocol.messages import ModelCall
 
 
+log = logging.getLogger(__name__)
+
+
 def client_for(config: ModelConfig) -> LLMClient:
     """Return a client for one agent.
 
@@ -43,6 +52,11 @@ def client_for(config: ModelConfig) -> LLMClient:
         ConfigError: the key that the model file names is missing.
     """
     key = read_key(config.api_key_env) if config.api_key_env else None
+    if key is not None and sends_openly(config.base_url):
+        _warn_once(
+            f"the key in {config.api_key_env} goes to {config.base_url} unencrypted: everyone on the way can read it; "
+            "use https://"
+        )
     if config.profile == "anthropic":
         return Anthropic(
             model=config.model,
@@ -67,6 +81,11 @@ def client_for(config: ModelConfig) -> LLMClient:
     )
 
 
+@cache
+def _warn_once(sentence: str) -> None:
+    log.error("%s", sentence)  # the level that is shown without -v
+
+
 class Workshop:
     """The maker of the policies of one process.
 
@@ -81,6 +100,7 @@ class Workshop:
         self._budget = Budget(budget_usd, source="the budget of this process")
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+        self._breakers: dict[str, Breaker] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
         """Return the policy of one agent.
@@ -92,7 +112,7 @@ class Workshop:
             return load_policy(spec.policy)
         assert spec.model is not None
         config, limits = self._model(spec.model)
-        return LLMPolicy(
+        model = LLMPolicy(
             client_for(config),
             memory=LastSteps(spec.memory) if spec.memory else None,
             retry=config.retry,
@@ -100,7 +120,9 @@ class Workshop:
             try_timeout_s=config.try_timeout_s,
             vision=config.vision,
             pace=config.pace,
+            breaker=self._breakers.setdefault(config.base_url, Breaker(config.base_url, config.breaker)),
         )
+        return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
         if name not in self._models:
@@ -154,7 +176,7 @@ def _vision_of(exchanges: Iterable[ModelCall]) -> Vision | None:
 
 
 def load_policy(name: str) -> Policy:
-    """Return the policy called `silent`, or the function, class or policy at `module:name`.
+    """Return the scripted player of this name, or the function, class or policy at `module:name`.
 
     Modules are also looked for in the current directory.
 
@@ -163,9 +185,11 @@ def load_policy(name: str) -> Policy:
     """
     if name == "silent":
         return Silent()
+    if name in PLAYERS:
+        return Player(name)
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
-        raise ConfigError(f"'{name}' is no policy: write 'silent' or module:name, such as my_agent:decide")
+        raise ConfigError(f"'{name}' is no policy: write {', '.join(PLAYERS)} or module:name, such as my_agent:decide")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:

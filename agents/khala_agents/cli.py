@@ -64,6 +64,13 @@ def agent(
         float | None,
         typer.Option(min=0.0, help="Limit of this process in US dollars; beyond it, its agents do nothing."),
     ] = None,
+    fallback: Annotated[
+        str | None,
+        typer.Option(
+            help="Policy where the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
+            metavar="NAME",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
     """Play one or more agents of a run.
@@ -76,7 +83,7 @@ def agent(
     from khala_agents import commands  # noqa: PLC0415  # see there
 
     commands.play(
-        commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents),
+        commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents, fallback=fallback),
         run,
         side,
         connect or [],

@@ -82,21 +82,33 @@ def serve(
 # --- agent ------------------------------------------------------------------------------------------
 
 
-def specs(names: Sequence[str], *, model: str | None, policy: str | None, memory: int, path: Path | None) -> AgentsFile:
+def specs(
+    names: Sequence[str],
+    *,
+    model: str | None,
+    policy: str | None,
+    memory: int,
+    path: Path | None,
+    fallback: str | None = None,
+) -> AgentsFile:
     """Return the agents that the command line describes, by a file or one by one.
 
     Raises:
         ConfigError: the command line says both, or nothing, or the file is wrong.
     """
     if path is not None:
-        if names or model or policy:
-            raise ConfigError("a file of agents says all: leave out NAMES, --model and --policy", source="--agents")
+        if names or model or policy or fallback:
+            fault = "a file of agents says all: leave out NAMES, --model, --policy and --fallback"
+            raise ConfigError(fault, source="--agents")
         return load_agents(path)
     if not names:
         raise ConfigError("say which agents to play, or give a file with --agents: khala agent NAME… --run RUN")
     if model and policy:
         raise ConfigError("an agent decides with a model or with a policy: give --model or --policy, not both")
-    spec = WorkerSpec(policy=policy) if policy else WorkerSpec(model=model or "scripted", memory=memory)
+    if policy and fallback:
+        raise ConfigError("--fallback is for agents with a model: leave it out, or --policy")
+    default = WorkerSpec(model=model or "scripted", memory=memory, fallback=fallback)
+    spec = WorkerSpec(policy=policy) if policy else default
     return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
 
 

@@ -14,6 +14,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, JsonValue, field_validator, model_validator
 
 from khala_agents.llm.address import checked_address
+from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.limits import LimitRules
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES, ProfileName
@@ -52,6 +53,7 @@ class ModelConfig(Frozen):
     """Time for one try; the time to the step's deadline if that is shorter."""
     retry: RetryRule = RetryRule()
     limits: LimitRules = LimitRules()
+    breaker: BreakerRule = BreakerRule()
     prices: Prices = Prices()
     pace: Pace | None = None
     """How fast it reads and writes: what its decisions cost with the clock `token`; None: the task says."""
@@ -111,7 +113,10 @@ class WorkerSpec(Frozen):
     model: str | None = None
     """Name of a shipped model file, or path of a model file, relative to the file that names it."""
     policy: str | None = None
-    """`module:name` of a function or a policy, or `silent`."""
+    """`silent`, the name of a scripted player, or `module:name` of a function or a policy."""
+    fallback: str | None = None
+    """A policy, named as in `policy`, that decides where the model has no reply because its endpoint is away, the money
+    is used up or the time is over. With a model only."""
     memory: int = Field(default=0, ge=0)
     """Number of past steps that the prompt repeats word for word before the observation; with a model only."""
 
@@ -119,6 +124,8 @@ class WorkerSpec(Frozen):
     def _one_of_two(self) -> Self:
         if (self.model is None) == (self.policy is None):
             raise ValueError("either a model or a policy is wanted")
+        if self.fallback is not None and self.model is None:
+            raise ValueError("fallback is for an agent with a model; a policy has none")
         return self
 
 

@@ -11,12 +11,14 @@ import logging
 import random
 from typing import TYPE_CHECKING
 
+from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.client import (
     Completion,
     LLMClient,
     LLMError,
     Origin,
     Request,
+    TryTimeout,
     estimated_image_tokens,
     estimated_tokens,
 )
@@ -50,6 +52,7 @@ class LLMPolicy(Policy):
         memory: what is carried from step to step.
         retry: how often a failed try is repeated.
         limits: shared with other agents of the process.
+        breaker: shared with the agents of the process that ask the same endpoint.
         try_timeout_s: time for one try; the time to the deadline if that is shorter.
         vision: how the model sees; None if it does not see, and pictures are left out.
         pace: how fast the model is, for the clock `token`; None: the task says.
@@ -63,6 +66,7 @@ class LLMPolicy(Policy):
         memory: Memory | None = None,
         retry: RetryRule | None = None,
         limits: Limits | None = None,
+        breaker: Breaker | None = None,
         try_timeout_s: float = 45.0,
         vision: Vision | None = None,
         pace: Pace | None = None,
@@ -70,6 +74,7 @@ class LLMPolicy(Policy):
     ) -> None:
         self.client = client
         self.limits = limits or Limits()
+        self.breaker = breaker or Breaker(client.endpoint)
         self.try_timeout_s = try_timeout_s
         self.vision = vision
         self.pace = pace
@@ -165,13 +170,14 @@ class _Tries:
         self._clock = asyncio.get_running_loop().time
 
     async def once(self) -> Completion:
-        """Make one try, as soon as the limits allow it."""
+        """Make one try, as soon as the limits allow it and unless the endpoint is away."""
+        self._policy.breaker.check()
         async with self._policy.limits.admit(tokens=self._tokens, deadline=self._context.deadline) as ticket:
             self._made += 1
             began = self._clock()
             status, text, usage = "cancelled", None, UNKNOWN + self._images
             try:
-                completion = await self._policy.client.complete(self._request(began))
+                completion = await self._completed(began)
                 status, text, usage = "ok", completion.text, self._with_images(completion.usage)
                 ticket.settle(usage)
             except LLMError as error:
@@ -183,6 +189,21 @@ class _Tries:
             finally:
                 self._trace(began, ticket.waited_s, status, text, usage)
             return completion
+
+    async def _completed(self, began: float) -> Completion:
+        """Return the completion; tell the breaker how the call ended."""
+        breaker, deadline = self._policy.breaker, self._context.deadline
+        try:
+            completion = await self._policy.client.complete(self._request(began))
+        except LLMError as error:
+            breaker.note(error)
+            raise
+        except asyncio.CancelledError:
+            if deadline is not None and self._clock() >= deadline:  # the deadline came before the timeout of the try
+                breaker.note(TryTimeout("the decision was cancelled at its deadline"))
+            raise
+        breaker.note(None)
+        return completion
 
     def _with_images(self, usage: Usage) -> Usage:
         return usage if usage.images else usage + self._images  # a recorded one has them counted already

@@ -75,6 +75,7 @@ class Context:
         trace: call it with each request to a model as soon as the request is over; it is published, recorded and
             counted in the reply.
         arrived: when the observation arrived, on the clock of the event loop.
+        reserve_s: seconds of the time that are for another policy, should this one fail.
     """
 
     briefing: Briefing
@@ -82,11 +83,13 @@ class Context:
     pictures: PictureStore = field(default_factory=PictureStore)
     trace: Callable[[ModelCall], None] = _untraced
     arrived: float = field(default_factory=_now)
+    reserve_s: float = 0.0
 
     @property
     def time_s(self) -> float | None:
         """Seconds that the decision may take in all; None for no limit."""
-        return time_to_decide_s(self.observation.answer_within_s)
+        time_s = time_to_decide_s(self.observation.answer_within_s)
+        return None if time_s is None else max(time_s - self.reserve_s, 0.0)
 
     @property
     def deadline(self) -> float | None:

@@ -58,3 +58,15 @@ def scrub(text: str) -> str:
         if value in text:
             text = text.replace(value, MASK)
     return text
+
+
+def excerpt(said: str | bytes, most: int = 200) -> str:
+    """Return what an endpoint said as one line of at most `most` characters, for a log or an error.
+
+    Keys are masked before anything is cut, so that none is cut in two. Characters that a terminal would obey are
+    replaced.
+    """
+    text = said.decode("utf-8", "replace") if isinstance(said, bytes) else said
+    line = " ".join(scrub(text).split())
+    line = line if len(line) <= most else f"{line[: most - 1]}…"
+    return "".join(character if character.isprintable() else "\ufffd" for character in line)

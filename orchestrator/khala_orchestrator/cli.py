@@ -7,7 +7,7 @@ import asyncio
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -18,6 +18,9 @@ from khala_orchestrator.config import all_tasks
 from khala_orchestrator.console import stderr_console
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.signals import stop_on_signal
+
+if TYPE_CHECKING:
+    from khala_protocol.recording import Recording
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")]
 Listen = Annotated[
@@ -38,7 +41,8 @@ REPLAY_EPILOG = """
 Examples:\n
     khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
     khala replay recording.mcap --agent Stalkers --steps 10-20 --text\n
-    khala replay recording.mcap --steps 7 --images pictures
+    khala replay recording.mcap --steps 7 --images pictures\n
+    khala replay torn.mcap --recover whole.mcap
 """
 
 
@@ -98,6 +102,12 @@ def replay(
     images: Annotated[
         Path | None, typer.Option(help="Write the pictures that agents were shown into this directory.", metavar="DIR")
     ] = None,
+    new: Annotated[
+        Path | None,
+        typer.Option(
+            "--recover", help="Write what can be read into this new recording, as a whole one.", metavar="NEW"
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Show what was said and done in a recorded run."""
@@ -107,15 +117,24 @@ def replay(
         summary,
         transcript,
     )
+    from khala_protocol.recording import Recording, recover  # noqa: PLC0415
 
     selection = StepSelection.of(agent, steps)
+    recording = Recording.open(file)
+    if not recording.complete:
+        stderr_console().print(Text(_damage(recording)), style="yellow", soft_wrap=True)
+    if new is not None:
+        whole = recover(file, new)
+        data = {"recording": str(new), "samples": whole.samples, "complete": recording.complete}
+        _out(data, f"{new} holds the {whole.samples} samples of {file} that can be read", as_json=as_json)
+        return
     if images is not None:
         saved = save_pictures(file, selection, images)
         data = {"pictures": [str(path) for path in saved]}
         _out(data, f"{len(saved)} pictures are in {images}", as_json=as_json)
         return
     if as_json:
-        typer.echo(json.dumps(summary(file, selection)))
+        typer.echo(json.dumps(summary(file, selection) | {"complete": recording.complete}))
         return
     console = Console(highlight=False)
     for part in transcript(file, selection, whole=text):
@@ -138,6 +157,11 @@ async def _route(config: BusConfig, *, as_json: bool) -> None:
         await stop.wait()
     finally:
         await bus.close()
+
+
+def _damage(recording: "Recording") -> str:
+    where = f"after its sample {recording.samples}" if recording.samples else "before its first sample"
+    return f"{recording.path} is torn or damaged {where}; --recover NEW writes what can be read as a whole recording"
 
 
 def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:

@@ -19,7 +19,7 @@ from khala_bridge.task.images import images_for
 from khala_bridge.task.maps import known_maps
 from khala_bridge.task.standard import standard_task
 from khala_configs import CONFIGS
-from khala_protocol.configfile import load
+from khala_protocol.configfile import load, words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Clock, Frozen
@@ -97,8 +97,8 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
         return TaskConfig.model_validate(fields | given)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        place, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
-        raise ConfigError(f"{place}: {words}", source="command line") from None
+        place = ".".join(map(str, first["loc"]))
+        raise ConfigError(f"{place}: {words_of(first)}", source="command line") from None
 
 
 def new_run_name(task: str) -> str:

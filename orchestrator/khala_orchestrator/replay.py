@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.match import Match, SilentObserver
@@ -20,7 +22,7 @@ from khala_protocol.messages import Observation, Reply, Report
 from khala_protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.turn import Question
@@ -28,32 +30,56 @@ if TYPE_CHECKING:
     from khala_protocol.recording import RecordedStep, Recording
 
 
-def recorded_config(recording: Recording) -> MatchConfig:
+def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> MatchConfig:
     """Return the match that was recorded.
 
+    Args:
+        recording: of a match.
+        modules: Python modules of sections that it may name. A recording may be anyone's, and to import a module is to
+            run it.
+
     Raises:
-        RecordingError: it has no run card.
+        RecordingError: it has no run card, its run card is wrong, or it names another module.
     """
     run = recording.run
     if run is None:
         raise RecordingError(f"{recording.path} has no run card: it was ended before the match began")
-    task = TaskConfig.model_validate(run.config)
-    game, _, _version = run.game.rpartition(" ")
-    return MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes)
+    try:
+        task = TaskConfig.model_validate(run.config)
+        game, _, _version = run.game.rpartition(" ")
+        config = MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        place = ".".join(map(str, fault["loc"]))
+        raise RecordingError(
+            f"{recording.path}: its run card is not one of this version: {place}: {fault['msg']}"
+        ) from None
+    if foreign := sorted(_modules(task) - set(modules)):
+        raise RecordingError(
+            f"{recording.path} names the module {foreign[0]!r} for a section of its text, and a recording imports "
+            f"nothing by itself: if you trust it, allow modules=[{foreign[0]!r}]"
+        )
+    return config
 
 
-async def replay(recording: Recording, game: Sides) -> list[Difference]:
+def _modules(task: TaskConfig) -> set[str]:
+    names = (name.rpartition(":") for agent in task.agents for name in agent.sections)
+    return {module for module, colon, _ in names if colon}
+
+
+async def replay(recording: Recording, game: Sides, *, modules: Collection[str] = ()) -> list[Difference]:
     """Play a recording again, up to its last complete step.
 
     Args:
         recording: of a match.
         game: the game of `recorded_config`, started.
+        modules: see `recorded_config`.
 
     Returns:
         every observation that differs from the recorded one; a replay that diverges ends at its first step.
     """
     turn = RecordedTurn(recording)
-    config = recorded_config(recording)
+    config = recorded_config(recording, modules=modules)
     match = Match(config, game, sides_of(config), turn, SilentObserver())
     try:
         async for _ in match.play():

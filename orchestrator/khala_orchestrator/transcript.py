@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Wire
 
 
+_NOT_IN_FILE_NAMES = re.compile(r"[^A-Za-z0-9_.-]+")  # a recording may be anyone's, and its names too
+
+
 @dataclass(frozen=True, slots=True)
 class StepSelection:
     """Which part of a recording is shown."""
@@ -43,9 +46,9 @@ class StepSelection:
         """
         if steps is None:
             return cls(agent)
-        found = re.fullmatch(r"(\d*)(-?)(\d*)", steps)
+        found = re.fullmatch(r"([0-9]{0,9})(?:(-)([0-9]{0,9}))?", steps)
         if not found or not steps.strip("-"):
-            raise ConfigError(f"{steps!r} names no steps: write 7, 10-20, 10- or -20", source="--steps")
+            raise ConfigError(f"{steps[:40]!r} names no steps: write 7, 10-20, 10- or -20", source="--steps")
         first, dash, last = found.groups()
         end = last if dash else first
         return cls(agent, int(first or 0), int(end) if end else None)
@@ -141,8 +144,8 @@ def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list
             for image in seen.images:
                 if image.sha256 in pictures:
                     kind = image.media_type.partition("/")[2]
-                    name = f"{seen.episode}-{seen.step:04}-{seen.agent}-{image.name}.{kind}"
-                    saved.append(directory / name)
+                    name = f"{seen.episode}-{seen.step:04}-{seen.agent}-{image.name}"
+                    saved.append(directory / f"{_NOT_IN_FILE_NAMES.sub('_', name)[:200]}.{kind}")
                     saved[-1].write_bytes(pictures[image.sha256])
     except OSError as error:
         raise RecordingError(f"{directory} cannot be written: {error.strerror}") from None

@@ -197,7 +197,13 @@ def test_a_policy_is_found_by_its_module_in_the_current_directory(module: Path) 
 
 
 BAD_POLICIES = [
-    ("my_agent", "'my_agent' is no policy: write 'silent' or module:name, such as my_agent:decide"),
+    (
+        "my_agent",
+        (
+            "'my_agent' is no policy: write silent, random-legal, focus-fire, skilled or module:name, "
+            "such as my_agent:decide"
+        ),
+    ),
     ("nowhere:decide", "policy nowhere:decide: there is no module 'nowhere'"),
     ("lost_agent:decide", "policy lost_agent:decide: there is no module 'not_installed'"),
     ("my_agent:decide_not", "policy my_agent:decide_not: the module my_agent has no 'decide_not'"),

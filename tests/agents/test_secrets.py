@@ -11,7 +11,12 @@ from aiohttp import web
 
 from khala_agents.build import Workshop, client_for
 from khala_agents.config import ModelConfig, WorkerSpec
-from khala_agents.secret import MASK, read_key, scrub
+from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.client import MalformedCompletion
+from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import Prices
+from khala_agents.llm.profiles import PROFILES
+from khala_agents.secret import MASK, excerpt, read_key, scrub
 from khala_agents.worker import run_worker
 from khala_protocol.bus import Delivery
 from khala_protocol.errors import ConfigError
@@ -56,6 +61,48 @@ def test_a_key_shows_itself_nowhere() -> None:
     for text in (repr(key), str(key), f"{key}", f"{key!r}", "%s" % key):  # noqa: UP031 - each way of writing it
         assert KEY not in text
     assert scrub(f"Incorrect API key: {KEY}!") == f"Incorrect API key: {MASK}!"
+
+
+@pytest.mark.parametrize("most", [80, 200])
+def test_a_key_is_masked_wherever_an_excerpt_ends(most: int) -> None:
+    read_key("K", {"K": KEY})
+    for before in range(most + 1):
+        said = excerpt(("x" * before + KEY + " y" * 100).encode(), most)
+        assert not any(KEY[begin : begin + 4] in said for begin in range(len(KEY) - 3)), before
+        assert len(said) <= most
+
+
+@pytest.mark.parametrize("kind", [OpenAICompatible, Anthropic])
+def test_an_answer_that_is_no_completion_shows_no_part_of_a_key(kind: type[OpenAICompatible | Anthropic]) -> None:
+    read_key("K", {"K": KEY})
+    options: dict[str, Any] = {"profile": PROFILES["compatible"]} if kind is OpenAICompatible else {}
+    model = kind(model="m", base_url="http://localhost/v1", prices=Prices(), key=None, **options)
+    for before in range(90):
+        with pytest.raises(MalformedCompletion) as caught:
+            model._read(b"x" * before + KEY.encode())
+        assert "sk-" not in str(caught.value)
+        assert "x" * min(before, 70) in str(caught.value)
+
+
+def test_an_excerpt_obeys_no_terminal() -> None:
+    assert excerpt("a\x1b]0;b\x07\n c\u202ed\x9b") == "a\ufffd]0;b\ufffd c\ufffdd\ufffd"
+
+
+OPEN = ModelConfig(profile="compatible", model="m", base_url="http://example.org/v1", api_key_env="OPEN_KEY")
+
+
+def test_a_key_that_crosses_a_network_unencrypted_is_warned_of_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("OPEN_KEY", KEY)
+    for address in ("http://localhost:1/v1", "https://example.org/v1", "http://[::1]/v1"):
+        client_for(OPEN.model_copy(update={"base_url": address}))
+    assert caplog.messages == []
+    client_for(OPEN)
+    client_for(OPEN)
+    assert caplog.messages == [
+        "the key in OPEN_KEY goes to http://example.org/v1 unencrypted: everyone on the way can read it; use https://"
+    ]
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.act import JointAction, PlanStep, Played
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
+from khala_bridge.game import pysc2_game
 from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Patience, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
@@ -235,6 +236,24 @@ def test_a_missing_game_is_told_with_what_to_do(tmp_path: Path) -> None:
 
 def config(directory: Path) -> GameConfig:
     return GameConfig(sc2path=directory, map=known_maps()["2s3z"], start_timeout_s=8)
+
+
+def test_a_map_that_is_no_file_of_a_fair_size_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install = lay_out(tmp_path / "sc2", maps=False)
+    path = install / "Maps" / "llm_smac" / "2s3z.SC2Map"
+    path.parent.mkdir(parents=True)
+    os.mkfifo(path)
+    with pytest.raises(GameMissing, match=r"2s3z.SC2Map cannot be read: it is a pipe or a device"):
+        PySC2Game(config(install))
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(GameMissing, match=r"2s3z.SC2Map cannot be read: it is a pipe or a device"):
+        PySC2Game(config(install))
+    path.unlink()
+    path.write_bytes(b"x" * 11)
+    monkeypatch.setattr(pysc2_game, "MAX_MAP_BYTES", 10)
+    with pytest.raises(GameMissing, match=r"2s3z.SC2Map cannot be read: it is larger than"):
+        PySC2Game(config(install))
 
 
 def test_a_missing_map_is_told(tmp_path: Path) -> None:

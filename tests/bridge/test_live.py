@@ -11,7 +11,7 @@ import pytest
 
 from khala_bridge.act import Actor, executor_of
 from khala_bridge.errors import GameError, GameHangs
-from khala_bridge.game.game import GameConfig, GameThread, OneSide, Patience, StepResult
+from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides, StepResult
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer
 from khala_bridge.task.maps import known_maps
@@ -193,15 +193,15 @@ async def test_a_stopped_game_is_noticed_killed_and_named(
         return games[0]
 
     thread = GameThread(begin, patience=Patience(least_s=4.0))
-    async with OneSide(thread, executor_of(task("2s3z")), step_loops=11) as side:
+    async with Sides(thread, [executor_of(task("2s3z"))]) as side:
         await side.reset()
         for _ in range(3):
-            await side.act([])
+            await side.act([[]], 11)
         (process,) = games[0]._env._sc2_procs
         pid = process.pid
         os.kill(pid, signal.SIGSTOP)
         with pytest.raises(GameHangs, match=r"^the game did not answer within \d[.\d]* s and was ended"):
-            await side.act([])
+            await side.act([[]], 11)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
     assert caplog.messages[0] == "the game has not answered for 2 s"

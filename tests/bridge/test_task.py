@@ -67,6 +67,13 @@ def test_a_task_may_bring_its_own_map() -> None:
     assert read_again.map_spec == spec
 
 
+@pytest.mark.parametrize("file", ["/dev/zero", "../../secret", "a/../../b.SC2Map", "", '"a\\0"'])
+def test_a_map_of_its_own_is_below_the_maps_of_the_install(file: str) -> None:
+    own = GOOD.replace("map: 2s3z", f"own_map: {{file: {file or repr(file)}, race: protoss, opponent: null}}")
+    with pytest.raises(ConfigError, match=r"t:2 \(own_map.file\): the path of a map goes from the directory Maps"):
+        loads(own, TaskConfig, source="t")
+
+
 @pytest.mark.parametrize("maps", ["", "map: 2s3z\nown_map: {file: a/b.SC2Map, race: zerg, opponent: zerg}\n"])
 def test_a_task_has_exactly_one_map(maps: str) -> None:
     with pytest.raises(ConfigError, match="give either map or own_map"):
@@ -85,6 +92,7 @@ def test_a_task_has_exactly_one_map(maps: str) -> None:
         ("control_group: 1", "control_group: 12", 8, "less than or equal to 9"),
         ("control_group: 1}", "control_group: 1}\n      - {name: A, unit_types: [Stalker]}", 5, "two of team A"),
         ("task: Win.\n", "", 1, "is required and not given"),
+        ("task: Win.", "max_actions: 999999999999\ntask: Win.", 3, "less than or equal to 1000"),
         (
             "task: Win.",
             "clock: {rule: budget}\ntask: Win.",

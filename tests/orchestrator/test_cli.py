@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
+import os
 import re
 import signal
 from pathlib import Path
@@ -15,9 +17,9 @@ from khala_orchestrator.config import load_task
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode
-from khala_protocol.errors import BusError
-from khala_protocol.messages import AgentReport, Observation, Report, View
-from khala_protocol.recording import Recorder
+from khala_protocol.errors import BusError, RecordingError
+from khala_protocol.messages import AgentReport, ImageRef, Observation, Report, View
+from khala_protocol.recording import Recorder, Recording
 
 
 @pytest.mark.parametrize(
@@ -103,6 +105,70 @@ def test_a_replay_for_its_pictures_says_where_they_are(
     replay(recording, images=Path("pictures_of_it"))
     out, err = capsys.readouterr()
     assert (out, err) == ("", "0 pictures are in pictures_of_it\n")
+
+
+def torn(recording: Path) -> Path:
+    """Cut the end off a recording whose samples were flushed one by one."""
+    path = recording.with_name("torn.mcap")
+    with Recorder(path) as recorder:
+        for sample in Recording.open(recording):
+            recorder.write(sample.key, sample.payload)
+            recorder.flush()
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 6])
+    return path
+
+
+def test_a_replay_says_that_a_recording_is_torn_and_after_which_sample(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = torn(recording)
+    count = Recording.open(path).samples
+    assert 0 < count < 6
+    replay(path, as_json=True)
+    out, err = capsys.readouterr()
+    assert json.loads(out)["complete"] is False
+    advice = "--recover NEW writes what can be read as a whole recording"
+    assert err == f"{path} is torn or damaged after its sample {count}; {advice}\n"
+    replay(recording, as_json=True)
+    out, err = capsys.readouterr()
+    assert (json.loads(out)["complete"], err) == (True, "")
+
+
+def test_a_torn_recording_is_recovered_by_a_command(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, new = torn(recording), tmp_path / "whole.mcap"
+    replay(path, new=new, as_json=True)
+    count = Recording.open(path).samples
+    assert json.loads(capsys.readouterr().out) == {"recording": str(new), "samples": count, "complete": False}
+    assert Recording.open(new).complete
+    with pytest.raises(RecordingError, match=r"whole\.mcap exists already"):
+        replay(path, new=new)
+
+
+def test_a_pipe_is_no_recording(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RecordingError, match=r"pipe cannot be read: it is a pipe or a device, a file is wanted$"):
+        replay(tmp_path / "pipe")
+
+
+def test_pictures_stay_in_their_directory_whatever_they_are_called(tmp_path: Path) -> None:
+    data = b"\x89PNG"
+    picture = ImageRef(
+        name="/../../out", media_type="image/png", sha256=hashlib.sha256(data).hexdigest(), width=1, height=1, bytes=4
+    )
+    directory = tmp_path / "below" / "pictures"
+    (directory / "0-0000-..").mkdir(parents=True)
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        seen = Observation(
+            run="test", side="blue", agent="..", episode=0, step=0, game_loop=0, answer_within_s=None, text="",
+            view=View(time_s=0.0), images=(picture,),
+        )  # fmt: skip
+        recorder.write("khala/test/blue/A/image/0", data)
+        recorder.write("khala/test/blue/A/observation", encode(seen))
+    replay(tmp_path / "run.mcap", images=directory)
+    assert [path.name for path in tmp_path.rglob("*.png")] == ["0-0000-..-_.._.._out.png"]
+    assert len(list(directory.glob("*.png"))) == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+import sys
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
+from khala_bridge.observe.text import SECTIONS
 from khala_orchestrator.replay import RecordedTurn, recorded_config, replay
 from khala_orchestrator.turn import Question
 from khala_protocol.codec import encode
@@ -16,7 +18,7 @@ from khala_protocol.messages import Observation, Reply, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Collection
     from pathlib import Path
 
     from khala_bridge.game.game import Sides
@@ -69,8 +71,11 @@ def again(
 ) -> Callable[..., Awaitable[list[Difference]]]:
     """Replays a recording in a game of its own; `after` is what happens there."""
 
-    async def run(recording: Recording, *, after: dict[int, dict[str, Any]] | None = None) -> list[Difference]:
-        return await replay(recording, await start(still_game(after=EVENTS if after is None else after)))
+    async def run(
+        recording: Recording, *, after: dict[int, dict[str, Any]] | None = None, modules: Collection[str] = ()
+    ) -> list[Difference]:
+        game = await start(still_game(after=EVENTS if after is None else after))
+        return await replay(recording, game, modules=modules)
 
     return run
 
@@ -83,6 +88,51 @@ def changed(recording: Recording, path: Path, change: Callable[[Wire], Wire | No
             if message is not None or sample.message is None:
                 recorder.write(sample.key, encode(message) if message else sample.payload)
     return Recording.open(path)
+
+
+MODULE = """
+from khala_bridge.observe.text import section
+
+@section("mine")
+def mine(page):
+    yield "seen"
+"""
+
+
+@pytest.fixture
+def foreign(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Recording:
+    """Return a recording whose task reads a section of a module."""
+    (tmp_path / "foreign_sections.py").write_text(MODULE, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "foreign_sections", raising=False)
+    monkeypatch.delitem(SECTIONS, "mine", raising=False)
+
+    def sectioned(message: Wire) -> Wire:
+        if not isinstance(message, Run):
+            return message
+        agents = [{**agent, "sections": ["foreign_sections:mine"]} for agent in cast("Any", message.config["agents"])]
+        return message.but(config={**message.config, "agents": agents})
+
+    return changed(recording, tmp_path / "foreign.mcap", sectioned)
+
+
+async def test_a_recording_imports_no_module_by_itself(foreign: Recording, again: Replay) -> None:
+    with pytest.raises(RecordingError, match=r"names the module 'foreign_sections' for a section of its text") as error:
+        await again(foreign)
+    assert str(error.value).endswith("if you trust it, allow modules=['foreign_sections']")
+    assert "foreign_sections" not in sys.modules
+
+
+async def test_a_recording_reads_the_modules_that_are_allowed(foreign: Recording, again: Replay) -> None:
+    differences = await again(foreign, modules=["foreign_sections"])
+    assert "foreign_sections" in sys.modules
+    assert any('"text":"seen' in found.sent for found in differences)
+
+
+def test_a_run_card_of_another_version_is_named(recording: Recording, tmp_path: Path) -> None:
+    other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(config={"name": 7}) if isinstance(m, Run) else m)
+    with pytest.raises(RecordingError, match=r"b\.mcap: its run card is not one of this version: name: "):
+        recorded_config(other)
 
 
 def places(differences: list[Difference]) -> list[tuple[str, int, int, str]]:

@@ -150,7 +150,7 @@ async def test_an_agent_is_gone_when_its_last_instance_is(
     await new.arrive("2")
     async with called(broker) as (roster, gone):
         await settle()
-        assert caplog.messages == ["2 processes are agent p1/Zealots: the first reply of a step counts, all pay"]
+        assert caplog.messages == ["2 processes are agent p1/Zealots: the first reply of a step counts"]
         old.bus.kill()
         await settle()
         assert (roster.present(ZEALOTS), gone) == (True, [])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import time
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from khala_protocol.configfile import load, loads
+from khala_protocol.configfile import UnknownName, load, loads
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -57,10 +60,10 @@ def test_anchors_and_merges_are_read() -> None:
 
 
 ERRORS = [
-    ("task: [", "m.yaml:1: this is no YAML: expected the node content, but found '<stream end>'"),
+    ("task: [", "m.yaml:1: this is no YAML: did not find expected node content"),
     ("task: !!python/x y",
      "m.yaml:1: this is no YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/x'"),
-    ("task: x\n\ttab: 1", "m.yaml:2: this is no YAML: found character '\\t' that cannot start any token"),
+    ("task: x\n\ttab: 1", "m.yaml:2: this is no YAML: found a tab character that violates indentation"),
     ("", "m.yaml:1 (task): is required and not given"),
     ("- a", "m.yaml:1: fields are wanted here, not ['a']"),
     ("task: x\nteems: []", "m.yaml:2 (teems): no such field, did you mean 'teams'?"),
@@ -77,6 +80,15 @@ ERRORS = [
     ("task: 1\nclock: 2", "m.yaml:1 (task): input should be a valid string, not 1 (and 1 more)"),
     ("task: x\nbest: {name: *a}", "m.yaml:2: this is no YAML: found undefined alias 'a'"),
     ("task: x\nlimits: &a\n  more: *a", "m.yaml:3: nested too deep"),
+    ("task: x\nlimits: &a\n  <<: *a", "m.yaml:2: nested too deep"),
+    ("task: x\nlimits: {<<: 3}", "m.yaml:2: only fields can be merged by <<"),
+    ("task: x\n---\ntask: y", "m.yaml:2: this is no YAML: a second document begins here"),
+    ("task: x\nlimits:\n  [usd]: 1", "m.yaml:3: the name of a field is wanted here, not a list or fields"),
+    ("task: x\n" + "k" * 300 + ": 1", "m.yaml:2: the name of a field has at most 200 characters, this has 300"),
+    ("task: x\nlimits: {usd: " + "9" * 5000 + "}", f"m.yaml:2: '{'9' * 56}… is too long for int"),
+    ("task: 2026-02-31", "m.yaml:1: '2026-02-31' is no timestamp; put it in quotes if it is a text"),
+    ("task: !!bool 7", "m.yaml:1: '7' is no bool; put it in quotes if it is a text"),
+    ("task: x\nlimits: " + "[" * 3000, "m.yaml:2: nested too deep"),
 ]  # fmt: skip
 
 
@@ -87,9 +99,54 @@ def test_an_error_says_file_line_field_and_what_is_wrong(text: str, expected: st
     assert str(caught.value) == expected
 
 
+BOMBS = {
+    "lists": "\n".join(f"{c}: &{c} [{', '.join([f'*{b}'] * 9)}]" for b, c in pairwise("abcdefghij")),
+    "fields": "\n".join(
+        f"{c}: &{c} {{{', '.join(f'k{i}: *{b}' for i in range(9))}}}" for b, c in pairwise("abcdefghij")
+    ),
+    "merges": "\n".join(f"{c}: &{c} {{<<: [{', '.join([f'*{b}'] * 9)}]}}" for b, c in pairwise("abcdefghij")),
+    "wide": "task: [" + "a," * 40_000 + "]",
+}
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_a_text_that_unfolds_to_millions_of_values_is_refused_at_once(kind: str) -> None:
+    began = time.process_time()
+    with pytest.raises(ConfigError, match=r"m\.yaml:\d+: there are more than 5000 values here"):
+        loads(f"a: &a {{x: 1}}\n{BOMBS[kind]}\n", Match, source="m.yaml")
+    assert time.process_time() - began < 0.25
+
+
+class Named(BaseModel):
+    names: list[str]
+
+    @field_validator("names")
+    @classmethod
+    def known(cls, names: list[str]) -> list[str]:
+        raise UnknownName("unit", names[0], [f"Stalker{number}" for number in range(1000)])
+
+
+def test_the_nearest_name_is_looked_for_when_the_error_is_shown() -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads("names: [Stalkr7]", Named, source="m.yaml")
+    assert str(caught.value) == "m.yaml:1 (names): there is no unit 'Stalkr7', did you mean 'Stalker7'?"
+    with pytest.raises(ConfigError) as caught:
+        loads(f"names: [{'x' * 5000}]", Named, source="m.yaml")
+    assert str(caught.value) == f"m.yaml:1 (names): there is no unit '{'x' * 56}…"
+
+
+@pytest.mark.parametrize(("text", "code"), [("task: x\nteams: \0", "0000"), ("task: x\nteams: \x1b", "001B")])
+def test_a_control_character_is_refused_with_its_line(text: str, code: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads(text, Match, source="m.yaml")
+    assert str(caught.value) == f"m.yaml:2: this is no YAML: the character U+{code} is not allowed"
+
+
 @pytest.mark.parametrize(
     ("name", "text"),
     [
+        ("big.yaml", "cannot be read: it is larger than 1 MB"),
+        ("pipe.yaml", "cannot be read: it is a pipe or a device, a file is wanted"),
         ("none.yaml", "there is no such file"),
         ("folder.yaml", "this is a directory, a YAML file is wanted"),
         ("latin.yaml", "this is no UTF-8 text"),
@@ -98,6 +155,8 @@ def test_an_error_says_file_line_field_and_what_is_wrong(text: str, expected: st
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, text: str) -> None:
     (tmp_path / "latin.yaml").write_bytes(b"task: \xe9")
     (tmp_path / "folder.yaml").mkdir()
+    (tmp_path / "big.yaml").write_bytes(b"#" * (2**20 + 1))
+    os.mkfifo(tmp_path / "pipe.yaml")
     path = tmp_path / name
     with pytest.raises(ConfigError) as caught:
         load(path, Match)
@@ -128,6 +187,11 @@ EXTENDS_ERRORS = [
     ({"a": GOOD, "b": "extends: a\n\ntask: unknown\n"}, "b.yaml:3 (task): there is no task of this name"),
     ({"a": "task: unknown\n", "b": "extends: a\nclock: slow\n"},
      "b.yaml:2 (clock): 'slow' is none of 'frozen' or 'token' (and 1 more)"),
+    ({"b": 'extends: "a\\0"'},
+     "b.yaml:1 (extends): the file for it cannot be read: its name has a character that no file name has"),
+    ({"b": f"extends: {'a' * 300}"}, "b.yaml:1 (extends): the file for it cannot be read: File name too long"),
+    ({f"f{i}": f"extends: f{i - 1}" for i in range(1, 40)},
+     "f24.yaml:1 (extends): more than 16 files extend each other here"),
     ({"a": "clock: token\n", "b": "extends: a\n"}, "b.yaml:1 (task): is required and not given"),
 ]  # fmt: skip
 

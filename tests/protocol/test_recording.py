@@ -6,14 +6,20 @@ import itertools
 import json
 import random
 import signal
+import struct
 import subprocess
 import sys
+import time
+import tracemalloc
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import jsonschema  # type: ignore[import-untyped]  # comes with check-jsonschema; one test is not worth its stubs
 import pytest
+import zstandard
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC
 
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
@@ -290,8 +296,6 @@ def test_a_torn_recording_is_recovered_as_a_whole_one(path: Path, tmp_path: Path
 
 
 def test_a_large_recording_is_read_in_the_memory_of_a_chunk(path: Path) -> None:
-    import tracemalloc
-
     with Recorder(path) as recorder:
         for number in range(400):
             recorder.write("khala/r1/p1/A/reply", random.Random(number).randbytes(100_000))
@@ -301,6 +305,65 @@ def test_a_large_recording_is_read_in_the_memory_of_a_chunk(path: Path) -> None:
     tracemalloc.stop()
     assert total == 40_000_000
     assert peak < 8_000_000
+
+
+def chunk_of(records: bytes, *, compression: str = "zstd", said: int | None = None) -> bytes:
+    """Return a chunk whose head may say another size than its frame."""
+    data = zstandard.compress(records) if compression else records
+    head = struct.pack("<QQQI", 0, 0, len(records) if said is None else said, 0)
+    body = head + struct.pack("<I", len(compression)) + compression.encode() + struct.pack("<Q", len(data)) + data
+    return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+
+
+def sample_of(payload: bytes, key: str = "khala/r1/run") -> bytes:
+    """Return the records of a channel and of a sample of it."""
+    name = struct.pack("<HHI", 1, 0, len(key)) + key.encode() + struct.pack("<II", 0, 0)
+    channel = struct.pack("<BQ", Opcode.CHANNEL, len(name)) + name
+    head = struct.pack("<HIQQ", 1, 0, 0, 0)
+    return channel + struct.pack("<BQ", Opcode.MESSAGE, len(head) + len(payload)) + head + payload
+
+
+def hostile(path: Path, *chunks: bytes) -> Path:
+    header = struct.pack("<II", 0, 0)
+    path.write_bytes(MCAP0_MAGIC + struct.pack("<BQ", Opcode.HEADER, len(header)) + header + b"".join(chunks))
+    return path
+
+
+BOMBS = {
+    "a large sample": lambda: [chunk_of(sample_of(b" " * 300 * 2**20))],
+    "a frame that is larger than said": lambda: [chunk_of(sample_of(b" " * 300 * 2**20), said=1000)],
+    "many small chunks": lambda: [chunk_of(sample_of(b" " * 4 * 2**20))] * 100,
+    "many small samples": lambda: [chunk_of(sample_of(b"") * 100_000)] * 40,
+    "a deep message": lambda: [chunk_of(sample_of(b"[" * 7 * 2**20))],
+}
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_a_file_that_unpacks_to_far_more_than_its_size_is_read_within_limits(kind: str, path: Path) -> None:
+    size = hostile(path, *BOMBS[kind]()).stat().st_size
+    began = time.process_time()
+    assert not Recording.open(path).complete
+    assert time.process_time() - began < 0.5
+    tracemalloc.start()
+    assert len(list(Recording.open(path).by_step())) == 0
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert size < 500_000
+    assert peak < 80e6
+
+
+def test_a_large_sample_that_is_hard_to_compress_is_read(path: Path) -> None:
+    picture = random.Random(1).randbytes(20 * 2**20)
+    written = write(path, [("khala/r1/p1/A/image/0", picture), *samples()])
+    assert pairs(read(path)) == written
+    assert Recording.open(path).complete
+
+
+def test_a_payload_that_is_far_too_long_is_no_message(path: Path) -> None:
+    card = run_card().model_copy(update={"task": random.Random(1).randbytes(5 * 2**20).hex()})
+    write(path, [("khala/r1/run", encode(card))])
+    assert Recording.open(path).run is None
+    assert Recording.open(path).samples == 1
 
 
 # --- error texts -----------------------------------------------------------------------------------

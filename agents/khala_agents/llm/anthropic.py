@@ -10,7 +10,7 @@ from pydantic_core import to_json
 
 from khala_agents.llm.client import Completion, MalformedCompletion, Request, Scalar
 from khala_agents.llm.http import HttpEndpoint
-from khala_agents.secret import scrub
+from khala_agents.secret import excerpt, scrub
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Anthropic:
         try:
             body = _Body.model_validate_json(answer)
         except ValidationError:
-            begin = scrub(answer[:80].decode("utf-8", "replace"))
+            begin = excerpt(answer, 80)
             raise MalformedCompletion(f"{self.endpoint} answered with no message: {begin!r}") from None
         return Completion(
             text=scrub("".join(block.text for block in body.content if block.type == "text")),

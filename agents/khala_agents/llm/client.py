@@ -13,7 +13,7 @@ A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_age
     ├── MalformedCompletion     the provider's: "200 OK" without a completion in it
     └── limits.LimitExceeded    ours: a limit that this process was given
 
-No error text holds a key: texts of a server pass through `khala_agents.secret.scrub`.
+No error text holds a key: texts of a server pass through `khala_agents.secret.excerpt`.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 import httpx
 from pydantic_core import from_json
 
-from khala_agents.llm.address import checked_address
+from khala_agents.llm.address import LOOPBACK, checked_address
 from khala_agents.llm.client import (
     EndpointUnavailable,
     LLMError,
@@ -33,8 +33,8 @@ from khala_agents.llm.client import (
     Unreachable,
 )
 from khala_agents.llm.retry import is_retried
-from khala_agents.llm.transport import CONNECT_S, AiohttpTransport
-from khala_agents.secret import scrub
+from khala_agents.llm.transport import CONNECT_S, AiohttpTransport, BodyTooLarge
+from khala_agents.secret import excerpt
 
 if TYPE_CHECKING:
     import ssl
@@ -50,7 +50,6 @@ _SPENT_CODES = frozenset(
     {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
 )
 """Codes under which "429 Too Many Requests" means that the account has no money left."""
-_LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 class HttpEndpoint:
@@ -72,7 +71,12 @@ class HttpEndpoint:
         key: SecretStr | None = None,
     ) -> None:
         self.address = checked_address(base_url)
-        self._headers = {"Content-Type": "application/json", "Accept": "application/json", **(headers or {})}
+        self._headers = {
+            "Content-Type": "application/json",
+            "Accept": "application/json",
+            "Accept-Encoding": "gzip, deflate",
+        }
+        self._headers |= headers or {}
         if key is not None:
             name, prefix = key_header
             self._headers[name] = prefix + key.get_secret_value()
@@ -89,6 +93,8 @@ class HttpEndpoint:
                 response = await self._connected().post(self.address + path, content=body)
         except TimeoutError:
             raise TryTimeout(f"{self.address} gave no answer within {timeout_s:g} s") from None
+        except BodyTooLarge as error:
+            raise MalformedCompletion(f"{self.address} cannot be used: {error}") from None
         except httpx.DecodingError:
             raise MalformedCompletion(f"{self.address} sent a body that cannot be unpacked") from None
         except httpx.TransportError as error:
@@ -128,7 +134,7 @@ class HttpEndpoint:
         if self._client is None:
             self._client = httpx.AsyncClient(
                 headers=self._headers,
-                transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in _LOOPBACK),
+                transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in LOOPBACK),
                 timeout=_TIMEOUT,
                 trust_env=False,  # the transport reads the environment
             )
@@ -172,19 +178,14 @@ def _said(body: bytes) -> tuple[str, str]:
     try:
         error = from_json(body)["error"]
     except (ValueError, KeyError, TypeError):
-        return "", _one_line(body.decode("utf-8", "replace"))
+        return "", excerpt(body)
     if not isinstance(error, dict):
-        return "", _one_line(str(error))
-    return str(error.get("code") or error.get("type") or ""), _one_line(str(error.get("message") or ""))
-
-
-def _one_line(text: str) -> str:
-    text = " ".join(scrub(text).split())
-    return text if len(text) <= 200 else f"{text[:199]}…"
+        return "", excerpt(str(error))
+    return str(error.get("code") or error.get("type") or ""), excerpt(str(error.get("message") or ""))
 
 
 def _words(error: httpx.TransportError) -> str:
-    text = _one_line(str(error))
+    text = excerpt(str(error))
     return f"{text} ({type(error).__name__})" if text else type(error).__name__
 
 

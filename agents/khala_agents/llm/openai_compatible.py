@@ -13,7 +13,7 @@ from pydantic_core import to_json
 
 from khala_agents.llm.client import Completion, LLMError, MalformedCompletion, Request, Scalar
 from khala_agents.llm.http import HttpEndpoint, error_for
-from khala_agents.secret import scrub
+from khala_agents.secret import excerpt, scrub
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ class OpenAICompatible:
         try:
             fault = _Fault.model_validate_json(answer)  # "200 OK" with the error in the body: OpenRouter does it
         except ValidationError:
-            begin = scrub(answer[:80].decode("utf-8", "replace"))
+            begin = excerpt(answer, 80)
             return MalformedCompletion(f"{self.endpoint} answered with no chat completion: {begin!r}")
         return error_for(self.endpoint, fault.error.code, {}, answer)
 

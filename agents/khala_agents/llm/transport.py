@@ -2,7 +2,8 @@
 
 httpx's own transport spends most of a call's CPU, and cancelled calls keep slots of its pool
 (httpcore 1.0.9, encode/httpcore#1093). Over this one, a call costs half as much when many are made at once,
-see `bench/http_client.py`. Bodies are read whole: no completion is streamed here.
+see `bench/http_client.py`. Bodies are read whole, because no completion is streamed here, and up to `MAX_BODY_BYTES`;
+aiohttp unpacks them in pieces, so that a small body that unpacks to gigabytes is noticed after a few megabytes.
 """
 
 from __future__ import annotations
@@ -11,13 +12,22 @@ from typing import TYPE_CHECKING
 
 import aiohttp
 import httpx
+from aiohttp.http_exceptions import ContentEncodingError
 
 if TYPE_CHECKING:
     import ssl
 
 CONNECT_S = 5.0
 KEEP_ALIVE_S = 120.0
+MAX_BODY_BYTES = 8 * 2**20
+"""Of an answer, unpacked; the longest completion of today's models has half a megabyte."""
+_DONE = ("content-encoding", "content-length", "transfer-encoding")
+"""Headers that no longer say what the body is."""
 _OURS = frozenset({"Accept", "Accept-Encoding", "User-Agent", "Content-Type"})
+
+
+class BodyTooLarge(httpx.DecodingError):
+    """An answer has more than `MAX_BODY_BYTES`."""
 
 
 class AiohttpTransport(httpx.AsyncBaseTransport):
@@ -38,6 +48,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
 
         Raises:
             httpx.TransportError: there is no answer.
+            httpx.DecodingError: it cannot be unpacked, or is too large.
         """
         try:
             async with self._open().request(
@@ -47,14 +58,16 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 data=request.content,
                 allow_redirects=False,
             ) as answer:
-                body = await answer.read()
+                body = await _body(answer)
         except aiohttp.ServerTimeoutError as error:
             raise httpx.ConnectTimeout(str(error), request=request) from error
         except aiohttp.ClientConnectorError as error:
             raise httpx.ConnectError(str(error), request=request) from error
         except (aiohttp.ClientError, OSError) as error:
-            raise httpx.ReadError(str(error), request=request) from error
-        return httpx.Response(answer.status, headers=answer.raw_headers, content=body, request=request)
+            kind = httpx.DecodingError if isinstance(error.__cause__, ContentEncodingError) else httpx.ReadError
+            raise kind(str(error), request=request) from error
+        headers = [(name, value) for name, value in answer.raw_headers if name.decode("latin-1").lower() not in _DONE]
+        return httpx.Response(answer.status, headers=headers, content=body, request=request)
 
     async def aclose(self) -> None:
         """Close the connections."""
@@ -69,7 +82,16 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 timeout=aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_S),
                 cookie_jar=aiohttp.DummyCookieJar(),
                 trust_env=self._proxies,
-                auto_decompress=False,  # httpx does it
                 skip_auto_headers=_OURS,  # httpx has set them
             )
         return self._session
+
+
+async def _body(answer: aiohttp.ClientResponse) -> bytes:
+    body = bytearray()
+    async for piece in answer.content.iter_any():
+        body += piece
+        if len(body) > MAX_BODY_BYTES:
+            answer.close()  # the rest is not read for the sake of the connection
+            raise BodyTooLarge(f"the answer is larger than {MAX_BODY_BYTES >> 20} MB")
+    return bytes(body)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
 from typing import TYPE_CHECKING
 
 from khala_agents.policy import Policy
+from khala_agents.scripted.players import PLAYERS
 
 if TYPE_CHECKING:
     from khala_agents.policy import Context
+    from khala_agents.scripted.players import PlayerName
 
 
 class Fixed(Policy):
@@ -20,6 +23,24 @@ class Fixed(Policy):
         """Return the text."""
         del context
         return self._text
+
+
+class Player(Policy):
+    """A scripted player within a worker: it plays from the text of the observation alone.
+
+    Args:
+        name: of the player.
+        seed: for what it leaves to chance; the same seed and text give the same reply.
+    """
+
+    def __init__(self, name: PlayerName, *, seed: int = 0) -> None:
+        self._play = PLAYERS[name]
+        self._seed = seed
+
+    async def decide(self, context: Context) -> str:
+        """Return the player's reply."""
+        text = context.observation.text
+        return self._play(text, random.Random(f"{self._seed} {text}"))
 
 
 class Silent(Fixed):

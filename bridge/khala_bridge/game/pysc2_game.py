@@ -24,6 +24,7 @@ from khala_bridge.errors import GameError, GameMissing
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
+from khala_protocol.files import MB, read_limited
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 _PLACING_LOOPS = 16
 """Loops that a map's script may take until it places the first unit; the battles need none or one."""
+MAX_MAP_BYTES = 64 * MB
+"""The largest map of the game's ladder has 6 MB."""
 _environment = threading.Lock()
 
 
@@ -220,7 +223,7 @@ class _Player:
 def _map_data(config: GameConfig) -> bytes:
     path: Path = config.sc2path / "Maps" / config.map.file
     try:
-        return path.read_bytes()
+        return read_limited(path, MAX_MAP_BYTES)
     except FileNotFoundError:
         raise GameMissing(
             f"there is no map {config.map.file} in {config.sc2path / 'Maps'}: copy it there, or play with the simulator"

@@ -7,7 +7,6 @@ names, so that a wrong name is an error with its line, not a surprise in the gam
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
@@ -20,15 +19,19 @@ from khala_bridge.catalogue.catalogue import alias_of, catalogue, chosen
 from khala_bridge.knowledge import knowledge
 from khala_bridge.knowledge.forms import forms_of
 from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
-from khala_bridge.task.maps import Difficulty, MapSpec, Race, known_maps
+from khala_bridge.task.maps import MOST_LOOPS, Difficulty, MapSpec, Race, known_maps
+from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec, Trigger
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
 T = TypeVar("T")
+
+MOST_ACTIONS = 1000
+"""Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
 AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
@@ -41,13 +44,10 @@ def _key_name(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-def _known(name: str, known: Iterable[str], what: str) -> str:
-    names = list(known)
-    if name in names:
+def _known(name: str, known: Collection[str], what: str) -> str:
+    if name in known:
         return name
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ""
-    raise ValueError(f"there is no {what} '{name}'{hint}")
+    raise UnknownName(what, name, known)
 
 
 def _known_action(name: str) -> str:
@@ -170,7 +170,7 @@ class AgentConfig(Frozen):
     group that the type has. A form (sieged, burrowed, …) that is not listed has the actions of its type."""
     task: str = ""
     """Its task in addition to the task of all."""
-    max_actions: int | None = Field(default=None, ge=1)
+    max_actions: int | None = Field(default=None, ge=1, le=MOST_ACTIONS)
     """Limit of actions for one of its teams in one reply; None for the task's limit."""
     required: bool = True
     """Whether the match waits for it, at the start and while it is away."""
@@ -183,6 +183,7 @@ class AgentConfig(Frozen):
     @field_validator("actions")
     @classmethod
     def _actions(cls, actions: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        actions = {unit_type: tuple(dict.fromkeys(names)) for unit_type, names in actions.items()}
         found = {unit_type: chosen(names, unit_type) for unit_type, names in actions.items()}
         for unit_type, names in found.items():
             if strange := [name for name in names if not catalogue()[name].fits(unit_type)]:
@@ -289,9 +290,9 @@ class TaskConfig(Frozen):
     faults: FaultRules = FaultRules()
     default_reply: str = ""
     """Reply of an agent that did not answer in time; empty: its units continue."""
-    max_actions: int = Field(default=3, ge=1)
+    max_actions: int = Field(default=3, ge=1, le=MOST_ACTIONS)
     """Limit of actions for one team in one reply."""
-    max_steps: int | None = Field(default=None, ge=1)
+    max_steps: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Decisions after which an episode ends without a result; None: the map decides."""
 
     @field_validator("sides")

@@ -6,7 +6,10 @@ The file of a map, its players and its purpose; only the game knows the rest.
 from __future__ import annotations
 
 import functools
+from pathlib import PurePosixPath
 from typing import Literal, TypeAlias
+
+from pydantic import Field, field_validator
 
 from khala_bridge import data
 from khala_protocol.messages import Frozen
@@ -26,12 +29,16 @@ Difficulty: TypeAlias = Literal[
 ]
 
 
+MOST_LOOPS = 2**24
+"""Game loops of a game: more than eight days; a game of the real one ends before 2**19 by itself."""
+
+
 class MapSpec(Frozen):
     """One map and its players."""
 
     name: str = ""
     file: str
-    """Below the directory `Maps` of the install."""
+    """Below the directory `Maps` of the install; a directory of yours can be linked there."""
     race: Race
     """Of the agents' side."""
     opponent: Race | None
@@ -42,7 +49,7 @@ class MapSpec(Frozen):
     """Whether a second side of agents can take the place of the computer player."""
     difficulty: Difficulty = "very_hard"
     """Of the computer player; the paper's setting."""
-    limit_loops: int | None = None
+    limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Game loop at which the map itself ends the game."""
     goal: str = ""
     """The task on the map."""
@@ -50,6 +57,14 @@ class MapSpec(Frozen):
     """Types of the agents' units, for a task that is made for the map."""
     upgrades: tuple[str, ...] = ()
     """Upgrades that the map grants the agents' side, as far as actions need them; named as in `pysc2.lib.upgrades`."""
+
+    @field_validator("file")
+    @classmethod
+    def _below_maps(cls, file: str) -> str:
+        parts = PurePosixPath(file).parts
+        if not parts or ".." in parts or PurePosixPath(file).is_absolute() or not file.isprintable():
+            raise ValueError("the path of a map goes from the directory Maps of the install downwards")
+        return file
 
 
 @functools.cache

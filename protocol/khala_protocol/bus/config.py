@@ -27,7 +27,9 @@ WAIT_BEFORE_DROP_S = 0.02
 were dropped on a busy machine, and came 0.3 s later; a batch takes 5 ms on a link of 100 Mbit."""
 UNIX_PATH_BYTES = 107
 _ENDPOINT = re.compile(r"(?P<transport>[a-z-]+)/(?P<address>[^?#]+)(?P<rest>[?#].*)?")
-_HOST_PORT = re.compile(r"(?P<host>\[[^\]]+\]|[^:\[\]]+):(?P<port>\d{1,5})")
+_HOST_PORT = re.compile(
+    r"(?P<host>\[[\w:.%]{2,60}\]|(?=.{1,253}:)[\w-]{1,63}(\.[\w-]{1,63})*\.?):(?P<port>\d{1,5})", re.ASCII
+)
 
 
 class TlsFiles(BaseModel):
@@ -179,17 +181,19 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
     found = _ENDPOINT.fullmatch(endpoint)
     if not found or found["transport"] not in TRANSPORTS:
         raise BusError(
-            f"{endpoint!r} is no endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; "
+            f"{endpoint[:100]!r} is no endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; "
             f"transports are {', '.join(sorted(TRANSPORTS))}"
         )
     if found["transport"] == "unixsock-stream":
         if len(found["address"].encode()) > UNIX_PATH_BYTES:
-            raise BusError(f"{endpoint!r} has too long a path: a unix socket's has at most {UNIX_PATH_BYTES} bytes")
+            raise BusError(
+                f"{endpoint[:200]!r} has too long a path: a unix socket's has at most {UNIX_PATH_BYTES} bytes"
+            )
         return
     place = _HOST_PORT.fullmatch(found["address"])
     port = int(place["port"]) if place else -1
     if not (0 if listening else 1) <= port <= 65535:
-        raise BusError(f"{endpoint!r} needs a host and a port between 1 and 65535, such as tcp/127.0.0.1:7447")
+        raise BusError(f"{endpoint[:100]!r} needs a host and a port between 1 and 65535, such as tcp/127.0.0.1:7447")
 
 
 def _check_tls(endpoint: str, tls: TlsFiles | None) -> None:

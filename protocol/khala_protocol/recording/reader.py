@@ -5,24 +5,23 @@ from __future__ import annotations
 import hashlib
 import itertools
 import os
-import struct
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TypeVar
 
-import zstandard
-from mcap.exceptions import McapError
 from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata, Statistics
-from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.stream_reader import MAGIC_SIZE
 from mcap.writer import MCAP0_MAGIC
 
 from khala_protocol.codec import decode
 from khala_protocol.errors import PeerError, RecordingError
+from khala_protocol.files import MB, check_regular
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
 from khala_protocol.recording.recorder import KINDS, LIBRARY, METADATA, Recorder
+from khala_protocol.recording.unpack import BROKEN, unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -33,9 +32,8 @@ W = TypeVar("W", bound=Wire)
 
 _RUN_LEVEL = tuple(f"/{topic}" for topic in (Topic.RUN, Topic.RESULT))
 _OPENERS = tuple(f"/{topic}" for topic in (Topic.OBSERVATION, Topic.REPORT))
-_LARGEST_RECORD = 2**30  # bytes; ours are a megabyte or one sample, a length beyond this is damage
-_BROKEN = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError, OverflowError, MemoryError)
-"""Errors that mcap raises on bytes that are not an MCAP file; found by cutting and flipping bytes of one."""
+MAX_MESSAGE_BYTES = 8 * MB
+"""Longer payloads are not read as messages; a prompt of a million tokens has half of it."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +62,8 @@ class Recorded:
 
     @cached_property
     def message(self) -> Wire | None:
-        """The message; None if the bytes are not of this protocol, or a picture."""
-        if self.address is not None and self.address.topic is Topic.IMAGE:
+        """The message; None if the bytes are not of this protocol, too many, or a picture."""
+        if len(self.payload) > MAX_MESSAGE_BYTES or (self.address and self.address.topic is Topic.IMAGE):
             return None
         try:
             return decode(self.payload)
@@ -108,6 +106,11 @@ class Recording:
     results: tuple[Result, ...]
     counts: Mapping[str, int]
     metadata: Mapping[str, str]
+
+    @property
+    def samples(self) -> int:
+        """The number of readable samples."""
+        return sum(self.counts.values())
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -216,6 +219,7 @@ def recover(path: Path | str, new_path: Path | str) -> Recording:
 
 def _require_recording(path: Path) -> None:
     try:
+        check_regular(path)
         with path.open("rb") as file:
             magic = file.read(MAGIC_SIZE)
     except FileNotFoundError:
@@ -236,7 +240,7 @@ def _records(path: Path) -> Iterator[Recorded | McapRecord]:
     expected: Iterator[int] = itertools.repeat(-1)
     with path.open("rb") as file:
         try:
-            for record in StreamReader(file, validate_crcs=True, record_size_limit=_LARGEST_RECORD).records:
+            for record in unpacked(file):
                 match record:
                     case Header() if record.library.startswith(LIBRARY):
                         expected = itertools.count()
@@ -248,7 +252,7 @@ def _records(path: Path) -> Iterator[Recorded | McapRecord]:
                         yield Recorded(keys[record.channel_id], record.data, record.log_time, record.sequence)
                     case _:
                         yield record
-        except _BROKEN:
+        except BROKEN:
             return
         except OSError as error:
             raise RecordingError(f"{path} cannot be read: {error.strerror}") from error

@@ -53,8 +53,9 @@ class Names:
 def _known(value: Any, known: Collection[Any], what: str) -> Any:
     if value in known:
         return value
-    close = difflib.get_close_matches(str(value), [str(name) for name in sorted(known)], n=1)
-    hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(map(str, sorted(known))) or 'none'}"
+    names = sorted(map(str, known))  # a region may be called 7 and another "seven"
+    close = difflib.get_close_matches(str(value)[:100], names, n=1)
+    hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(names) or 'none'}"
     raise ValueError(f"there is no {what} {value}{hint}")
 
 

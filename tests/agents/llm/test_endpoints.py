@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import random
 import socket
+import tracemalloc
+import zlib
 from typing import TYPE_CHECKING, Any, Self
 
 import pytest
@@ -64,6 +67,55 @@ async def test_a_completion_comes_with_its_usage_and_price() -> None:
     said = count_tokens(completion.text)
     assert (completion.usage.prompt_tokens, completion.usage.completion_tokens) == (prompt, said)
     assert completion.usage.cost_usd == pytest.approx((prompt + 10 * said) / 1e6)
+
+
+# --- bodies --------------------------------------------------------------------------------------------
+
+
+async def _gzip(request: web.Request) -> web.StreamResponse:
+    packer = zlib.compressobj(wbits=31)
+    packed = [packer.compress(bytes(2**20)) for _ in range(100)]
+    return web.Response(
+        body=b"".join(packed) + packer.flush(), headers={"Content-Encoding": "gzip"}, content_type="application/json"
+    )
+
+
+async def _endless(request: web.Request) -> web.StreamResponse:
+    response = web.StreamResponse()
+    await response.prepare(request)
+    with contextlib.suppress(ConnectionError):
+        while True:
+            await response.write(bytes(2**20))
+    return response
+
+
+async def _unknown(request: web.Request) -> web.StreamResponse:
+    return web.Response(body=b"{}", headers={"Content-Encoding": "gzip"}, content_type="application/json")
+
+
+HOSTILE_BODIES = [
+    (_gzip, "cannot be used: the answer is larger than 8 MB"),
+    (_endless, "cannot be used: the answer is larger than 8 MB"),
+    (_unknown, "sent a body that cannot be unpacked"),
+]
+
+
+@pytest.mark.parametrize(("handler", "sentence"), HOSTILE_BODIES, ids=["gzip", "endless", "unknown"])
+async def test_no_body_takes_more_than_some_megabytes(handler: Any, sentence: str) -> None:
+    application = web.Application()
+    application.router.add_post("/v1/chat/completions", handler)
+    runner = web.AppRunner(application, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    try:
+        tracemalloc.start()
+        with pytest.raises(MalformedCompletion, match=sentence):
+            await ask(client(f"http://127.0.0.1:{runner.addresses[0][1]}/v1"))
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+        await runner.cleanup()
+    assert peak < 40e6
 
 
 FAULTS = [

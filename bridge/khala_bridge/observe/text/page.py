@@ -153,8 +153,8 @@ def _find(reference: str) -> Section:
     if colon:
         try:
             importlib.import_module(module)
-        except ImportError as error:
-            raise ConfigError(f"the module of section '{reference}' cannot be imported: {error}") from None
+        except Exception as error:  # an import runs the user's code, which may raise anything
+            raise ConfigError(f"the module of section '{reference}' cannot be imported: {error}") from error
     if name not in SECTIONS:
         close = difflib.get_close_matches(name, SECTIONS, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(sorted(SECTIONS))}"
