@@ -31,7 +31,8 @@ from rich.table import Table
 from bench.original import step_s
 from khala import games
 from khala.children import Children
-from khala.local import one_side, shares
+from khala.hosting import game_of
+from khala.local import shares
 from khala.local_bus import LOOPBACK, local_endpoint
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
@@ -219,7 +220,7 @@ def _card(run: str, task: TaskConfig) -> Run:
 async def battle(task: TaskConfig) -> Snapshot:
     """Return a snapshot from the middle of a battle."""
     sc2path, _ = games.find("simulator")
-    async with one_side(MatchConfig(task=task, run="bench"), sc2path) as game:
+    async with game_of(MatchConfig(task=task, run="bench"), sc2path) as game:
         (snapshot,) = await game.reset()
         for _ in range(BATTLE_STEPS):
             snapshot = (await game.act([[]], task.clock.step_loops))[0].snapshot

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.local import one_side
+from khala.hosting import game_of
 from khala_agents.llm.vision import ANTHROPIC, OPENAI
 from khala_agents.scripted.players import PLAYERS
 from khala_bridge.task.images import PAPER, ImageSpec
@@ -123,7 +123,7 @@ async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Quest
     """
     config = MatchConfig(task=task, run="seen")
     agents = Played(step)
-    async with one_side(config, sc2path) as game:
+    async with game_of(config, sc2path) as game:
         try:
             async for _ in Match(config, game, sides_of(config), agents, SilentObserver()).play():
                 pass

@@ -15,18 +15,14 @@ from urllib.parse import urlsplit
 
 from khala import environment, games
 from khala.children import Children
+from khala.hosting import hosted
 from khala.local_bus import local_endpoint
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model
-from khala_bridge.act import executor_of
-from khala_bridge.game.game import GameConfig, GameThread, Sides
-from khala_bridge.game.pysc2_game import PySC2Game
-from khala_orchestrator.host import host
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import Report
-from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
@@ -34,6 +30,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
     from khala_protocol.messages import Result, Wire
 
@@ -79,7 +76,13 @@ class Minds:
 
 
 async def play(
-    config: MatchConfig, minds: Minds, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
+    config: MatchConfig,
+    minds: Minds,
+    directory: Path,
+    *,
+    game: str,
+    watch: Callable[[Wire], None] = lambda _: None,
+    past: Unfinished | None = None,
 ) -> list[Result]:
     """Play a match with everything it needs on this machine.
 
@@ -89,6 +92,7 @@ async def play(
         directory: is created, and gets the logs of the processes.
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
+        past: what was played of this match before its host was lost.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
@@ -100,7 +104,6 @@ async def play(
         stack.push_async_callback(bus.close)
         children = await stack.enter_async_context(Children(directory))
         started = await _start_agents(children, config, minds, bus)
-        side = await stack.enter_async_context(one_side(config, sc2path))
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
@@ -111,34 +114,24 @@ async def play(
                     children.start_again_with(share.process, *share.arguments)
             watch(message)
 
-        return await _unless_one_dies(host(config, side, bus, watch=see), children, begun)
+        return await _unless_one_dies(hosted(config, sc2path, bus, watch=see, past=past), children, begun)
 
 
 async def play_hosted(
-    config: MatchConfig, bus: BusConfig, directory: Path, *, game: str, watch: Callable[[Wire], None] = lambda _: None
+    config: MatchConfig,
+    bus: BusConfig,
+    directory: Path,
+    *,
+    game: str,
+    watch: Callable[[Wire], None] = lambda _: None,
+    past: Unfinished | None = None,
 ) -> list[Result]:
     """Play a match whose agents come over the bus; arguments and errors as in `play`."""
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         session = await open_bus(bus)
         stack.push_async_callback(session.close)
-        side = await stack.enter_async_context(one_side(config, sc2path))
-        return await host(config, side, session, watch=watch)
-
-
-def one_side(config: MatchConfig, sc2path: Path) -> Sides:
-    """Return the game of a match, not started yet."""
-    task = config.task
-    sides = task.per_side()
-    started = GameConfig(
-        sc2path=sc2path,
-        map=task.map_spec,
-        players=len(sides),
-        seed=config.seed,
-        render_px=task.render_px,
-        environment=environment.plain() | named_parent(),
-    )
-    return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(side) for side in sides])
+        return await hosted(config, sc2path, session, watch=watch, past=past)
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:

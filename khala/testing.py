@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala import games
-from khala.local import one_side
+from khala.hosting import game_of
 from khala_agents.policy import as_policy
 from khala_agents.replay import replay_agent
 from khala_orchestrator.replay import recorded_config, replay
@@ -36,7 +36,7 @@ async def replay_host(path: Path | str, *, game: str = "simulator", modules: Col
     """
     recording = Recording.open(path)
     sc2path, _ = games.find(game)
-    async with one_side(recorded_config(recording, modules=modules), sc2path) as side:
+    async with game_of(recorded_config(recording, modules=modules), sc2path) as side:
         return await replay(recording, side, modules=modules)
 
 

@@ -114,7 +114,7 @@ class _PublishingObserver:
     """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
 
     Attributes:
-        live: False while a recording is played again: then it only calls `watch`, and keeps the briefings.
+        live: False while a recording is played again: then it only keeps the briefings.
     """
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
@@ -144,7 +144,7 @@ class _PublishingObserver:
         if self.live:
             await self._announcer.report(report)
             self._flush()
-        self._watch(report)
+            self._watch(report)
 
     async def result(self, result: Result) -> None:
         await self._announcer.result(result)

@@ -68,14 +68,18 @@ class Unfinished:
             yield sample
 
 
-def unfinished(recording: Recording) -> Unfinished:
+def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfinished:
     """Return what is left to play of a recorded match.
+
+    Args:
+        recording: of the match, up to where its host or its game was lost.
+        config: the match; None: as its run card says.
 
     Raises:
         ResumeError: it is over, or its game cannot be played again.
         RecordingError: it has no run card.
     """
-    config = recorded_config(recording)
+    config = config or recorded_config(recording)
     if not config.game.startswith("Khala simulator"):
         raise ResumeError(
             f"{recording.path} was played on {config.game}, which does not play the same game twice: begin a new run"

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from khala.local import one_side
+from khala.hosting import game_of
 from khala_agents.policy import Policy
 from khala_agents.worker import run_worker
 from khala_bridge.task.images import ImageSpec
@@ -72,7 +72,7 @@ async def test_a_battle_with_pictures_is_recorded_and_replayed_to_the_pixel(tmp_
         for name, policy in policies.items()
     ]
     sc2path = install(tmp_path / "sc2")
-    async with one_side(config, sc2path) as game:
+    async with game_of(config, sc2path) as game:
         await host(config, game, broker.session())
     stop.set()
     await asyncio.gather(*workers)
@@ -91,5 +91,5 @@ async def test_a_battle_with_pictures_is_recorded_and_replayed_to_the_pixel(tmp_
     rendered = [ref.title for ref in named.values() if "rendered by the game" in ref.title]
     assert rendered, "the simulator renders"
 
-    async with one_side(config.model_copy(update={"record": None}), sc2path) as game:
+    async with game_of(config.model_copy(update={"record": None}), sc2path) as game:
         assert await replay(recording, game) == []
