@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeVar
 
+from pydantic import model_validator
+
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.task.maps import MapSpec  # noqa: TC001  # pydantic evaluates it
@@ -56,6 +58,12 @@ class GameConfig(Frozen):
     """Whether each observation says what every own unit can do now: a query of 1 ms for 30 units, 3 ms for 100."""
     start_timeout_s: int = 120
     """Time limit until the game listens."""
+
+    @model_validator(mode="after")
+    def _somebody_to_play(self) -> Self:
+        if self.players == 2 and self.map.opponent is None:
+            raise ValueError(f"the map {self.map.name} is played alone: it has no place for a second player")
+        return self
 
     @property
     def camera_width(self) -> float:
