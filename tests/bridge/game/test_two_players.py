@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -145,23 +147,28 @@ def test_each_player_of_a_full_game_sees_its_own_and_is_asked_about_its_own(sc2p
 
 
 @pytest.mark.slow
-def test_a_game_of_two_that_is_killed_leaves_no_process(sc2path: Path) -> None:
+@pytest.mark.parametrize("dead", ["first", "second", "both"])
+def test_a_game_of_two_that_loses_a_process_ends_and_leaves_none(sc2path: Path, dead: str) -> None:
     with two(sc2path, "duel_3m") as game:
         now = game.reset()
-        assert len(_processes(sc2path)) == 2
-        game.kill()
+        first, second = _processes(sc2path)
+        if dead == "both":
+            game.kill()
+        else:
+            os.kill(first if dead == "first" else second, signal.SIGKILL)
         with pytest.raises(GameError):
             act(game, now, wait, wait)
     assert not _processes(sc2path)
 
 
-def _processes(sc2path: Path) -> list[str]:
+def _processes(sc2path: Path) -> list[int]:
+    """Return the processes of the game, in the order in which they were started."""
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             if str(sc2path).encode() in (directory / "cmdline").read_bytes():
-                found.append(directory.name)
-    return found
+                found.append(int(directory.name))
+    return sorted(found)
 
 
 def test_a_map_that_is_played_alone_has_no_second_player(sc2path: Path) -> None:
