@@ -109,16 +109,19 @@ def test_nothing_happens_between_two_silent_players(sc2path: Path, name: str) ->
 
 
 @pytest.mark.slow
-def test_the_one_who_waits_is_the_one_who_is_attacked(sc2path: Path) -> None:
-    """Orders enter the game for the player who gives them."""
+@pytest.mark.parametrize("mover", [0, 1])
+def test_an_order_moves_the_units_of_the_player_who_gives_it(sc2path: Path, mover: int) -> None:
+    acts: list[Act] = [wait, wait]
+    acts[mover] = cross
     with two(sc2path, "duel_2s3z") as game:
-        now = game.reset()
-        for _ in range(8):
-            now = act(game, now, wait, cross)
-    blue, red = now
-    assert all(unit.pos.x < MIDDLE / 2 for unit in blue.own)
-    assert all(unit.pos.x < MIDDLE / 2 for unit in red.own)
-    assert [snapshot.player.player_id for snapshot in now] == [1, 2]
+        before = game.reset()
+        after = act(game, before, *acts, loops=16)
+    moved = [
+        all(unit.pos != old.pos for unit, old in zip(now.own, then.own, strict=True))
+        for now, then in zip(after, before, strict=True)
+    ]
+    assert moved == [mover == 0, mover == 1]
+    assert [snapshot.player.player_id for snapshot in after] == [1, 2]
 
 
 @pytest.mark.slow
