@@ -53,7 +53,7 @@ def _link(task: TaskConfig) -> str:
 
 
 def _agents(task: TaskConfig) -> str:
-    return ", ".join(agent.name for agent in task.agents)
+    return ", ".join(dict.fromkeys(card.name for card in task.cards()))
 
 
 def _task(task: TaskConfig) -> str:
@@ -66,7 +66,9 @@ def _task(task: TaskConfig) -> str:
     if len(task.agents) > 1 and task.communication:
         channels = f", and on {codes(task.channels)}" if task.channels else ""
         facts.append(f"* The agents can write to each other{channels}.")
-    rows = [row for agent in task.agents for row in _teams(agent)]
+    if task.sides:
+        facts.append(f"* Two sides play against each other: {codes(side.side for side in task.sides)}.")
+    rows = list(dict.fromkeys(row for side in task.per_side() for agent in side.agents for row in _teams(agent)))
     return join(
         f"## {task.name}",
         task.description,
@@ -91,6 +93,7 @@ def _teams(agent: AgentConfig) -> list[tuple[str, str, str, str]]:
 def _map_row(spec: MapSpec) -> tuple[object, ...]:
     limit = f"{spec.limit_loops} loops, {spec.limit_loops / LOOPS_PER_S:.0f} s" if spec.limit_loops else ""
     against = f"{spec.opponent}, {spec.difficulty}" if spec.opponent else "nobody"
+    against += ", or a second side" if spec.two_sides else ""
     row = (code(spec.name), code(spec.file), spec.race, against, limit)
     try:
         shipped = load_map(spec.file.removesuffix(".SC2Map"))

@@ -37,7 +37,7 @@ def test_the_hash_of_the_catalogue_is_a_sha256() -> None:
 
 def test_the_maps_of_every_family_are_known() -> None:
     families = Counter(spec.file.partition("/")[0] for spec in known_maps().values())
-    assert families == {"llm_smac": 9, "llm_pysc2": 25, "SMAC_Maps": 23, "mini_games": 7, "Melee": 8}
+    assert families == {"llm_smac": 9, "llm_pysc2": 25, "SMAC_Maps": 23, "mini_games": 7, "Melee": 8, "duels": 3}
     names = [(name.removeprefix("smac_"), spec.file) for name, spec in known_maps().items()]
     assert all(file.endswith(f"/{name}.SC2Map") for name, file in names)
 

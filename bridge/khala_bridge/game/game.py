@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
@@ -63,6 +63,12 @@ class GameConfig(Frozen):
     """Time limit until the game listens."""
     environment: dict[str, str] | None = Field(default=None, repr=False)
     """Environment of the game's process; None: ours, with all that is in it."""
+
+    @model_validator(mode="after")
+    def _somebody_to_play(self) -> Self:
+        if self.players == 2 and self.map.opponent is None:
+            raise ValueError(f"the map {self.map.name} is played alone: it has no place for a second player")
+        return self
 
     @property
     def camera_width(self) -> float:

@@ -21,8 +21,8 @@ from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps")
-"""Folders below `Maps` that PySC2, SMAC and LLM-PySC2 look into."""
+FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps", "duels")
+"""Folders below `Maps`: those that PySC2, SMAC and LLM-PySC2 look into, and that of Khala's own maps."""
 
 SUFFIX = ".SC2Map"
 _MARK = b"# A map of Khala's simulator\n"

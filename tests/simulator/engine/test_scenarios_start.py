@@ -23,6 +23,7 @@ STALKERS = {"Stalker": 12}
 
 # (map, of the agent, of the opponent), beside what a melee start gives
 ARMIES = [
+    ("duel_2s3z", {"Stalker": 2, "Zealot": 3}, {"Stalker": 2, "Zealot": 3}),
     ("pvz_task1_level1", {"Adept": 2}, {"Queen": 2}),
     ("pvz_task1_level3", {"Adept": 2}, {"Queen": 2, "Zergling": 4}),
     ("pvz_task2_level2", {"Phoenix": 3}, {"Queen": 2, "SporeCrawler": 1}),
@@ -103,7 +104,7 @@ PURSES = [
     ("BuildMarines", (50, 0), [], []),
 ]
 
-FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 23, "llm_smac": 9, "mini_games": 7, "Melee": 9}
+FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 23, "llm_smac": 9, "mini_games": 7, "Melee": 9, "duels": 3}
 
 
 def army(world: World, player: int) -> dict[str, int]:
@@ -148,12 +149,22 @@ def test_players_begin_with_what_the_map_gives(
     assert [player.upgrades for player in others[:1]] in ([theirs], [])
 
 
+@pytest.mark.parametrize("name", ["duel_3m", "duel_8m", "duel_2s3z"])
+def test_the_sides_of_a_duel_are_mirrored_unit_by_unit(name: str) -> None:
+    world = begun(name)
+    first, second = (world.units_of(player) for player in (1, 2))
+    width = world.map.terrain.size[0]
+    assert [world.unit_type(slot).name for slot in first] == [world.unit_type(slot).name for slot in second]
+    assert world.pos[first].tolist() == [[width - x, y] for x, y in world.pos[second].tolist()]
+
+
 ONE_OF_A_FAMILY = {
     "llm_smac/2s3z",
     "llm_pysc2/pvz_task8_level1",
     "SMAC_Maps/MMM2",
     "mini_games/DefeatZerglingsAndBanelings",
     "Melee/Simple64",
+    "duels/duel_2s3z",
 }
 
 
