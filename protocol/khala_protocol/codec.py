@@ -13,10 +13,13 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, from_json
 
 from khala_protocol.errors import MalformedMessage, WrongVersion
-from khala_protocol.messages import SCHEMA_VERSION, AnyMessage, Wire
+from khala_protocol.messages import SCHEMA_VERSION, AnyMessage, Reply, Wire
 
 _ANY: TypeAdapter[Wire] = TypeAdapter(AnyMessage)
 M = TypeVar("M", bound=Wire)
+
+MAX_REPLY_BYTES = 2**20
+"""Longer replies are refused unread. A character has at most 12 bytes, as two escapes."""
 
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _SHOWN = 60
@@ -52,8 +55,10 @@ def decode_as(kind: type[M], payload: bytes) -> M:
 
     Raises:
         WrongVersion: it has another major version of the schema.
-        MalformedMessage: it is not a message, or one of another kind.
+        MalformedMessage: it is not a message, or one of another kind, or a reply of more than `MAX_REPLY_BYTES`.
     """
+    if kind is Reply and len(payload) > MAX_REPLY_BYTES:
+        raise MalformedMessage(f"a reply of {len(payload)} bytes is too long: it may have {MAX_REPLY_BYTES}")
     try:
         return kind.model_validate_json(payload)
     except ValidationError as error:

@@ -306,6 +306,7 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
     "unknown_team": "below and tests/bridge/test_addressee.py",
     "too_many_actions": "below",
     "unknown_recipient": "tests/orchestrator/test_mailbox.py",
+    "too_many_messages": "tests/orchestrator/test_mailbox.py",
     "refused_by_game": "tests/bridge/test_executors.py",
 }
 

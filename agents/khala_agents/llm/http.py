@@ -35,6 +35,7 @@ from khala_agents.llm.client import (
 from khala_agents.llm.retry import is_retried
 from khala_agents.llm.transport import CONNECT_S, AiohttpTransport
 from khala_agents.secret import scrub
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     import ssl
@@ -179,7 +180,7 @@ def _said(body: bytes) -> tuple[str, str]:
 
 
 def _one_line(text: str) -> str:
-    text = " ".join(scrub(text).split())
+    text = visible_line(scrub(text))
     return text if len(text) <= 200 else f"{text[:199]}…"
 
 
