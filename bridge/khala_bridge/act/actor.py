@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from khala_bridge.act.addressee import Addressees
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.act.recognise import recognise
+from khala_bridge.act.rejected import CallRejected, reject
 from khala_bridge.act.screen import ScreenExecutor
 from khala_bridge.act.translate import Translator
 from khala_bridge.act.vocabulary import Vocabulary
@@ -23,13 +24,18 @@ from khala_bridge.auto.workers import automatic
 from khala_protocol.messages import Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from khala_bridge.act.plan import Executor
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
+    from khala_protocol.messages import Call
     from khala_protocol.speech import Speech
+
+
+MOST_WRONG = 100
+"""Calls of an agent that are read in addition to as many as may count: 4 600 wrong ones would take 1.3 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +91,8 @@ class Actor:
         commands: list[Command] = []
         accepted: list[str] = []
         faults: list[Rejection] = []
-        for call in speech.calls:
+        most = self._most_calls(agent)
+        for call in speech.calls[:most]:
             recognised = recognise(call, words, addressees)
             if isinstance(recognised, Rejection):
                 faults.append(recognised)
@@ -97,7 +104,19 @@ class Actor:
                 else:
                     commands += translated
                     accepted.append(said.text)
+        if len(speech.calls) > most:
+            faults.append(_unread(speech.calls[most:]))
         return commands, accepted, faults
+
+    def _most_calls(self, agent: AgentObservation) -> int:
+        """Return the number of calls of an agent that are read: all that may count, and some that are wrong."""
+        return self._task.max_actions_of(agent.agent) * len(agent.teams) + MOST_WRONG
+
+
+def _unread(calls: Sequence[Call]) -> Rejection:
+    """Return the rejection of the calls of a reply that has far too many."""
+    what = f"these are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
+    return reject(calls[0], CallRejected("too_many_actions", what))
 
 
 def executor_of(task: TaskConfig) -> Executor:

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.observe import landmarks, side
 from khala_bridge.observe.chronicle import Chronicle
+from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.scene import Scene
 from khala_bridge.observe.stages import Stages
-from khala_bridge.observe.text import Feedback, Page, render, sections_of
+from khala_bridge.observe.text import Page, render, sections_of
 from khala_bridge.state.teams import TeamRoster
 
 if TYPE_CHECKING:
