@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
-from khala_bridge.observe import Feedback
+from khala_bridge.observe import Feedback, shortened
 from khala_orchestrator.cards import briefing
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.tally import Tally
@@ -129,12 +129,11 @@ class Match:
         with watch.phase("act"):
             speeches = self._speeches(answers)
             joint = self.actor.joint(observation, speeches)
-            messages = self._messages(at, speeches)
-            post = await self._deliver(messages, speeches)
+            post = await self._deliver(self._messages(at, speeches), speeches)
         with watch.phase("game"):
             (result,) = await self.game.act([joint.commands], self.config.task.clock.step_loops)
         heard = self._feedback(joint, result, post)
-        report = self._report(at, answers, messages, heard, result, watch.timings(answers))
+        report = self._report(at, answers, post.taken, heard, result, watch.timings(answers))
         return StepOutcome(report, result.snapshot, heard)
 
     async def _begin(self, episode: int) -> None:
@@ -198,9 +197,10 @@ class Match:
         for agent, speech in speeches.items():
             for listen in speech.listens:
                 self.mailbox.listen(Seat(self.config.task.side, agent), listen.channel)
-        for message in messages:
+        post = self.mailbox.deliver(messages)
+        for message in post.taken:
             await self.match_observer.message(message)
-        return self.mailbox.deliver(messages)
+        return post
 
     def _feedback(self, joint: JointAction, result: StepResult, post: Post) -> dict[str, Feedback]:
         feedback = {}
@@ -213,7 +213,7 @@ class Match:
                 *post.rejections.get(seat, ()),
             )
             accepted, received = joint.accepted.get(agent.name, ()), post.received.get(seat, ())
-            feedback[agent.name] = Feedback(accepted, rejections, received)
+            feedback[agent.name] = Feedback(accepted, shortened(rejections), received)
         return feedback
 
     def _report(
