@@ -32,6 +32,7 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
+from khala_protocol.visible import VisibleFormatter
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells expect it."""
@@ -203,11 +204,9 @@ def front_door(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log what happens, on stderr.")] = False,
 ) -> None:
     """Set up logging before any command."""
-    logging.basicConfig(
-        level=logging.INFO if verbose else logging.ERROR,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, handlers=[handler])
     logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
 
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
 from khala_orchestrator.config import all_tasks
-from khala_orchestrator.console import stderr_console
+from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.signals import stop_on_signal
 
@@ -74,7 +73,7 @@ def tasks(*, as_json: Json = False) -> None:
         ]
         typer.echo(json.dumps({"tasks": rows}))
         return
-    console = Console(highlight=False)
+    console = stdout_console()
     for task in found:
         console.print(Text.assemble((task.name, "bold"), "  ", (people([a.name for a in task.agents]), "dim")))
         console.print(Padding(task.description, (0, 0, 0, 4), expand=False))
@@ -117,7 +116,7 @@ def replay(
     if as_json:
         typer.echo(json.dumps(summary(file, selection)))
         return
-    console = Console(highlight=False)
+    console = stdout_console()
     for part in transcript(file, selection, whole=text):
         console.print(part, soft_wrap=isinstance(part, Text))
 
