@@ -115,7 +115,7 @@ class Actor:
 
 def _unread(calls: Sequence[Call]) -> Rejection:
     """Return the rejection of the calls of a reply that has far too many."""
-    what = f"these are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
+    what = f"These are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
     return reject(calls[0], CallRejected("too_many_actions", what))
 
 
