@@ -357,7 +357,9 @@ def main() -> None:
     options.add_argument("--processes", type=int, default=2)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     chosen = options.parse_args()
-    trials = {  # a further kind of input is one more line, and a function of a count and a seed
+    trials: dict[
+        str, tuple[Callable[[int, int], Verdict], int]
+    ] = {  # a further kind of input is one more line, and a function of a count and a seed
         "replies": (partial(replies, scenes()), chosen.replies),
         "frames": (frames, chosen.frames),
     }

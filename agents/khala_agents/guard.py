@@ -17,6 +17,7 @@ from khala_agents.policy import Decision, Said
 from khala_agents.secret import scrub
 from khala_protocol.messages import MAX_DETAIL_CHARACTERS
 from khala_protocol.speech import MAX_REPLY_CHARACTERS
+from khala_protocol.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Coroutine
@@ -116,7 +117,7 @@ class Guard:
     def _once(self, text: str, key: str | None = None) -> None:
         if (key or text) not in self._complaints:
             self._complaints.add(key or text)
-            log.error("agent %s: %s", self._agent, text)
+            log.error("agent %s: %s", self._agent, visible(text))
 
 
 def _fallback(detail: str) -> Decision:

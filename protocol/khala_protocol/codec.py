@@ -14,6 +14,7 @@ from pydantic_core import PydanticSerializationError, from_json
 
 from khala_protocol.errors import MalformedMessage, WrongVersion
 from khala_protocol.messages import SCHEMA_VERSION, AnyMessage, Reply, Wire
+from khala_protocol.visible import visible_line
 
 _ANY: TypeAdapter[Wire] = TypeAdapter(AnyMessage)
 M = TypeVar("M", bound=Wire)
@@ -92,5 +93,6 @@ def _explain(payload: bytes, error: ValidationError) -> MalformedMessage | Wrong
 
 
 def _short(text: str, longest: int = _SHOWN) -> str:
-    """Return a peer's words, shortened for a log."""
+    """Return a peer's words, shortened for a log, on one line."""
+    text = visible_line(text)
     return text if len(text) <= longest else text[:longest] + "…"

@@ -26,7 +26,9 @@ _ESCAPED = re.compile(
     re.IGNORECASE,
 )
 _ENTITIES = {"lt": "<", "gt": ">", "quot": '"', "#34": '"', "apos": "'", "#39": "'", "#x27": "'", "amp": "&"}
-_CHARACTER = re.compile(r"&(?:#[0-9]{1,7}+(?![0-9])|#[xX][0-9a-fA-F]{1,6}+(?![0-9a-fA-F])|[A-Za-z][A-Za-z0-9]{1,30}+);?+")
+_CHARACTER = re.compile(
+    r"&(?:#[0-9]{1,7}+(?![0-9])|#[xX][0-9a-fA-F]{1,6}+(?![0-9a-fA-F])|[A-Za-z][A-Za-z0-9]{1,30}+);?+"
+)
 _BACKSLASHED = re.compile(r"\\([\"'nt])")
 
 
