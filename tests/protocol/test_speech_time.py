@@ -35,7 +35,7 @@ def growth(piece: str, prefix: str, long: int) -> float:
     return min(seconds(long_text) for _ in range(3)) / min(seconds(short) for _ in range(3))
 
 
-def is_linear(piece: str, prefix: str, long: int = MAX_REPLY_CHARACTERS // 2) -> bool:
+def is_linear(piece: str, prefix: str, long: int = MAX_REPLY_CHARACTERS // 4) -> bool:
     return any(growth(piece, prefix, long) < 8 for _ in range(3))  # 4 if it is linear, 16 if it is quadratic
 
 
