@@ -33,6 +33,7 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
+from khala_protocol.visible import VisibleFormatter
 
 SIGNALLED = 128
 """Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
@@ -238,11 +239,9 @@ def front_door(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log what happens, on stderr.")] = False,
 ) -> None:
     """Set up logging before any command."""
-    logging.basicConfig(
-        level=logging.INFO if verbose else logging.WARNING,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.basicConfig(level=logging.INFO if verbose else logging.WARNING, handlers=[handler])
     logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
 
 

@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING, ParamSpec
 from khala_agents.llm.client import LLMError
 from khala_agents.policy import Decision, Said
 from khala_agents.secret import scrub
+from khala_protocol.messages import MAX_DETAIL_CHARACTERS
+from khala_protocol.speech import MAX_REPLY_CHARACTERS
+from khala_protocol.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Coroutine
@@ -25,8 +28,6 @@ log = logging.getLogger(__name__)
 
 UNWIND_S = 0.02
 """Time that a cancelled policy has to report its spending, before the fallback is sent."""
-MAX_REPLY_CHARACTERS = 65_536
-"""Longer replies are cut: a model that repeats itself endlessly must not fill the bus."""
 
 
 class Guard:
@@ -89,10 +90,10 @@ class Guard:
             kind = type(answer).__name__
             self._once(f"the policy returned {kind}, a reply is a str or an khala_agents.policy.Decision")
             return _fallback(f"returned {kind}")
-        text = answer.text[:MAX_REPLY_CHARACTERS]
+        text = answer.text[: MAX_REPLY_CHARACTERS + 1]  # by the last one the host sees that the reply was longer
         if not text.isascii():  # lone surrogates cannot be sent
             text = text.encode("utf-8", "replace").decode("utf-8")
-        return Decision(text, answer.status, answer.detail, answer.attempts, answer.usage)
+        return Decision(text, answer.status, answer.detail[:MAX_DETAIL_CHARACTERS], answer.attempts, answer.usage)
 
     def _let_go(self, task: asyncio.Task[Said]) -> None:
         if not task.done():
@@ -116,7 +117,7 @@ class Guard:
     def _once(self, text: str, key: str | None = None) -> None:
         if (key or text) not in self._complaints:
             self._complaints.add(key or text)
-            log.error("agent %s: %s", self._agent, text)
+            log.error("agent %s: %s", self._agent, visible(text))
 
 
 def _fallback(detail: str) -> Decision:

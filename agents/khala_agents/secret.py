@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from pydantic import SecretStr
 
 from khala_protocol.errors import ConfigError
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,6 +68,5 @@ def excerpt(said: str | bytes, most: int = 200) -> str:
     replaced.
     """
     text = said.decode("utf-8", "replace") if isinstance(said, bytes) else said
-    line = " ".join(scrub(text).split())
-    line = line if len(line) <= most else f"{line[: most - 1]}…"
-    return "".join(character if character.isprintable() else "\ufffd" for character in line)
+    line = visible_line(scrub(text))
+    return line if len(line) <= most else f"{line[: most - 1]}…"

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
 from khala_orchestrator.config import all_tasks
-from khala_orchestrator.console import stderr_console
+from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.signals import stop_on_signal
 
@@ -78,7 +77,7 @@ def tasks(*, as_json: Json = False) -> None:
         ]
         typer.echo(json.dumps({"tasks": rows}))
         return
-    console = Console(highlight=False)
+    console = stdout_console()
     for task in found:
         console.print(Text.assemble((task.name, "bold"), "  ", (people([a.name for a in task.agents]), "dim")))
         console.print(Padding(task.description, (0, 0, 0, 4), expand=False))
@@ -136,7 +135,7 @@ def replay(
     if as_json:
         typer.echo(json.dumps(summary(file, selection) | {"complete": recording.complete}))
         return
-    console = Console(highlight=False)
+    console = stdout_console()
     for part in transcript(file, selection, whole=text):
         console.print(part, soft_wrap=isinstance(part, Text))
 

@@ -6,7 +6,7 @@ It gets the same messages that go over the bus, and prints to stderr, so that st
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from rich import box
 from rich.console import Console, Group
@@ -15,7 +15,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from khala_protocol.messages import LOOPS_PER_S, Report, Result, Run, Usage, Wire
+from khala_protocol.messages import LOOPS_PER_S, Frozen, Report, Result, Run, Usage, Wire
+from khala_protocol.visible import visible, visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,9 +28,17 @@ STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "ma
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
 
 
+M = TypeVar("M", bound=Frozen)
+
+
 def stderr_console() -> Console:
-    """Return a console on stderr, where a person reads."""
-    return Console(stderr=True, highlight=False)
+    """Return a console on stderr, where a person reads; it prints words as they are, `[red]` is no markup."""
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+
+
+def stdout_console() -> Console:
+    """Return a console on stdout."""
+    return Console(highlight=False, markup=False, emoji=False)
 
 
 class Progress:
@@ -56,6 +65,7 @@ class Progress:
 
     def __call__(self, message: Wire) -> None:
         """Show a run card, a report or a result."""
+        message = visible_message(message)
         match message:
             case Run():
                 self._run = message
@@ -88,7 +98,7 @@ class Progress:
         steps = f" of {self._max_steps}" if self._max_steps else ""
         line = f"step {report.step}{steps}   game {clock(report.game_loop)}   score {report.score:g}"
         title = f"{self._run.task} · {self._run.run}" if self._run else ""
-        return Panel(Group(Text(line), rows), title=title, border_style="blue")
+        return Panel(Group(Text(line), rows), title=Text(title), border_style="blue")
 
     def _row(self, agent: AgentReport) -> tuple[str | Text, ...]:
         counts, usage = self._counts[agent.agent], self._usage[agent.agent]
@@ -99,7 +109,7 @@ class Progress:
             str(counts["accepted"]),
             str(counts["rejected"]),
             f"{usage.prompt_tokens + usage.completion_tokens:,}",
-            Text(agent.accepted[-1] if agent.accepted else agent.detail, overflow="ellipsis"),
+            Text(visible_line(agent.accepted[-1] if agent.accepted else agent.detail), overflow="ellipsis"),
         )
 
 
@@ -111,7 +121,7 @@ def card(run: Run) -> Panel:
     rows.add_row("game", f"{run.game}, {run.executor} executor")
     rows.add_row("clock", f"{run.clock.rule}: {run.clock.step_loops} loops a step, waits {wait}")
     rows.add_row("agents", ", ".join(f"{agent.name} ({', '.join(agent.teams)})" for agent in run.agents))
-    return Panel(rows, title=run.run, border_style="dim", box=box.ROUNDED)
+    return Panel(rows, title=Text(run.run), border_style="dim", box=box.ROUNDED)
 
 
 def table(result: Result) -> Panel:
@@ -135,6 +145,24 @@ def table(result: Result) -> Panel:
         rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
     title = Text.assemble((result.outcome, OUTCOME[result.outcome]), f", {result.cause} (episode {result.episode})")
     return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
+
+
+def visible_message(message: M) -> M:
+    """Return a message in which all text is visible."""
+    return cast("M", _visible(message))
+
+
+def _visible(value: Any) -> Any:
+    match value:
+        case str():
+            return visible(value)
+        case Frozen():
+            return value.having({name: _visible(field) for name, field in value})
+        case dict():
+            return {_visible(key): _visible(item) for key, item in value.items()}
+        case tuple() | list():
+            return type(value)(map(_visible, value))
+    return value
 
 
 def _tokens(usages: Iterable[Usage]) -> str:

@@ -3,11 +3,15 @@
 A message goes into the next observation of its recipients: an agent of the same side by name, or every
 agent of that side that listens to a channel, except the sender. A message without recipients
 goes back to the sender as a rejection. An agent listens to a channel until the end of the episode.
+
+What one agent says is read by others, and paid for by them. So the number of messages of a sender in a step is limited,
+and so are the characters that a recipient gets in a step, from each sender and in total; the sender reads how many of
+its messages were not delivered. The recording has the whole reply.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,18 +19,26 @@ from khala_orchestrator.roster import Seat
 from khala_protocol.messages import Message, Received, Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-MAX_CHARACTERS = 4000
-"""Longer messages are cut: what one agent says is read by all others, and paid for by them."""
+MAX_MESSAGES = 5
+"""Number of messages of a sender that count in a step."""
+MAX_CHARACTERS = 1_500
+"""Characters that a recipient gets from one sender in a step; the rest is cut. The shortest observation has 1 900."""
+MAX_RECEIVED_CHARACTERS = 6_000
+"""Characters that a recipient gets in a step, in equal parts from all that write to it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Post:
-    """The messages of a step: those delivered, by recipient in order of arrival, and those that could not be."""
+    """The messages of a step."""
 
+    taken: Sequence[Message] = ()
+    """Those that count, in order of arrival."""
     received: Mapping[Seat, tuple[Received, ...]] = field(default_factory=dict)
+    """Those delivered, by recipient in order of arrival."""
     rejections: Mapping[Seat, tuple[Rejection, ...]] = field(default_factory=dict)
+    """Those that could not be, by sender."""
 
 
 class Mailbox:
@@ -35,7 +47,7 @@ class Mailbox:
     def __init__(self, reach: Mapping[Seat, Sequence[Seat]], channels: Iterable[str] = ()) -> None:
         """Set the seats that each seat may write to, and the channels that every seat may write to."""
         self._reach = dict(reach)
-        self._channels = tuple(channels)
+        self._channels = {channel.casefold(): channel for channel in channels}
         self._listeners: dict[tuple[str, str], list[Seat]] = defaultdict(list)
 
     def clear(self) -> None:
@@ -44,33 +56,41 @@ class Mailbox:
 
     def listen(self, seat: Seat, channel: str) -> None:
         """Deliver what is said on `channel` to `seat` from now on; unknown channels stay silent."""
-        listeners = self._listeners[seat.side, channel.casefold()]
-        if seat not in listeners:
-            listeners.append(seat)
+        name = channel.casefold()
+        if name in self._channels and seat not in self._listeners[seat.side, name]:
+            self._listeners[seat.side, name].append(seat)
 
     def deliver(self, messages: Iterable[Message]) -> Post:
         """Sort the messages of one step."""
-        boxes: dict[Seat, list[Received]] = defaultdict(list)
+        boxes: dict[Seat, list[Message]] = defaultdict(list)
         returned: dict[Seat, list[Rejection]] = defaultdict(list)
+        said: Counter[Seat] = Counter()
+        taken: list[Message] = []
         for message in messages:
             sender = Seat(message.side, message.agent)
+            said[sender] += 1
+            if said[sender] > MAX_MESSAGES:
+                continue
+            taken.append(message)
             recipients = self._recipients(sender, message.recipient)
             if recipients is None:
                 returned[sender].append(self._return(sender, message))
-                continue
-            text = message.text[:MAX_CHARACTERS]
-            for seat in recipients:
-                boxes[seat].append(Received(sender=message.agent, recipient=message.recipient, text=text))
-        return Post({s: tuple(m) for s, m in boxes.items()}, {s: tuple(r) for s, r in returned.items()})
+            for seat in recipients or ():
+                boxes[seat].append(message)
+        for sender, number in said.items():
+            if number > MAX_MESSAGES:
+                returned[sender].append(_too_many(number))
+        received = {seat: tuple(_fitting(box)) for seat, box in boxes.items()}
+        return Post(taken, received, {seat: tuple(rejections) for seat, rejections in returned.items()})
 
     def _recipients(self, sender: Seat, name: str) -> list[Seat] | None:
         wanted = name.casefold()
-        if wanted in (channel.casefold() for channel in self._channels):
+        if wanted in self._channels:
             return [seat for seat in self._listeners[sender.side, wanted] if seat != sender]
         return [seat for seat in self._reach[sender] if seat.agent.casefold() == wanted] or None
 
     def _return(self, sender: Seat, message: Message) -> Rejection:
-        names = [seat.agent for seat in self._reach[sender]] + list(self._channels)
+        names = [seat.agent for seat in self._reach[sender]] + list(self._channels.values())
         known = "you can write to " + ", ".join(names) if names else "there is nobody to write to"
         return Rejection(
             reason="unknown_recipient",
@@ -78,3 +98,32 @@ class Mailbox:
             text=message.recipient,
             start=0,
         )
+
+
+def newest(messages: Sequence[Received]) -> tuple[Received, ...]:
+    """Return the newest messages of several steps, as far as an observation has room for them."""
+    room, kept = MAX_RECEIVED_CHARACTERS, 0
+    for message in reversed(messages):
+        room -= len(message.text)
+        if room < 0:
+            break
+        kept += 1
+    return tuple(messages[len(messages) - kept :])
+
+
+def _too_many(number: int) -> Rejection:
+    """Return the rejection of the messages over the limit."""
+    what = f"{number - MAX_MESSAGES} of your {number} messages were not delivered"
+    return Rejection(reason="too_many_messages", message=f"{what}: write at most {MAX_MESSAGES}.", text="", start=0)
+
+
+def _fitting(box: Sequence[Message]) -> Iterator[Received]:
+    """Yield the messages for one recipient, cut to each sender's part of what it gets in a step."""
+    senders = {message.agent for message in box}
+    left = dict.fromkeys(senders, min(MAX_CHARACTERS, MAX_RECEIVED_CHARACTERS // len(senders)))
+    for message in box:
+        room = left[message.agent]
+        if room:
+            text = message.text if len(message.text) <= room else message.text[: room - 1] + "…"
+            left[message.agent] -= len(text)
+            yield Received(sender=message.agent, recipient=message.recipient, text=text)

@@ -138,7 +138,7 @@ class Match:
         with watch.phase("act"):
             due = self.schedule.due(loop)
             played = [side.act(at, [one for one in due if one.seat.side == side.name]) for side in self.sides]
-            for message in (message for one in played for message in one.messages):
+            for message in (message for one in played for message in one.post.taken):
                 await self.match_observer.message(message)
         with watch.phase("game"):
             results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act import Actor
-from khala_bridge.observe import Feedback, Observer
+from khala_bridge.observe import Feedback, Observer, shortened
 from khala_bridge.observe.triggers import triggers, vitals
-from khala_orchestrator.mailbox import Mailbox
+from khala_orchestrator.mailbox import Mailbox, newest
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Question
 from khala_protocol.messages import AgentReport, Message, Observation, Received, Rejection, Report
@@ -39,7 +39,6 @@ class Played(NamedTuple):
 
     decisions: Sequence[Decision]
     joint: JointAction
-    messages: Sequence[Message]
     post: Post
 
     @property
@@ -157,7 +156,7 @@ class Side:
         for agent, speech in speeches.items():
             for listen in speech.listens:
                 self.mailbox.listen(self.seat(agent), listen.channel)
-        return Played(decisions, joint, messages, self.mailbox.deliver(messages))
+        return Played(decisions, joint, self.mailbox.deliver(messages))
 
     def _speech(self, decision: Decision) -> Speech | None:
         """Return what an agent says: the only place where a reply is parsed. None if it failed, and nothing stands in.
@@ -190,7 +189,7 @@ class Side:
             step=at.step,
             game_loop=result.snapshot.game_loop,
             agents=tuple(self._agent(at, one, played, heard[one.seat.agent]) for one in played.decisions),
-            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in played.messages),
+            messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in played.post.taken),
             functions=result.played.functions,
             env_steps=result.env_steps,
             score=result.snapshot.score.total,
@@ -204,7 +203,7 @@ class Side:
             *(refusal.rejection for refusal in result.played.refusals if refusal.agent == seat.agent),
             *played.post.rejections.get(seat, ()),
         )
-        return Feedback(joint.accepted.get(seat.agent, ()), rejections, played.post.received.get(seat, ()))
+        return Feedback(joint.accepted.get(seat.agent, ()), shortened(rejections), played.post.received.get(seat, ()))
 
     def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
         agent, loop = decision.seat.agent, self._now.snapshot.game_loop
@@ -255,7 +254,6 @@ def _too_old(decision: Decision, text: str, start: int) -> Rejection:
 
 
 def _joined(before: Feedback, more: Feedback) -> Feedback:
-    """Return two feedbacks as one, the older first."""
-    return Feedback(
-        before.accepted + more.accepted, before.rejections + more.rejections, before.messages + more.messages
-    )
+    """Return two feedbacks as one, the older first; of the messages those that still fit into an observation."""
+    accepted, rejections = before.accepted + more.accepted, before.rejections + more.rejections
+    return Feedback(accepted, rejections, newest(before.messages + more.messages))

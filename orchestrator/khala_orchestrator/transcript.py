@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.text import Text
 
-from khala_orchestrator.console import STATUS, card, clock, table
+from khala_orchestrator.console import STATUS, card, clock, table, visible_message
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
 from khala_protocol.recording import Recording, read
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -71,7 +72,7 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
         RecordingError: the file is not a recording.
     """
     for recorded in read(path):
-        match recorded.message:
+        match recorded.message and visible_message(recorded.message):
             case Run() as run:
                 yield card(run)
             case Result() as result:
@@ -82,7 +83,9 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
             case Reply() as reply if whole and selection.holds(reply.step, reply.agent):
                 yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
             case Message() as said if selection.holds(said.step, said.agent):
-                yield Text.assemble((f"  {said.agent} → {said.recipient}: ", "magenta"), " ".join(said.text.split()))
+                yield Text.assemble(
+                    (f"  {said.agent} → {visible_line(said.recipient)}: ", "magenta"), visible_line(said.text)
+                )
             case Report() as report if selection.holds(report.step):
                 yield from _report(report, selection)
 
@@ -115,11 +118,13 @@ def _report(report: Report, selection: StepSelection) -> Iterator[Text]:
 def _agent(agent: AgentReport) -> Iterator[Text]:
     latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
     ignored = f", {agent.ignored} ignored" if agent.ignored else ""
-    detail = f" ({agent.detail})" if agent.detail else ""
+    detail = f" ({visible_line(agent.detail)})" if agent.detail else ""
     yield Text.assemble(f"  {agent.agent}: ", (agent.status, STATUS[agent.status]), f"{detail}{latency}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
-        yield Text.assemble((f"    {fault.text}", "red"), f"  {fault.reason}: {fault.message}")
+        yield Text.assemble(
+            (f"    {visible_line(fault.text)}", "red"), f"  {fault.reason}: {visible_line(fault.message)}"
+        )
 
 
 def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list[Path]:

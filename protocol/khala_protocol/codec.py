@@ -13,10 +13,14 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, from_json
 
 from khala_protocol.errors import MalformedMessage, WrongVersion
-from khala_protocol.messages import SCHEMA_VERSION, AnyMessage, Wire
+from khala_protocol.messages import SCHEMA_VERSION, AnyMessage, Reply, Wire
+from khala_protocol.visible import visible_line
 
 _ANY: TypeAdapter[Wire] = TypeAdapter(AnyMessage)
 M = TypeVar("M", bound=Wire)
+
+MAX_REPLY_BYTES = 2**20
+"""Longer replies are refused unread. A character has at most 12 bytes, as two escapes."""
 
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _SHOWN = 60
@@ -52,8 +56,10 @@ def decode_as(kind: type[M], payload: bytes) -> M:
 
     Raises:
         WrongVersion: it has another major version of the schema.
-        MalformedMessage: it is not a message, or one of another kind.
+        MalformedMessage: it is not a message, or one of another kind, or a reply of more than `MAX_REPLY_BYTES`.
     """
+    if kind is Reply and len(payload) > MAX_REPLY_BYTES:
+        raise MalformedMessage(f"a reply of {len(payload)} bytes is too long: it may have {MAX_REPLY_BYTES}")
     try:
         return kind.model_validate_json(payload)
     except ValidationError as error:
@@ -87,5 +93,6 @@ def _explain(payload: bytes, error: ValidationError) -> MalformedMessage | Wrong
 
 
 def _short(text: str, longest: int = _SHOWN) -> str:
-    """Return a peer's words, shortened for a log."""
+    """Return a peer's words, shortened for a log, on one line."""
+    text = visible_line(text)
     return text if len(text) <= longest else text[:longest] + "…"

@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from khala_protocol.errors import KhalaError
+from khala_protocol.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,7 +30,7 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
     except* user_errors as group:
         faults = list(_leaves(group))
     for fault in faults:
-        sys.stderr.write(f"{name}: {fault}\n")
+        sys.stderr.write(f"{name}: {visible(str(fault))}\n")
     if faults:  # not within `except*`: early Pythons 3.11 raise an exit there as a part of a group
         sys.exit(1)
 

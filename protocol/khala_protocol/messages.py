@@ -20,6 +20,13 @@ SCHEMA_VERSION: Literal[1] = 1
 LOOPS_PER_S = 22.4
 """Game loops per second at the speed called "faster", which ladders and the API use."""
 
+MOST = 2**53
+"""Largest number that every reader of JSON takes as it is. An agent reports its usage itself: no sum must fail."""
+
+MAX_DETAIL_CHARACTERS = 200
+"""Longest reason for a fallback."""
+
+Count = Annotated[int, Field(ge=0, le=MOST)]
 Point = tuple[float, float]
 Alliance = Literal["own", "ally", "enemy", "neutral"]
 Outcome = Literal["win", "draw", "loss"]
@@ -42,6 +49,7 @@ RejectionReason = Literal[
     "too_many_actions",  # over the number of actions a team may have in one reply
     "unknown_recipient",  # a message to nobody
     "too_late",  # the reply took effect too long after its observation
+    "too_many_messages",  # over the number of messages an agent may send in one reply
     "refused_by_game",  # PySC2 or the game answered with an error
 ]
 
@@ -126,7 +134,7 @@ class Rejection(Frozen):
     message: str
     """One sentence for the model: what was wrong, and what would be right."""
     text: str
-    """The rejected words."""
+    """The rejected words, as much of them as fits; empty if it stands for several."""
     start: int = Field(ge=0)
     """Offset of `text` in the reply."""
     team: str | None = None
@@ -438,36 +446,36 @@ class Frames(Frozen):
 
 
 class Usage(Frozen):
-    """The usage of requests to a model. Sums with `+`."""
+    """The usage of requests to a model. Sums with `+`, and no sum is more than `MOST`."""
 
-    requests: int = 0
-    prompt_tokens: int = 0
-    completion_tokens: int = 0
-    cached_tokens: int = 0
+    requests: Count = 0
+    prompt_tokens: Count = 0
+    completion_tokens: Count = 0
+    cached_tokens: Count = 0
     """The part of `prompt_tokens` that the provider had in its cache."""
-    reasoning_tokens: int = 0
+    reasoning_tokens: Count = 0
     """The part of `completion_tokens` that was reasoning."""
-    cost_usd: float | None = None
+    cost_usd: float | None = Field(default=None, ge=0, le=MOST)
     """None if no price is known for the model."""
-    unknown_requests: int = 0
+    unknown_requests: Count = 0
     """Requests that were cancelled or failed, whose tokens are unknown."""
-    images: int = 0
+    images: Count = 0
     """Number of pictures that were sent along."""
-    image_tokens: int = 0
+    image_tokens: Count = 0
     """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
 
     def __add__(self, other: Usage) -> Usage:
         costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
         return Usage(
-            requests=self.requests + other.requests,
-            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
-            completion_tokens=self.completion_tokens + other.completion_tokens,
-            cached_tokens=self.cached_tokens + other.cached_tokens,
-            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
-            cost_usd=sum(costs) if costs else None,
-            unknown_requests=self.unknown_requests + other.unknown_requests,
-            images=self.images + other.images,
-            image_tokens=self.image_tokens + other.image_tokens,
+            requests=min(self.requests + other.requests, MOST),
+            prompt_tokens=min(self.prompt_tokens + other.prompt_tokens, MOST),
+            completion_tokens=min(self.completion_tokens + other.completion_tokens, MOST),
+            cached_tokens=min(self.cached_tokens + other.cached_tokens, MOST),
+            reasoning_tokens=min(self.reasoning_tokens + other.reasoning_tokens, MOST),
+            cost_usd=min(sum(costs), MOST) if costs else None,
+            unknown_requests=min(self.unknown_requests + other.unknown_requests, MOST),
+            images=min(self.images + other.images, MOST),
+            image_tokens=min(self.image_tokens + other.image_tokens, MOST),
         )
 
 
@@ -576,11 +584,11 @@ class Reply(Wire):
     text: str
     """The reply as the model gave it. The host reads from it the agent's orders, messages and subscriptions."""
     status: Literal["ok", "fallback"] = "ok"
-    detail: str = ""
+    detail: str = Field(default="", max_length=MAX_DETAIL_CHARACTERS)
     """Reason for a fallback: `timeout`, `http 500`, `budget`, …"""
     latency_s: float = 0.0
     """From the arrival of the observation to this reply."""
-    attempts: int = Field(default=0, ge=0)
+    attempts: Count = 0
     usage: Usage = Usage()
     pace: Pace | None = None
     """The pace of its model, if the model file gives one; see `Clock.pace`."""

@@ -85,7 +85,7 @@ def test_an_answer_that_is_no_completion_shows_no_part_of_a_key(kind: type[OpenA
 
 
 def test_an_excerpt_obeys_no_terminal() -> None:
-    assert excerpt("a\x1b]0;b\x07\n c\u202ed\x9b") == "a\ufffd]0;b\ufffd c\ufffdd\ufffd"
+    assert excerpt("a\x1b]0;b\x07\n c\u202ed\x9b") == r"a\x1b]0;b\x07 c\u202ed\x9b"
 
 
 OPEN = ModelConfig(profile="compatible", model="m", base_url="http://example.org/v1", api_key_env="OPEN_KEY")

@@ -379,7 +379,7 @@ async def test_a_policy_may_say_itself_that_it_falls_back(
 
 @pytest.mark.parametrize(
     ("said", "sent"),
-    [("\ud83d unpaired", "? unpaired"), ("x" * 100_000, "x" * 65_536), ("\x00 ünï", "\x00 ünï")],
+    [("\ud83d unpaired", "? unpaired"), ("x" * 100_000, "x" * 65_537), ("\x00 ünï", "\x00 ünï")],
     ids=["surrogate", "endless", "zero"],
 )
 async def test_a_text_that_cannot_travel_is_made_to(

@@ -306,6 +306,7 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
     "unknown_team": "below and tests/bridge/test_addressee.py",
     "too_many_actions": "below",
     "unknown_recipient": "tests/orchestrator/test_mailbox.py",
+    "too_many_messages": "tests/orchestrator/test_mailbox.py",
     "refused_by_game": "tests/bridge/test_executors.py",
 }
 
@@ -406,3 +407,14 @@ def test_commands_come_in_the_order_of_the_agents(
     joint = Actor(config).joint(Observer(config).observe(world()), replies)
     assert [c.said.team.team.agent for c in joint.commands if c.said] == ["Stalkers", "Zealots"]
     assert all(isinstance(command, Command) for command in joint.commands)
+
+
+def test_of_far_too_many_calls_the_rest_is_not_read(act: Callable[..., JointAction]) -> None:
+    joint = act(team(*["<Atack_Unitt(0x1)>"] * 400, "<Stop()>"))
+    faults = joint.rejections["A"]
+    limit = 9 * 2 + 100  # two teams have units
+    assert not joint.accepted["A"]
+    assert [fault.reason for fault in faults] == ["unknown_action"] * limit + ["too_many_actions"]
+    assert faults[-1].message == (
+        f"These are too many calls for one reply: this one and all behind it, {401 - limit}, were not read."
+    )

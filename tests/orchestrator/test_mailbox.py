@@ -115,3 +115,33 @@ def test_each_side_has_its_channels_to_itself() -> None:
 def test_nothing_said_is_nothing_delivered(mailbox: Mailbox) -> None:
     post = mailbox.deliver([])
     assert (dict(post.received), dict(post.rejections)) == ({}, {})
+
+
+def test_a_sender_has_a_few_messages_in_a_step_and_reads_how_many_were_not_delivered(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(A, "B", str(number)) for number in range(1_200)])
+    assert [m.text for m in post.received[B]] == list("01234")
+    assert [m.text for m in post.taken] == list("01234")
+    (rejection,) = post.rejections[A]
+    assert rejection.reason == "too_many_messages"
+    assert rejection.message == "1195 of your 1200 messages were not delivered: write at most 5."
+
+
+def test_a_sender_has_only_so_many_characters_for_a_recipient(mailbox: Mailbox) -> None:
+    post = mailbox.deliver([said(A, "B", "x" * 1_000), said(C, "Channel-1"), *[said(A, "B", "y" * 1_000)] * 2])
+    assert [(m.sender, len(m.text), m.text[-1]) for m in post.received[B]] == [
+        ("A", 1_000, "x"),
+        ("C", 2, "i"),
+        ("A", MAX_CHARACTERS - 1_000, "…"),
+    ]
+
+
+def test_what_a_recipient_gets_is_limited_and_shared_in_equal_parts() -> None:
+    senders = [Seat("p1", f"S{number}") for number in range(12)]
+    post = Mailbox({seat: [A] for seat in senders}).deliver([said(seat, "A", "x" * 9_000) for seat in senders])
+    assert [len(m.text) for m in post.received[A]] == [500] * 12
+
+
+def test_listening_to_unknown_channels_is_not_remembered(mailbox: Mailbox) -> None:
+    for number in range(100):
+        mailbox.listen(A, f"Channel-{number}")
+    assert len(mailbox._listeners) == 1

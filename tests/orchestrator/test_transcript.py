@@ -117,6 +117,26 @@ def key_of(message: Wire | bytes) -> str:
     return run_key(RUN, topic) if topic in RUN_TOPICS else agent_key(RUN, "blue", data["agent"], topic)
 
 
+def test_no_character_of_a_recording_acts_on_the_terminal(tmp_path: Path, printed: Printed) -> None:
+    acting = "\x1b]0;t\x07\x1b[2J\x9b2J\u202e\u200b[red]"
+    agent = AgentReport(
+        agent="Stalkers",
+        side="blue",
+        status="ok",
+        detail=acting,
+        accepted=(acting,),
+        rejections=(Rejection(reason="malformed", message=acting, text=acting, start=0),),
+    )
+    messages = [seen(0, "Stalkers", acting), said(0, "Stalkers", acting), report(0, agent)]
+    with Recorder(tmp_path / "run.mcap") as recorder:
+        for message in messages:
+            recorder.write(key_of(message), encode(message))
+    lines = printed(*transcript(recorder.path, StepSelection(), whole=True), width=200)
+    shown = r"\x1b]0;t\x07\x1b[2J\x9b2J\u202e\u200b[red]"
+    assert sum(line.count(shown) for line in lines) == 6
+    assert all(line.isprintable() for line in lines)
+
+
 # --- for a person -----------------------------------------------------------------------------------------
 
 

@@ -11,9 +11,10 @@ from annotated_types import Ge
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from khala_protocol.codec import decode, decode_as, encode
+from khala_protocol.codec import MAX_REPLY_BYTES, decode, decode_as, encode
 from khala_protocol.errors import MalformedMessage, WrongVersion
-from khala_protocol.messages import MESSAGE_TYPES, Frozen, Message, Reply, Usage, Wire
+from khala_protocol.messages import MESSAGE_TYPES, MOST, Frozen, Message, Reply, Usage, Wire
+from khala_protocol.speech import MAX_REPLY_CHARACTERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,7 +43,9 @@ def values(annotation: Any, *, least: int | None = None) -> st.SearchStrategy[An
     arguments = get_args(annotation)
     origin = get_origin(annotation)
     if annotation is int and least is not None:
-        return st.integers(least, 2**53)
+        return st.integers(least, MOST)
+    if annotation == float | None and least is not None:
+        return st.none() | st.floats(least, MOST)
     if annotation in SIMPLE:
         return SIMPLE[annotation]
     if origin is Literal:
@@ -177,3 +180,35 @@ def test_a_message_of_another_kind_than_expected_is_refused() -> None:
 def test_no_bytes_raise_anything_else(payload: bytes) -> None:
     with pytest.raises((MalformedMessage, WrongVersion)):
         decode(payload)
+
+
+def test_a_reply_that_is_far_too_long_is_refused_unread() -> None:
+    with pytest.raises(MalformedMessage, match=r"^a reply of 1048577 bytes is too long: it may have 1048576$"):
+        decode_as(Reply, b"[" * (MAX_REPLY_BYTES + 1))
+
+
+def test_the_longest_reply_that_is_read_fits() -> None:
+    text = "\x00" * MAX_REPLY_CHARACTERS
+    reply = Reply(run="r", agent="A", side="p1", episode=0, step=0, text=text)
+    assert decode_as(Reply, encode(reply)) == reply
+
+
+def test_no_sum_of_what_agents_report_fails() -> None:
+    usage = Usage(requests=MOST, prompt_tokens=MOST, cost_usd=MOST)
+    assert usage + usage == usage
+
+
+@pytest.mark.parametrize("usage", [{"requests": -1}, {"prompt_tokens": 10**4000}, {"cost_usd": 1e300}])
+def test_usage_that_cannot_be_is_no_message(usage: dict[str, Any]) -> None:
+    reply = {
+        "kind": "reply",
+        "run": "r",
+        "agent": "A",
+        "side": "p1",
+        "episode": 0,
+        "step": 0,
+        "text": "",
+        "usage": usage,
+    }
+    with pytest.raises(MalformedMessage):
+        decode_as(Reply, json.dumps(reply).encode())

@@ -114,10 +114,10 @@ class _Block(BaseModel):
 
 
 class _Usage(BaseModel):
-    input_tokens: int = Field(ge=0)
-    output_tokens: int = Field(ge=0)
-    cache_read_input_tokens: int | None = None
-    cache_creation_input_tokens: int | None = None
+    input_tokens: int = Field(ge=0, le=10**12)
+    output_tokens: int = Field(ge=0, le=10**12)
+    cache_read_input_tokens: int | None = Field(default=None, ge=0, le=10**12)
+    cache_creation_input_tokens: int | None = Field(default=None, ge=0, le=10**12)
 
     def priced(self, prices: Prices) -> Usage:
         """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""

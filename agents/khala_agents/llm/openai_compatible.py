@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from khala_agents.llm.client import Completion, LLMError, MalformedCompletion, Request, Scalar
 from khala_agents.llm.http import HttpEndpoint, error_for
 from khala_agents.secret import excerpt, scrub
-from khala_protocol.messages import Usage
+from khala_protocol.messages import MOST, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -176,4 +176,4 @@ def _count(usage: dict[str, Any] | None, *path: str) -> int | None:
     value: Any = usage
     for name in path:
         value = value.get(name) if isinstance(value, dict) else None
-    return value if isinstance(value, int) and value >= 0 else None
+    return value if isinstance(value, int) and 0 <= value <= MOST else None

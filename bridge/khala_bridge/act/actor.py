@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from khala_bridge.act.addressee import Addressees
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.act.recognise import recognise
+from khala_bridge.act.rejected import CallRejected, reject
 from khala_bridge.act.screen import ScreenExecutor
 from khala_bridge.act.translate import Translator
 from khala_bridge.act.vocabulary import Vocabulary
@@ -26,14 +27,18 @@ from khala_bridge.auto.workers import automatic
 from khala_protocol.messages import Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from khala_bridge.act.plan import Executor
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.messages import Fate
+    from khala_protocol.messages import Call, Fate
     from khala_protocol.speech import Speech
+
+
+MOST_WRONG = 100
+"""Calls of an agent that are read in addition to as many as may count: 4 600 wrong ones would take 1.3 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +134,8 @@ class Actor:
         accepted: list[str] = []
         faults: list[Rejection] = []
         hindered = False
-        for call in speech.calls:
+        most = self._most_calls(saw)
+        for call in speech.calls[:most]:
             recognised = recognise(call, words, addressees)
             if isinstance(recognised, Rejection):
                 faults.append(recognised)
@@ -143,7 +149,19 @@ class Actor:
                     commands += translated
                     accepted.append(said.text)
                     hindered = hindered or translator.lacks_units(said)
+        if len(speech.calls) > most:
+            faults.append(_unread(speech.calls[most:]))
         return _Outcome(commands, accepted, faults, hindered)
+
+    def _most_calls(self, saw: AgentObservation) -> int:
+        """Return the number of calls of an agent that are read: all that may count, and some that are wrong."""
+        return self._task.max_actions_of(saw.agent) * len(saw.teams) + MOST_WRONG
+
+
+def _unread(calls: Sequence[Call]) -> Rejection:
+    """Return the rejection of the calls of a reply that has far too many."""
+    what = f"These are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
+    return reject(calls[0], CallRejected("too_many_actions", what))
 
 
 def executor_of(task: TaskConfig) -> Executor:

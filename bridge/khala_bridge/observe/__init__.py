@@ -5,12 +5,13 @@
     events     changes since the snapshot before              chronicle   a side's memory of an episode
     offers     possible actions, and why not the others       side, landmarks   for agents of the whole side
     observation   all of this as a value                      text, image  in words; in pictures
+    feedback   the results of the last reply, and messages
 
 Everything here is a function of snapshots and of agents' replies; no clock, no bus.
 """
 
+from khala_bridge.observe.feedback import Feedback, shortened
 from khala_bridge.observe.observation import AgentObservation, SideObservation, TeamObservation
 from khala_bridge.observe.observer import Observer
-from khala_bridge.observe.text import Feedback
 
-__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation"]
+__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation", "shortened"]

@@ -21,10 +21,11 @@ from khala_bridge.observe import landmarks, side
 from khala_bridge.observe.body import rounded
 from khala_bridge.observe.changes import Changes
 from khala_bridge.observe.chronicle import Chronicle
+from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.scene import Scene
 from khala_bridge.observe.stages import Stages
-from khala_bridge.observe.text import Feedback, Page, render, sections_of
+from khala_bridge.observe.text import Page, render, sections_of
 from khala_bridge.state.teams import TeamRoster
 from khala_protocol.messages import LOOPS_PER_S
 

@@ -11,8 +11,8 @@
 
 `parse` tolerates what models write and is exact in what it reports: text with only one possible meaning is read as
 that, any other text that looks like a call is a `Rejection` with its place and a sentence that the model can act on,
-and affects nothing else. Nothing raises, the time is linear in the length of the text, and a call that is cut off
-is never guessed at.
+and affects nothing else. Nothing raises, the time is linear in the length of the text (a reply is read up to
+`MAX_REPLY_CHARACTERS`), and a call that is cut off is never guessed at.
 
 This package knows no unit, no action and no game: the bridge decides whether a name, a tag or a team exists.
 These are the rules of tolerance, in addition to those of headings (H, `khala_protocol.speech.headings`) and arguments
@@ -56,7 +56,7 @@ These are the rules of tolerance, in addition to those of headings (H, `khala_pr
 """
 
 from khala_protocol.speech.arguments import render, written
-from khala_protocol.speech.reader import parse
+from khala_protocol.speech.reader import MAX_REPLY_CHARACTERS, parse
 from khala_protocol.speech.said import ListenTo, MessageTo, Speech
 
-__all__ = ["ListenTo", "MessageTo", "Speech", "parse", "render", "written"]
+__all__ = ["MAX_REPLY_CHARACTERS", "ListenTo", "MessageTo", "Speech", "parse", "render", "written"]

@@ -18,7 +18,7 @@ _NAME = re.compile(r"<(?P<blank>\s*+)[*`]*+(?P<name>[A-Za-z](?:\\?+[\w-])*+)[*`]
 _SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4})\s*+\\?+\(")
 _CLOSE = re.compile(r"[\s\\)\]}]*+[-=/]?+\s*+\\?+>")
 _CLOSE_BARE = re.compile(r"\s*+\\?+/?+\s*+\\?+>")
-_LOOSE = re.compile(r"(?:\s*+[:=]\s*+|\s++|(?=[\[{]))(?P<inside>[^<>\n]{1,200}?)\s*+/?+\s*+>")
+_LOOSE = re.compile(r"(?:\s*+[:=]\s*+|\s++|(?=[\[{]))(?P<inside>[^<>\n]{1,200}+)\s*+/?+\s*+>")
 _ELEMENT = re.compile(r"(?P<inside>[^<>]{1,200}+)</\s*+(?P<name>[\w-]++)\s*+>")
 _LINE_ENDS = re.compile(r"[ \t]*+(?:$|[\n<,;.|#]|//|--|- |\()")
 _STANDS_ALONE = re.compile(r"[ \t`*_\"'”’»」\]})>|,;.]*+(?:$|\n|</|#|//|/\*|[-–—:(]|[A-Z]\w*+\()")  # noqa: RUF001  # dashes
@@ -31,7 +31,8 @@ _NAKED = re.compile(
     r"\((?P<inside>[^()<>\n]*+(?:\([^()<>\n]*+\)[^()<>\n]*+)*+)\))"
 )
 _NAKED_TALK = re.compile(r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+(?P<call>(?P<name>message_?to)\()", re.IGNORECASE)
-_IN_WORDS = re.compile(r"\b(?P<name>[A-Z]\w*_\w++)[ \t:|=]++(?:0[xX][0-9a-fA-F]++|\[[0-9., \t]++\])")
+_PLAIN_LINE = re.compile(r"[^<\n]*+(?!<)")
+_IN_WORDS = re.compile(r"\b(?P<name>[A-Z](?=\w*_\w)\w++)[ \t:|=]++(?:0[xX][0-9a-fA-F]++|\[[0-9., \t]++\])")
 _MORE_WORDS = re.compile(r"(?:[ \t]++\w++)++(?=[ \t]*+\()")
 _CLOSING_TAG = re.compile(r"</\s*+([^\W\d][\w-]*+)\s*+>")
 _HTML = re.compile(
@@ -115,7 +116,9 @@ def _mend(text: str, opening: Opening, wrong: re.Match[str]) -> tuple[int, int]:
 def loose_arguments(text: str, at: int) -> tuple[int, int, int] | None:
     """Return where arguments after a name without parentheses begin and end, and where the call ends."""
     match = _LOOSE.match(text, at)
-    return None if match is None else (match.start("inside"), match.end("inside"), match.end())
+    if match is None:
+        return None
+    return match.start("inside"), match.start("inside") + len(match["inside"].rstrip(" \t/")), match.end()
 
 
 def element_at(text: str, at: int, name: str) -> tuple[int, int, int] | None:
@@ -164,9 +167,8 @@ def naked_talk_at(text: str, at: int) -> re.Match[str] | None:
 
 def in_words_at(text: str, at: int) -> re.Match[str] | None:
     """Match a name and its argument without the brackets of a call, on a line without any call: group `name`."""
-    line_end = text.find("\n", at)
-    stop = len(text) if line_end < 0 else line_end
-    return None if text.find("<", at, stop) >= 0 else _IN_WORDS.search(text, at, stop)
+    line = _PLAIN_LINE.match(text, at)
+    return _IN_WORDS.search(text, at, line.end()) if line else None
 
 
 def stands_alone(text: str, end: int) -> bool:

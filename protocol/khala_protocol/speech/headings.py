@@ -101,10 +101,10 @@ _TEAM = (
 _BARE = (
     rf"(?P<bare>[A-Za-z]\w*+(?:[.+-]\w++)*+){_CLOSE}:{_TO_EDGE}"
     rf"|(?P<numbered>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<]*+(?=<)"
-    rf"|(?P<cell>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<|]*+\|(?=[^\n<]*+<)"
+    rf"|(?P<cell>[A-Za-z][\w.+-]*(?<=[0-9]))[^\w\n<|]*+\|(?=[^\n<]{{0,200}}<)"
     rf"|(?P<alone>[A-Za-z]\w*-[0-9]++)(?:[^\w\n<:]*+|[ \t*]*[-—–]+[ \t][^\n<:]*+)$"  # noqa: RUF001  # dashes
     rf"|(?P<acts>[A-Za-z]\w*-[0-9]++){_SHALL}"
-    rf"|(?P<several>(?=[^\n<:]*[0-9]){_SEVERAL}){_CLOSE}:{_TO_EDGE}"
+    rf"|(?P<several>(?=[^\n<:]{{0,200}}[0-9]){_SEVERAL}){_CLOSE}:{_TO_EDGE}"
 )
 _EXPLAINS = (
     rf"(?P<explains>{words.EXPLANATION})(?![^\W_])[^\w\n<:]*+:"
@@ -120,7 +120,7 @@ _TAG = re.compile(
     _FLAGS,
 )
 _JSON = re.compile(r"\"teams?\"\s*+:\s*+\"(?P<team>[^\"\n<>]{1,60}+)\"", re.IGNORECASE)
-_JSON_AHEAD = re.compile(r"[\s{\[,]*+(?=\"teams?\"\s*+:\s*+\"[^\"\n<>]{1,60}+\")", re.IGNORECASE)
+_JSON_AHEAD = re.compile(r"[\s{\[,]{0,40}+(?=\"teams?\"\s*+:\s*+\"[^\"\n<>]{1,60}+\")", re.IGNORECASE)
 _NO_TEAM = re.compile(
     "also|answer|because|commands?|comments?|decisions?|do|final|finally|first|goal|ideas?|lastly|next|notes?|now|optional|or|orders?|"
     "never|output|plan|priority|reason(?:s|ing)?|reply|response|result|second|so|steps?|strategy|summary|tactics?|targets?|"

@@ -26,6 +26,9 @@ _ESCAPED = re.compile(
     re.IGNORECASE,
 )
 _ENTITIES = {"lt": "<", "gt": ">", "quot": '"', "#34": '"', "apos": "'", "#39": "'", "#x27": "'", "amp": "&"}
+_CHARACTER = re.compile(
+    r"&(?:#[0-9]{1,7}+(?![0-9])|#[xX][0-9a-fA-F]{1,6}+(?![0-9a-fA-F])|[A-Za-z][A-Za-z0-9]{1,30}+);?+"
+)
 _BACKSLASHED = re.compile(r"\\([\"'nt])")
 
 
@@ -57,7 +60,7 @@ def _as_long(match: re.Match[str]) -> str:
 def unescaped(words: str) -> str:
     """Return the text of a message: without blanks around it, and with the characters that escapes stand for."""
     if "&" in words:
-        words = html.unescape(words).strip(QUOTES + " \t\n") if "&#" in words or ";" in words else words
+        words = _CHARACTER.sub(lambda match: html.unescape(match[0]), words).strip(QUOTES + " \t\n")
     if "\\" in words:
         words = _BACKSLASHED.sub(lambda match: {"n": "\n", "t": "\t"}.get(match[1], match[1]), words).rstrip("\\")
     return words.strip()

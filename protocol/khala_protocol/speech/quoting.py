@@ -9,7 +9,9 @@ Below `khala_protocol.speech.reader`, which knows the purpose of a message.
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from dataclasses import dataclass
+from functools import cached_property
 
 from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall
 
@@ -29,7 +31,7 @@ _END = r"\s*+\\?+\)\s*+\\?+/?+>"
 _END_OF_THREE = r"\s*+\\?+(?:\)\s*+\\?+/?+>|/?+>|\)[ \t]*+(?=$|<))"
 _END_OF_NAKED = r"\s*+\)(?=[ \t`*.,;\]\"'}]*+$)"
 _NAKED_MESSAGE = r"\bmessage_?to\("
-_NAKED_LINE_END = re.compile(_END_OF_NAKED, re.MULTILINE)
+_NAKED_LINE_END = re.compile(rf"(?<!\s){_END_OF_NAKED}", re.MULTILINE)
 _ELEMENT_END = re.compile(r"</\s*+message_?to\s*+>", re.IGNORECASE)
 _ATTRIBUTES = re.compile(
     r"\s++(?:to|name|agent|recipient|receiver|target)\s*+=\s*+\"(?P<to>[^\"<>\n]{1,80}+)\""
@@ -37,7 +39,6 @@ _ATTRIBUTES = re.compile(
     re.IGNORECASE,
 )
 _NESTING = re.compile(r"(?P<open><\s*+\w++\()|\)/?+>|\n")
-_DEEPEST = 3
 _SAMPLE = "write <MessageTo(Name, '''text''')>"
 
 _FAMILIES = ("'´`‘’‚‛‹›", '"“”„‟«»', "「」", "『』")  # noqa: RUF001 - telling these apart is the point
@@ -56,14 +57,12 @@ class Addressed:
 class MessageReader:
     """A reader of the messages of one reply.
 
-    It remembers which quotes are no longer closed in the rest of the text, so that a reply full of
-    openings costs one search in total, not one per opening.
+    It remembers how far it searched, so that a reply full of openings costs one search in total, not one per opening.
     """
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._never_closed: set[str] = set()
-        self._not_closed_before = 0
+        self._searched: dict[re.Pattern[str], tuple[int, re.Match[str] | None]] = {}
 
     def attributes(self, at: int) -> Addressed | None:
         """Return the message whose recipient and text are attributes after `<MessageTo`."""
@@ -73,9 +72,8 @@ class MessageReader:
     def element(self, at: int) -> Addressed | None:
         """Return the message between `<MessageTo>`, which ends here, and `</MessageTo>`."""
         to = _RECIPIENT.match(self._text, at)
-        end = None if to is None or "</" in self._never_closed else _ELEMENT_END.search(self._text, to.end())
+        end = None if to is None else self._search(_ELEMENT_END, to.end())
         if to is None or end is None:
-            self._never_closed.add("</")
             return None
         start = to.end()
         stop = self._before_quotes(start, end.start())
@@ -112,35 +110,46 @@ class MessageReader:
 
     def _quoted_end(self, quote: re.Match[str], *, naked: bool) -> tuple[int, int] | None:
         mark = quote.group()
-        kind = mark + "naked" * naked
-        if kind in self._never_closed:
-            return None
         ends = _NAKED_ENDS if naked else _ENDS
-        found = ends[mark if mark in ends else mark[0]].search(self._text, quote.end())
-        if found is None:
-            self._never_closed.add(kind)
+        found = self._search(ends[mark if mark in ends else mark[0]], quote.end())
         return (found.start(), found.end()) if found and found["end"] else None
+
+    def _search(self, pattern: re.Pattern[str], at: int) -> re.Match[str] | None:
+        """Return the first match from here on; an earlier search that passed this place has found it."""
+        begun, found = self._searched.get(pattern, (len(self._text) + 1, None))
+        if at < begun or (found is not None and found.start() < at):
+            found = pattern.search(self._text, at)
+            self._searched[pattern] = at, found
+        return found
 
     def _line_end(self, at: int, recipient: str, *, naked: bool) -> tuple[int, int]:
         if naked:
-            if at >= self._not_closed_before:
-                line_end = self._text.find("\n", at)
-                stop = len(self._text) if line_end < 0 else line_end
-                if found := _NAKED_LINE_END.search(self._text, at, stop):
-                    return found.start(), found.end()
-                self._not_closed_before = stop
-            raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: {_SAMPLE}")
-        depth = 0
-        for mark in _NESTING.finditer(self._text, at):
-            if mark["open"] and depth < _DEEPEST:
-                depth += 1
-            elif mark["open"] or mark.group() == "\n":
-                break
-            elif depth == 0:
-                return self._before_quotes(at, mark.start()), mark.end()
-            else:
-                depth -= 1
-        raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: end it with ''')>")
+            end = self._search(_NAKED_LINE_END, at)
+            if end is None or self._text.find("\n", at, end.end()) >= 0:
+                raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: {_SAMPLE}")
+            return end.start(), end.end()
+        marks, closes = self._nesting
+        closing = closes[bisect_left(marks, at, key=re.Match.start)]
+        if closing == len(marks):
+            raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: end it with ''')>")
+        return self._before_quotes(at, marks[closing].start()), marks[closing].end()
+
+    @cached_property
+    def _nesting(self) -> tuple[list[re.Match[str]], list[int]]:
+        """The marks of calls and line ends, and the number of the mark that closes a call whose next mark is this one.
+
+        A number that no mark has says that the call is not closed on its line.
+        """
+        marks = list(_NESTING.finditer(self._text))
+        never = len(marks)
+        closes = [never] * (never + 1)
+        for place in range(never - 1, -1, -1):
+            if marks[place]["open"]:
+                inner = closes[place + 1]
+                closes[place] = closes[inner + 1] if inner < never else never
+            elif marks[place].group() != "\n":
+                closes[place] = place
+        return marks, closes
 
 
 def _end_of(mark: str, *, naked: bool = False) -> re.Pattern[str]:

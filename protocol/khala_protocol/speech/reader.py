@@ -7,6 +7,7 @@ and `objects`, each of which reads one kind of thing at one place, and `said`, w
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -54,11 +55,38 @@ if TYPE_CHECKING:
     from khala_protocol.speech.quoting import Addressed
 
 
+MAX_REPLY_CHARACTERS = 65_536
+"""The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
+
+
+MAX_FOUND = 1_000
+"""Number of calls, messages and faults that are read: 9 000 of them, as many as fit, would take a third of a second."""
+
+
 def parse(text: str) -> Speech:
     """Read a reply. Never raise; see the table of `khala_protocol.speech`."""
-    walk = _Walk(text)
-    walk.run()
+    walk = _Walk(text[:MAX_REPLY_CHARACTERS])
+    try:
+        walk.run()
+    except _TooManyError as error:
+        return _incomplete(walk, text, error.start, f"the reply has more than {MAX_FOUND} calls")
+    if len(text) > MAX_REPLY_CHARACTERS:
+        said = f"the reply is longer than {MAX_REPLY_CHARACTERS} characters"
+        return _incomplete(walk, text, MAX_REPLY_CHARACTERS, said)
     return walk.gathering.speech()
+
+
+class _TooManyError(Exception):
+    def __init__(self, start: int) -> None:
+        self.start = start
+
+
+def _incomplete(walk: _Walk, text: str, start: int, why: str) -> Speech:
+    """Return what was read of a reply up to this place, and the rejection of the rest."""
+    message = f"{why}, the rest of it was not read: write less"
+    unread = Rejection(reason="malformed", message=message, text=text[start : start + SHORT], start=start)
+    speech = walk.gathering.speech()
+    return replace(speech, faults=(*speech.faults, unread))
 
 
 _THINK = (
@@ -77,7 +105,7 @@ _NEXT = re.compile(
     rf"|(?P<sentence>{SENTENCE_END}|{JSON_KEY})",
     re.IGNORECASE,
 )
-_OBJECT_AHEAD = re.compile(r"[\s\[,]*+\{")
+_OBJECT_AHEAD = re.compile(r"[\s\[,]{0,40}+\{")
 _OTHER_SPEAKER = re.compile(r"[*_#]*+(?:user|human)[*_]*+:", re.IGNORECASE)
 _GENERIC = re.compile(r"[A-Za-z0-9]<")
 _NEGATED = re.compile(rf"(?:{NEGATION})[\s`*\"'_]*+$", re.IGNORECASE)
@@ -93,6 +121,7 @@ class _Walk:
         self._text = text
         self._plain = to_ascii(text)
         self._messages = MessageReader(self._plain)
+        self._found = 0
         self._start_over()
 
     def _start_over(self) -> None:
@@ -110,13 +139,19 @@ class _Walk:
             at = place.end() if mark is None else _READS[str(mark.lastgroup)](self, mark)
 
     @cached_property
+    def _last_comment_end(self) -> int:
+        return self._plain.rfind("-->") + 1
+
+    @cached_property
     def _closing_tags(self) -> frozenset[str]:
         return closing_tags(self._plain)
 
     # Each of the following reads the thing at one place and returns the offset after it.
 
     def comment(self, mark: re.Match[str]) -> int:  # S24
-        return max(mark.end(), self._plain.find("-->", mark.end()))
+        if mark.end() >= self._last_comment_end:
+            return mark.end()
+        return self._plain.find("-->", mark.end())
 
     def speaker(self, mark: re.Match[str]) -> int:  # S26
         return len(self._plain) if self.gathering else mark.end()
@@ -315,12 +350,14 @@ class _Walk:
         )
 
     def _fault(self, start: int, end: int, name: str, reason: str) -> None:
+        self._count(start)
         text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
         fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
         kind = ReplySection.COMMUNICATIONS if is_talk(name) else ReplySection.ACTIONS
         self.gathering.add(fault, kind, self._section_at(start))
 
     def _add(self, item: Call | MessageTo | ListenTo, kind: ReplySection, start: int) -> None:
+        self._count(start)
         before = self._plain[max(0, start - _LOOKED_BACK) : start]
         before = before[before.rfind("\n") + 1 :]
         taken_back = False
@@ -328,6 +365,11 @@ class _Walk:
             struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
             taken_back = bool(struck or _NEGATED.search(before))
         self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
+
+    def _count(self, start: int) -> None:
+        self._found += 1
+        if self._found > MAX_FOUND:
+            raise _TooManyError(start)
 
     def _section_at(self, start: int) -> ReplySection:
         """Return the section at this place."""

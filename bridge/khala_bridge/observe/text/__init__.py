@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text import actions, general, known, reply, units, whole_side
-from khala_bridge.observe.text.page import SECTIONS, Feedback, Page, Section, find_sections, render, section, shorter
+from khala_bridge.observe.text.page import SECTIONS, Page, Section, find_sections, render, section, shorter
 from khala_bridge.observe.text.tokens import tokens
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 __all__ = [
     "SECTIONS",
     "SECTIONS_OF",
-    "Feedback",
     "Page",
     "Section",
     "actions",

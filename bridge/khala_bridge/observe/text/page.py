@@ -22,24 +22,15 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from khala_bridge.observe.feedback import Feedback
     from khala_bridge.observe.observation import AgentObservation
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.messages import Received, Rejection, TeamView, View
+    from khala_protocol.messages import TeamView, View
 
     Write: TypeAlias = Callable[["Page"], Iterable[str]]
 
 Part: TypeAlias = Literal["counts", "events", "alerts", "others", "resources", "places", "power", "structures"]
 """A part of the view that is made only for agents with a section that shows it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Feedback:
-    """The results of an agent's last reply, and the messages of others."""
-
-    accepted: tuple[str, ...] = ()
-    """Its calls that were carried out, `Stalker-1 <Attack_Unit(0x1)>`."""
-    rejections: tuple[Rejection, ...] = ()
-    messages: tuple[Received, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section, shorter
@@ -11,7 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import Received
+    from khala_protocol.messages import Received, Rejection
+
+_QUOTES = re.compile("'{3,}")
 
 
 @section("last_actions")
@@ -28,9 +31,7 @@ def rejections(page: Page) -> Iterator[str]:
     """Show the calls that were not carried out, and why."""
     if page.feedback.rejections:
         yield "Your last errors"
-    for fault in page.feedback.rejections:
-        words = f"{fault.team} {fault.text}" if fault.team else fault.text
-        yield f"{INDENT}rejected: {one_line(words)}: {one_line(fault.message)}"
+    yield from (f"{INDENT}{_rejection(fault)}" for fault in page.feedback.rejections)
 
 
 @section("messages")
@@ -67,8 +68,14 @@ def _communication(page: Page, *, with_roles: bool) -> Iterator[str]:
         yield f"{INDENT}To write to all of them: <MessageTo(channel, '''text''')>; to listen: <ListenTo(channel)>"
 
 
+def _rejection(fault: Rejection) -> str:
+    words = one_line(f"{fault.team} {fault.text}" if fault.team else fault.text)
+    return f"rejected: {words}: {one_line(fault.message)}" if words else one_line(fault.message)
+
+
 def _message(message: Received, name: str) -> str:
+    """Return a message on one line and between quotes that it does not have, so that it cannot pass for other text."""
     where = "" if message.recipient == name else f" in {message.recipient}"
-    lines = [line.strip() for line in message.text.splitlines()]
-    text = " / ".join(line for line in lines if line)  # on one line, so that no part of it looks like a heading
+    lines = (one_line(line) for line in message.text.splitlines())
+    text = _QUOTES.sub('"', " / ".join(line for line in lines if line))
     return f"Message from {message.sender}{where}: '''{text}'''"

@@ -1,0 +1,94 @@
+"""No text takes the reader more than linear time: every short token of the language, and mixtures of them, repeated."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import time
+
+import pytest
+
+from bench.hostile import TOKENS
+from khala_protocol.speech import MAX_REPLY_CHARACTERS, parse
+
+PREFIXES = ("", "Actions:\n<Stop()>\n")
+FOUND = (  # each was quadratic, or worse, before
+    *("A_", "A_A_", "Aa_bAa_b", "<!--", "[\n", ". Actions: A1| ", '{"action":"A_b"}A1| ', "\nMessageTo(A, x"),
+    *("<MessageTo (A, x", "<MessageTo (A, x<a(x)>", "<MessageTo(A," + " " * 170 + "'x", "<MessageTo> ,x"),
+    *("Final actions:\n<A_b()>\n", "<A_b([1, 2], [3, 4])>\n"),
+)
+NOTICED_S = 0.02
+"""Less time is noise."""
+
+
+def seconds(text: str) -> float:
+    begin = time.thread_time()
+    parse(text)
+    return time.thread_time() - begin
+
+
+def growth(piece: str, prefix: str, long: int) -> float:
+    """Return how many times as long a text takes that is four times as long: the least of some measurements."""
+    short, long_text = ((prefix + piece * (size // len(piece) + 1))[:size] for size in (long // 4, long))
+    if seconds(long_text) < NOTICED_S:
+        return 0.0
+    return min(seconds(long_text) for _ in range(3)) / min(seconds(short) for _ in range(3))
+
+
+def is_linear(piece: str, prefix: str, long: int = MAX_REPLY_CHARACTERS // 4) -> bool:
+    return any(growth(piece, prefix, long) < 8 for _ in range(3))  # 4 if it is linear, 16 if it is quadratic
+
+
+@pytest.mark.parametrize("piece", FOUND)
+def test_what_was_slow_takes_linear_time(piece: str) -> None:
+    assert is_linear(piece, PREFIXES[1], MAX_REPLY_CHARACTERS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("token", TOKENS)
+def test_no_two_tokens_take_more_than_linear_time(token: str) -> None:
+    units = (token, *(token + other for other in TOKENS))
+    slow = [(unit, prefix) for unit in units for prefix in PREFIXES if not is_linear(unit, prefix)]
+    assert not slow
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_no_mixture_of_tokens_takes_more_than_linear_time(seed: int) -> None:
+    chance = random.Random(seed)
+    units = ("".join(chance.choices(TOKENS, k=chance.choice((3, 3, 4, 5)))) for _ in range(50))
+    assert not [unit for unit in units if not is_linear(unit, chance.choice(PREFIXES))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("token", TOKENS)
+def test_many_openings_and_a_far_end_take_linear_time(token: str) -> None:
+    for other, prefix in itertools.product(TOKENS, PREFIXES):
+        texts = (prefix + token * (size // len(token)) + other * (size // len(other)) for size in (8_192, 32_768))
+        short, long = (min(seconds(text) for _ in range(2)) for text in texts)
+        assert long < max(10 * short, 2 * NOTICED_S), other
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x" * MAX_REPLY_CHARACTERS + "<Stop()>", "the reply is longer than 65536 characters"),
+        ("<Stop()>" * 1_001, "the reply has more than 1000 calls"),
+    ],
+    ids=["characters", "calls"],
+)
+def test_what_is_not_read_of_a_reply_is_reported(text: str, message: str) -> None:
+    fault = parse(text).faults[-1]
+    assert (fault.reason, fault.text) == ("malformed", "<Stop()>")
+    assert fault.message == f"{message}, the rest of it was not read: write less"
+    assert text[fault.start :] == "<Stop()>"
+
+
+def test_all_calls_up_to_the_limit_are_read() -> None:
+    assert (len(parse("<Stop()>" * 1_000).calls), parse("<Stop()>" * 1_000).faults) == (1_000, ())
+
+
+@pytest.mark.parametrize("entity", ["&#" + "9" * 5_000 + ";", "&#x" + "f" * 5_000 + ";"])
+def test_an_entity_with_too_many_digits_is_text(entity: str) -> None:
+    (message,) = parse(f"<MessageTo(A, 'go {entity} on')>").messages
+    assert message.text == f"go {entity} on"
