@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -35,6 +35,9 @@ from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
 
+if TYPE_CHECKING:
+    from khala_orchestrator.resume import Unfinished
+
 SIGNALLED = 128
 """Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
 NOT_VALID = 3
@@ -56,15 +59,27 @@ Examples:\n
     khala run 2s3z_pair --model deepseek --episodes 5\n
     khala run pvz_task6_level1 --model anthropic --images paper\n
     khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
-    khala run my_task.yaml --policy my_agent:decide --json
+    khala run my_task.yaml --policy my_agent:decide --json\n
+    khala run 2s3z_pair --clock realtime --speed 2\n
+    khala run --resume runs/2s3z-20260101-120000-ab12
 """
 HOST_EPILOG = """
 Examples:\n
     khala host 2s3z_pair --run first --connect tcp/10.0.0.5:7447\n
-    khala host 2s3z_pair --run first --listen tcp/0.0.0.0:7447 --insecure
+    khala host 2s3z_pair --run first --listen tcp/0.0.0.0:7447 --insecure\n
+    khala host --resume runs/first --listen tcp/0.0.0.0:7447 --insecure
 """
 
-Task = Annotated[str, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")]
+Task = Annotated[
+    str | None, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")
+]
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        help="Instead of a task: go on with a match whose host was lost; its recording, or the directory of its run.",
+        metavar="RUN",
+    ),
+]
 Game = Annotated[
     str,
     typer.Option(help="Game to use: simulator, starcraft2 (at SC2PATH), or a directory of either.", metavar="GAME"),
@@ -109,8 +124,9 @@ Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own
 
 
 def run(
-    task: Task,
+    task: Task = None,
     *,
+    resume: Resume = None,
     model: Annotated[
         str, typer.Option(help="Model to ask: scripted, openai, deepseek, …, or a YAML file.", metavar="NAME")
     ] = "scripted",
@@ -155,18 +171,21 @@ def run(
     """
     from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
 
-    config = _config(
-        task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
+    config, past = _match(
+        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     minds = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
-    _until_interrupted(config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch))
+    _until_interrupted(
+        config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
+    )
 
 
 def host(
-    task: Task,
+    task: Task = None,
     *,
+    resume: Resume = None,
     run: RunName = None,
     connect: Annotated[
         list[str] | None, typer.Option(help="Endpoint of the router.", show_default="tcp/127.0.0.1:7447")
@@ -195,14 +214,14 @@ def host(
     """
     from khala.local import play_hosted  # noqa: PLC0415
 
-    config = _config(
-        task, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
+    config, past = _match(
+        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     bus = _bus(connect, listen, insecure=insecure)
     _until_interrupted(
-        config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch)
+        config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch, past=past)
     )
 
 
@@ -264,6 +283,33 @@ app.add_typer(knowledge, name="knowledge")
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
     run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
+
+
+def _match(
+    task: str | None, resume: Path | None, run: str | None, out: Path, **given: Any
+) -> "tuple[MatchConfig, Unfinished | None]":
+    """Return the match that the options describe, and what was played of it."""
+    if (task is None) == (resume is None):
+        raise ConfigError("give a task, or a recording with --resume: one of them")
+    if resume is None:
+        assert task is not None
+        return _config(task, run, out, **given), None
+    from khala_orchestrator.resume import unfinished  # noqa: PLC0415  # as below
+    from khala_protocol.recording import Recording  # noqa: PLC0415
+
+    past = unfinished(Recording.open(_newest_recording(resume)))
+    changes = {"record": _free_recording(out / past.config.run), "assemble_s": given["assemble_s"]}
+    return past.config.model_copy(update=changes), past
+
+
+def _newest_recording(path: Path) -> Path:
+    """Return the recording at a path, or the newest one in the directory of a run."""
+    if not path.is_dir():
+        return path
+    found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
+    if not found:
+        raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
+    return found[-1]
 
 
 def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:

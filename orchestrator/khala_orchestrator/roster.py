@@ -132,9 +132,7 @@ class Roster:
             self._doubtful[seat].discard(address.instance)
             instances.add(address.instance)
             if len(instances) > 1:
-                log.warning(
-                    "%d processes are agent %s: the first reply of a step counts, all pay", len(instances), seat
-                )
+                log.warning("%d processes are agent %s: the first reply of a step counts", len(instances), seat)
             await self._here(seat)
         elif self._cut:  # with our own link down, every agent seems to leave at once
             self._doubtful[seat].add(address.instance)

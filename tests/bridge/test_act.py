@@ -308,6 +308,7 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
     "unknown_recipient": "tests/orchestrator/test_mailbox.py",
     "too_many_messages": "tests/orchestrator/test_mailbox.py",
     "refused_by_game": "tests/bridge/test_executors.py",
+    "too_late": "tests/orchestrator/test_clocks.py",
 }
 
 
