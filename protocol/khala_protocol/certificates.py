@@ -17,7 +17,6 @@ import contextlib
 import ipaddress
 import socket
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cryptography import x509
@@ -38,6 +37,7 @@ from khala_protocol.keys import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from pathlib import Path
 
 AUTHORITY, ROUTER, HOST, OBSERVER = "authority", "router", "host", "observer"
 DEFAULT_DAYS = 365
@@ -124,19 +124,20 @@ def certificates(directory: Path) -> list[Certificate]:
 
 
 def files_of(directory: Path, *names: str) -> TlsFiles:
-    """Return the files of the first of these common names for which there is a certificate.
+    """Return the files of the first of these common names for which there is a certificate, or of any.
 
     Raises:
         ConfigError: there is none for any of them.
         BusError: a certificate cannot be read.
     """
     found = {one.name: one.path.parent for one in reversed(certificates(directory)) if one.name != AUTHORITY}
-    for name in names:
+    for name in names or found:
         if name in found:
             place = found[name]
             return TlsFiles(ca=place / "ca.pem", certificate=place / "certificate.pem", key=place / "key.pem")
     there = f"there are {', '.join(sorted(found))}" if found else "there are none"
-    raise ConfigError(f"no certificate of {' or '.join(names)}, {there}: {_how(names[0])}", source=str(directory))
+    wanted = names or (HOST,)
+    raise ConfigError(f"no certificate of {' or '.join(wanted)}, {there}: {_how(wanted[0])}", source=str(directory))
 
 
 def _how(name: str) -> str:
@@ -181,8 +182,9 @@ def _extensions(hosts: tuple[str, ...]) -> list[tuple[x509.ExtensionType, bool]]
     extensions: list[tuple[x509.ExtensionType, bool]] = [(x509.BasicConstraints(ca=False, path_length=None), True)]
     if not hosts:
         return [*extensions, (x509.ExtendedKeyUsage([ExtendedKeyUsageOID.CLIENT_AUTH]), False)]
+    uses = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
     names = x509.SubjectAlternativeName([_general_name(host) for host in dict.fromkeys(hosts)])
-    return [*extensions, (x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), False), (names, False)]
+    return [*extensions, (uses, False), (names, False)]
 
 
 def _general_name(host: str) -> x509.GeneralName:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
-from khala_protocol.bus.config import BusConfig, TlsFiles
+from khala_protocol.bus.config import BusConfig, TlsFiles, check
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -16,19 +16,20 @@ if TYPE_CHECKING:
 
 
 def client_config(
-    connect: Iterable[str], *, tls: Path | None, names: tuple[str, ...], insecure: bool, timeout_s: float = 5.0
+    connect: Iterable[str], *, tls: Path | None, names: tuple[str, ...] = (), insecure: bool, timeout_s: float = 5.0
 ) -> BusConfig:
     """Return the configuration of a session that connects to a router.
 
     Args:
         connect: endpoints; none means the default.
         tls: directory with certificates; None for a link without TLS.
-        names: common names of which the first that has a certificate is shown to the router.
+        names: common names of which the first that has a certificate is shown to the router; none means any.
         insecure: allow links to other machines without TLS.
         timeout_s: how long to try.
 
     Raises:
         ConfigError: there is no certificate with such a name.
+        BusError: as `khala_protocol.bus.config.check` does.
     """
     files = _files(tls, names)
     config = BusConfig(connect=tuple(connect), tls=files, insecure=insecure, connect_timeout_s=timeout_s)
@@ -42,6 +43,7 @@ def router_config(
 
     Raises:
         ConfigError: there is no certificate of a router.
+        BusError: as `khala_protocol.bus.config.check` does.
     """
     files = _files(tls, ("router",))
     return _loudly(
@@ -58,7 +60,8 @@ def _files(tls: Path | None, names: tuple[str, ...]) -> TlsFiles | None:
 
 
 def _loudly(config: BusConfig) -> BusConfig:
-    """Return the configuration, after a word on stderr about what is dangerous in it."""
+    """Return the configuration if it is right, after a word on stderr about what is dangerous in it."""
+    check(config)
     if config.insecure and config.exposed:
         _say(
             f"WARNING: {', '.join(config.exposed)} has no encryption and no identities: everyone who reaches it can "

@@ -7,7 +7,7 @@ them, shows them. Only these two know a library for them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from cryptography import x509
@@ -19,6 +19,7 @@ from khala_protocol.errors import BusError
 if TYPE_CHECKING:
     from pathlib import Path
 
+DAY = timedelta(days=1)
 SOON_DAYS = 30
 """A certificate with fewer days left is worth a word."""
 
@@ -41,18 +42,33 @@ class Certificate:
     begins: datetime
     ends: datetime
 
-    def days_left(self, now: datetime | None = None) -> int:
-        """Return the whole days until it expires; negative when it has expired."""
-        return (self.ends - (now or datetime.now(UTC))).days
+    @property
+    def has_expired(self) -> bool:
+        """Whether it is past its time."""
+        return self.ends < datetime.now(UTC)
+
+    @property
+    def days_left(self) -> int:
+        """Days until it expires, of which the last has begun."""
+        return -((datetime.now(UTC) - self.ends) // DAY)
+
+    @property
+    def key(self) -> Path:
+        """The file of its private key, if it is here."""
+        return self.path.parent / "key.pem"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether others than its owner can read the private key."""
+        return self.key.exists() and bool(self.key.stat().st_mode & 0o077)
 
     @property
     def warning(self) -> str:
         """One sentence if it expires soon or has expired; otherwise empty."""
-        left = self.days_left()
-        if left < 0:
+        if self.has_expired:
             return f"the certificate of {self.name} expired on {self.ends:%Y-%m-%d} ({self.path}): {self.remedy}"
-        if left < SOON_DAYS:
-            return f"the certificate of {self.name} expires in {left} days ({self.path}): {self.remedy}"
+        if self.days_left < SOON_DAYS:
+            return f"the certificate of {self.name} expires in {self.days_left} days ({self.path}): {self.remedy}"
         return ""
 
     @property
@@ -79,17 +95,16 @@ def read(path: Path, what: str = "certificate") -> Certificate:
     return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
 
 
-def check_valid(path: Path, what: str = "certificate", *, now: datetime | None = None) -> None:
+def check_valid(path: Path, what: str = "certificate") -> None:
     """Check that the certificate can be used at this moment.
 
     Raises:
         BusError: as `read` does, or it has expired, or is not valid yet.
     """
     found = read(path, what)
-    now = now or datetime.now(UTC)
-    if found.ends < now:
+    if found.has_expired:
         raise BusError(found.warning)
-    if found.begins > now:
+    if found.begins > datetime.now(UTC):
         raise BusError(f"the TLS {what} {path} is valid from {found.begins:%Y-%m-%d} on: is the clock here right?")
 
 

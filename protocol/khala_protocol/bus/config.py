@@ -207,10 +207,13 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
 
 
 def _exposed(endpoint: str, *, listening: bool) -> str:
-    harm = "would let every machine that reaches it join" if listening else "would send everything unencrypted"
-    remedy = "`khala keys init DIR` makes keys for `--tls DIR`" if listening else "use `--tls DIR`, see `khala keys`"
-    option = f"--{'listen' if listening else 'connect'} {_over_tls(endpoint)}"
-    return f"{endpoint} {harm}: {remedy} {option}; or say `--insecure` if the network is yours alone"
+    if listening:
+        harm = "would let every machine that reaches it join without TLS"
+        remedy = f"make keys with `khala keys init DIR` and say `--tls DIR --listen {_over_tls(endpoint)}`"
+    else:
+        harm = "would send everything to another machine without TLS"
+        remedy = f"say `--tls DIR --connect {_over_tls(endpoint)}`, with keys of `khala keys`"
+    return f"{endpoint} {harm}: {remedy}, or `--insecure` if the network is yours alone"
 
 
 def _over_tls(endpoint: str) -> str:
