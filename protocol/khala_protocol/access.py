@@ -28,6 +28,9 @@ REPLY_BYTES = 512 * 1024
 EXCHANGE_BYTES = 4 * 1024 * 1024
 """A prompt of a million tokens, without pictures."""
 QUESTION_BYTES = 4096
+RATE_HZ = 500.0
+"""How often an agent may write under one key. Replies to two steps are at least a turn of some milliseconds apart; what
+comes 2 ms after another is no answer to an observation. A flood of 20 kB frames had 2 300 of them in a second."""
 MESSAGE_BYTES = 64 * 1024 * 1024
 """A router puts fragments together up to this size; Zenoh's default is a gigabyte, for each link."""
 
@@ -61,6 +64,7 @@ def router_settings(agents: Iterable[tuple[str, str]], run: str | None = None) -
             "policies": [{"subjects": [name], "rules": ids} for name, ids in policies.items()],
         },
         "low_pass_filter": list(_sizes()),
+        "downsampling": [{"flows": ["ingress"], "messages": ["put"], "rules": list(_rates())}],
         "transport/link/rx/max_message_size": MESSAGE_BYTES,
     }
 
@@ -97,6 +101,11 @@ def _sizes() -> Iterable[dict[str, Any]]:
     for topic, size in limits.items():
         yield _limit(["put"], [f"{ROOT}/*/*/*/{topic}"], size)
     yield _limit(["query"], _with_caches(f"{ROOT}/**"), QUESTION_BYTES)
+
+
+def _rates() -> Iterable[dict[str, Any]]:
+    for topic in (Topic.REPLY, Topic.EXCHANGE):
+        yield {"key_expr": f"{ROOT}/*/*/*/{topic}", "freq": RATE_HZ}
 
 
 def _limit(messages: Sequence[str], keys: Sequence[str], size: int) -> dict[str, Any]:
