@@ -34,6 +34,7 @@ comes 2 ms after another is no answer to an observation. A flood of 20 kB frames
 MESSAGE_BYTES = 64 * 1024 * 1024
 """A router puts fragments together up to this size; Zenoh's default is a gigabyte, for each link."""
 
+_WRITES = (Topic.REPLY, Topic.EXCHANGE)
 _LISTEN = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
 _HEAR = ["put", "delete", "reply", "liveliness_token"]
 _EVERYTHING = [*_LISTEN, *_HEAR, "declare_queryable"]
@@ -47,9 +48,10 @@ def router_settings(agents: Iterable[tuple[str, str]], run: str | None = None) -
         run: name of the run; None allows any, for a router that does not know it.
     """
     root = f"{ROOT}/{check_name(run, 'run') if run else '*'}"
+    names = sorted(set(agents))
     rules = [*_host(root), *_observer(root)]
     subjects, policies = [HOST, OBSERVER], {HOST: ["host"], OBSERVER: ["listen:observer", "hear:observer"]}
-    for side, agent in agents:
+    for side, agent in names:
         name = agent_name(side, agent)
         own = _agent(root, name, f"{root}/{side}/{agent}")
         rules += own
@@ -64,7 +66,7 @@ def router_settings(agents: Iterable[tuple[str, str]], run: str | None = None) -
             "policies": [{"subjects": [name], "rules": ids} for name, ids in policies.items()],
         },
         "low_pass_filter": list(_sizes()),
-        "downsampling": [{"flows": ["ingress"], "messages": ["put"], "rules": list(_rates())}],
+        "downsampling": [{"flows": ["ingress"], "messages": ["put"], "rules": list(_rates(names))}],
         "transport/link/rx/max_message_size": MESSAGE_BYTES,
     }
 
@@ -84,15 +86,14 @@ def _observer(root: str) -> list[dict[str, Any]]:
 def _agent(root: str, name: str, own: str) -> list[dict[str, Any]]:
     reads = [f"{root}/run", f"{root}/result", f"{own}/briefing", f"{own}/observation", f"{own}/image/*"]
     keys = _with_caches(*reads)
-    writes = [Topic.REPLY, Topic.EXCHANGE]
     return [
         _rule(f"listen:{name}", ["ingress"], _LISTEN, keys),
         _rule(f"hear:{name}", ["egress"], _HEAR, keys),
         # The question that follows a reply shows when the router has it.
-        _rule(f"speak:{name}", ["ingress"], ["put", "query"], [f"{own}/{topic}" for topic in writes]),
+        _rule(f"speak:{name}", ["ingress"], ["put", "query"], [f"{own}/{topic}" for topic in _WRITES]),
         _rule(f"live:{name}", ["ingress"], ["liveliness_token"], [f"{own}/{Topic.ALIVE}/*"]),
         # That somebody listens to what agents write: without it, nothing is sent.
-        _rule(f"audience:{name}", ["egress"], ["declare_subscriber"], [f"{root}/*/*/{topic}" for topic in writes]),
+        _rule(f"audience:{name}", ["egress"], ["declare_subscriber"], [f"{root}/*/*/{topic}" for topic in _WRITES]),
     ]
 
 
@@ -103,9 +104,11 @@ def _sizes() -> Iterable[dict[str, Any]]:
     yield _limit(["query"], _with_caches(f"{ROOT}/**"), QUESTION_BYTES)
 
 
-def _rates() -> Iterable[dict[str, Any]]:
-    for topic in (Topic.REPLY, Topic.EXCHANGE):
-        yield {"key_expr": f"{ROOT}/*/*/*/{topic}", "freq": RATE_HZ}
+def _rates(names: Iterable[tuple[str, str]]) -> Iterable[dict[str, Any]]:
+    """One for each key: a link has one clock for all keys of an expression."""
+    for side, agent in names:
+        for topic in _WRITES:
+            yield {"key_expr": f"{ROOT}/*/{side}/{agent}/{topic}", "freq": RATE_HZ}
 
 
 def _limit(messages: Sequence[str], keys: Sequence[str], size: int) -> dict[str, Any]:

@@ -106,7 +106,8 @@ def issue(directory: Path, name: str, folder: str, *, hosts: Iterable[str] = (),
     now = datetime.now(UTC)
     ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
     draft = _draft(name, ca.subject, key.public_key(), now - BEGINS_EARLIER, ends)
-    for extension, critical in _extensions(tuple(hosts)):
+    signer = x509.AuthorityKeyIdentifier.from_issuer_public_key(ca_key.public_key())
+    for extension, critical in (*_extensions(tuple(hosts)), (signer, False)):
         draft = draft.add_extension(extension, critical=critical)
     with _writing(place):
         place.mkdir(mode=0o700, exist_ok=True)
@@ -157,6 +158,7 @@ def _make_ca(place: Path) -> None:
         key_agreement=False, key_cert_sign=True, crl_sign=True, encipher_only=False, decipher_only=False,
     )  # fmt: skip
     draft = draft.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+    draft = draft.add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
     draft = draft.add_extension(usage, critical=True)
     place.mkdir(mode=0o700, exist_ok=True)
     _write(place / "key.pem", _pem(key))
