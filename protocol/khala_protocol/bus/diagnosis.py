@@ -37,6 +37,8 @@ _REASONS: tuple[tuple[type[OSError], str], ...] = (
     (FileNotFoundError, "there is no such socket"),
     (socket.gaierror, "this host name is unknown"),
 )
+OTHER_AUTHORITY = {7, 18, 19, 20, 21}
+"""Codes of OpenSSL (X509_V_ERR_…): a signature that does not fit, a chain that ends nowhere."""
 _ALERTS = {
     "TLSV1_ALERT_UNKNOWN_CA": "it does not know the authority of our certificate; take one of the same `khala keys`",
     "TLSV1_ALERT_DECRYPT_ERROR": "it does not know the authority of our certificate; take one of the same `khala keys`",
@@ -76,6 +78,8 @@ async def _attempt(endpoint: str, tls: TlsFiles | None) -> str:
         async with asyncio.timeout(ATTEMPT_S):
             await _connect(endpoint, tls)
     except ssl.SSLCertVerificationError as error:
+        if error.verify_code in OTHER_AUTHORITY:
+            return "its certificate is of another authority; take keys of the same `khala keys`"
         return f"its certificate is not good: {error.verify_message.rstrip('.')}"
     except ssl.SSLError as error:
         return _ALERTS.get(error.reason or "", "something listens there, but it speaks no TLS")
