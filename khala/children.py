@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -94,6 +95,8 @@ class Children:
                 stdin=subprocess.DEVNULL,
                 stdout=stdout,
                 stderr=log,
+                # The link to a child stays on this machine, and needs no certificate.
+                env={name: value for name, value in os.environ.items() if name != "KHALA_TLS"},
                 start_new_session=True,
             )
         self._processes[name] = process
