@@ -30,7 +30,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from khala_protocol.bus.certificate import Certificate, read
+from khala_protocol.bus.certificate import Certificate, command_for, read
 from khala_protocol.bus.config import TlsFiles
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
@@ -138,14 +138,8 @@ def files_of(directory: Path, *names: str) -> TlsFiles:
             return TlsFiles(ca=place / "ca.pem", certificate=place / "certificate.pem", key=place / "key.pem")
     there = f"there are {', '.join(sorted(found))}" if found else "there are none"
     wanted = names or (HOST,)
-    raise ConfigError(f"no certificate of {' or '.join(wanted)}, {there}: {_how(wanted[0])}", source=str(directory))
-
-
-def _how(name: str) -> str:
-    role, _, whose = name.partition(":")
-    side, _, agent = whose.partition("/")
-    commands = {"agent": f"agent {agent} DIR --side {side}", OBSERVER: "observer NAME DIR"}
-    return f"make it with `khala keys {commands.get(role, 'init DIR')}`, and copy its folder"
+    remedy = f"make it with {command_for(wanted[0])}, and copy its folder"
+    raise ConfigError(f"no certificate of {' or '.join(wanted)}, {there}: {remedy}", source=str(directory))
 
 
 def _make_ca(place: Path) -> None:

@@ -74,10 +74,16 @@ class Certificate:
     @property
     def remedy(self) -> str:
         """The command that makes a new one, where the authority is."""
-        role, _, whose = self.name.partition(":")
-        side, _, agent = whose.partition("/")
-        again = {"agent": f"agent {agent} DIR --side {side}", "observer": f"observer {self.path.parent.name} DIR"}
-        return f"`khala keys {again.get(role, 'init DIR')}` makes a new one where the authority is"
+        return f"{command_for(self.name, self.path.parent.name)} makes a new one where the authority is"
+
+
+def command_for(name: str, folder: str = "observer.NAME") -> str:
+    """Return the command that makes the certificate with this common name, for this folder."""
+    role, _, whose = name.partition(":")
+    side, _, agent = whose.partition("/")
+    observer = folder.removeprefix("observer.")
+    commands = {"agent": f"agent {agent} DIR --side {side}", "observer": f"observer {observer} DIR"}
+    return f"`khala keys {commands.get(role, 'init DIR')}`"
 
 
 def read(path: Path, what: str = "certificate") -> Certificate:
