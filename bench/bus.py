@@ -1,6 +1,7 @@
 """One joint round over the bus: the host sends every agent an observation, and every agent replies.
 
     python bench/bus.py                      a table
+    python bench/bus.py --tls                the same over TLS, next to it
     python bench/bus.py --json               one JSON object on stdout
 
 It compares, in turns of a few rounds so that a noisy machine treats them the same:
@@ -20,10 +21,12 @@ import os
 import platform
 import statistics
 import sys
+import tempfile
 import threading
 import time
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import zenoh
@@ -32,11 +35,13 @@ from zenoh.handlers import Callback
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig, settings
 from khala_protocol.bus.zenoh import ZenohBus, open_bus
+from khala_protocol.certificates import files_of, make_authority
 
 ROUNDS = {1: 400, 8: 200, 32: 120, 128: 60}
 TURN_ROUNDS = 10
 WARM_UP_ROUNDS = 10
 TIMEOUT_S = 60.0
+KEYS = "KHALA_TLS"
 HEAD_BYTES = 8
 BLOCK = zenoh.CongestionControl.BLOCK  # raw publishers have no cache to repair losses of DROP
 
@@ -68,8 +73,20 @@ def open_raw(config: BusConfig) -> zenoh.Session:
 # --- agents, in their own processes ------------------------------------------------------------------
 
 
+def client(endpoint: str) -> BusConfig:
+    """Return the configuration of a client; without access rules, any certificate is good."""
+    keys = os.environ.get(KEYS)
+    return BusConfig(connect=(endpoint,), tls=files_of(Path(keys), "host") if keys and "tls/" in endpoint else None)
+
+
+def listener(*, tls: bool) -> BusConfig:
+    """Return the configuration of a router."""
+    files = files_of(Path(os.environ[KEYS]), "router") if tls else None
+    return BusConfig(mode="router", listen=(f"{'tls' if tls else 'tcp'}/127.0.0.1:0",), tls=files)
+
+
 async def work_bus(endpoint: str, agents: range, size: int) -> None:
-    bus = await open_bus(BusConfig(connect=(endpoint,)))
+    bus = await open_bus(client(endpoint))
 
     async def act(agent: int) -> None:
         replies = await bus.publisher(reply_key(agent), Delivery.SPEECH)
@@ -83,7 +100,7 @@ async def work_bus(endpoint: str, agents: range, size: int) -> None:
 
 
 async def work_raw(endpoint: str, agents: range, size: int) -> None:
-    session = open_raw(BusConfig(connect=(endpoint,)))
+    session = open_raw(client(endpoint))
     loop = asyncio.get_running_loop()
 
     async def act(agent: int) -> None:
@@ -103,7 +120,7 @@ async def work_raw(endpoint: str, agents: range, size: int) -> None:
 
 
 async def work_bare(endpoint: str, agents: range, size: int) -> None:
-    session = open_raw(BusConfig(connect=(endpoint,)))
+    session = open_raw(client(endpoint))
     held = []
     for agent in agents:
         publisher = session.declare_publisher(reply_key(agent), congestion_control=BLOCK)
@@ -231,14 +248,14 @@ WORKERS = {"bus": work_bus, "raw": work_raw, "bare": work_bare}
 # --- the measurement --------------------------------------------------------------------------------
 
 
-async def measure(agents: int, *, separate: bool, workers: int, sizes: Sizes, rounds: int) -> dict[str, list[float]]:
+async def measure(
+    agents: int, *, tls: bool, separate: bool, workers: int, sizes: Sizes, rounds: int
+) -> dict[str, list[float]]:
     """Return the milliseconds of each round, by kind."""
     async with AsyncExitStack() as stack:
         hosts: dict[str, Host] = {}
         for kind, make in HOSTS.items():
-            config = BusConfig(mode="router", listen=("tcp/127.0.0.1:0",))
-            if separate:
-                config = BusConfig(connect=(await start(stack, "router"),))
+            config = client(await start(stack, "router", str(tls))) if separate else listener(tls=tls)
             host = hosts[kind] = make()
             await host.open(config, agents, sizes)
             stack.push_async_callback(host.close)
@@ -289,7 +306,7 @@ async def start(stack: AsyncExitStack, *arguments: str) -> str:
 
 async def be_process(role: str, *arguments: str) -> None:
     if role == "router":
-        bus = await open_bus(BusConfig(mode="router", listen=("tcp/127.0.0.1:0",)))
+        bus = await open_bus(listener(tls=arguments == ("True",)))
         print(bus.endpoints[0], flush=True)
         await asyncio.get_running_loop().create_future()
     endpoint, first, agents, workers, size = arguments
@@ -299,11 +316,14 @@ async def be_process(role: str, *arguments: str) -> None:
 async def run(arguments: argparse.Namespace) -> dict[str, Any]:
     results = []
     sizes = Sizes(arguments.observation_bytes, arguments.reply_bytes)
-    for separate in (False, True):
-        for agents in arguments.agents:
+    places = [(separate, agents) for separate in (False, True) for agents in arguments.agents]
+    for separate, agents in places:
+        for tls in (False, True) if arguments.tls else (False,):
             rounds = max(TURN_ROUNDS, round(ROUNDS.get(agents, 100) * arguments.scale))
-            took = await measure(agents, separate=separate, workers=arguments.workers, sizes=sizes, rounds=rounds)
-            results.append(summary(agents, separate, took))
+            took = await measure(
+                agents, tls=tls, separate=separate, workers=arguments.workers, sizes=sizes, rounds=rounds
+            )
+            results.append(summary(agents, separate, took) | {"tls": tls})
             print(row(results[-1]), file=arguments.table, flush=True)
     machine = {"cpus": os.cpu_count(), "python": platform.python_version(), "system": platform.platform()}
     return {"bench": "bus", "machine": machine, "workers": arguments.workers, "sizes": vars(sizes), "results": results}
@@ -322,13 +342,14 @@ def summary(agents: int, separate: bool, took_ms: dict[str, list[float]]) -> dic
     }
 
 
-HEADER = "router   agents rounds |  bus ms    p99 |  raw ms    p99 | bare ms    p99 | bus/raw bus/bare"
+HEADER = "link router   agents rounds |  bus ms    p99 |  raw ms    p99 | bare ms    p99 | bus/raw bus/bare"
 
 
 def row(result: dict[str, Any]) -> str:
     cells = " | ".join(f"{result['median_ms'][kind]:7.2f} {result['p99_ms'][kind]:6.1f}" for kind in HOSTS)
     ratios = f"{result['ratio_to_raw']:7.2f} {result['ratio_to_bare']:8.2f}"
-    return f"{result['router']:8} {result['agents']:6} {result['rounds']:6} | {cells} | {ratios}"
+    place = f"{'tls' if result['tls'] else 'tcp':4} {result['router']:8}"
+    return f"{place} {result['agents']:6} {result['rounds']:6} | {cells} | {ratios}"
 
 
 def main() -> None:
@@ -338,6 +359,7 @@ def main() -> None:
     parser.add_argument("--observation-bytes", type=int, default=20_000)
     parser.add_argument("--reply-bytes", type=int, default=2_000)
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the number of rounds")
+    parser.add_argument("--tls", action="store_true", help="measure over TLS as well, with keys made for it")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     parser.add_argument("--process", nargs="+", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -346,7 +368,10 @@ def main() -> None:
         return
     arguments.table = sys.stderr if arguments.json else sys.stdout
     print(HEADER, file=arguments.table)
-    result = asyncio.run(run(arguments))
+    with tempfile.TemporaryDirectory() as keys:
+        make_authority(Path(keys), ["127.0.0.1"])
+        os.environ[KEYS] = keys  # its processes have it from there
+        result = asyncio.run(run(arguments))
     if arguments.json:
         print(json.dumps(result))
 

@@ -23,7 +23,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -43,9 +43,11 @@ from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Roster as Attendance
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Question, Turn
+from khala_protocol.access import router_settings
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.certificates import certify_agent, files_of, make_authority
 from khala_protocol.codec import decode_as
 from khala_protocol.keys import Topic, every_agent
 from khala_protocol.keys import parse as parse_key
@@ -77,13 +79,18 @@ class Measured:
     parts_s: dict[str, list[float]] = field(default_factory=lambda: {part: [] for part in PARTS})
     original_s: list[float] = field(default_factory=list)
     observation_bytes: int = 0
+    link: str = "tcp"
 
-    def row(self, latency_s: float) -> dict[str, float]:
+    def row(self, latency_s: float) -> dict[str, Any]:
         """Return medians, in milliseconds, without the endpoint's latency."""
-        row = {"agents": self.agents, "over": 1000 * (statistics.median(self.step_s) - latency_s)}
+        row: dict[str, Any] = {
+            "link": self.link,
+            "agents": self.agents,
+            "over": 1000 * (statistics.median(self.step_s) - latency_s),
+        }
         row |= {part: 1000 * statistics.median(values) for part, values in self.parts_s.items()}
         row["original"] = 1000 * (statistics.median(self.original_s) - latency_s) if self.original_s else 0.0
-        return row | {"goal": float(GOALS_MS.get(self.agents, 0)), "observation_bytes": self.observation_bytes}
+        return row | {"goal": GOALS_MS.get(self.agents, 0), "observation_bytes": self.observation_bytes}
 
 
 class Bench:
@@ -227,8 +234,18 @@ async def battle(task: TaskConfig) -> Snapshot:
     return snapshot
 
 
-async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool) -> list[Measured]:
-    """Measure every number of agents, ours and the original's way."""
+def listener(keys: Path, task: TaskConfig, agents: int) -> BusConfig:
+    """Return the configuration of a host that listens over TLS, with certificates and access rules for its agents."""
+    make_authority(keys, ["127.0.0.1"])
+    names = [(task.side, agent.name) for agent in crowd(task, agents).agents]
+    for side, name in names:
+        certify_agent(keys, side, name)
+    rules = router_settings(names)
+    return BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(keys, "router"), zenoh=rules)
+
+
+async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool, tls: bool) -> list[Measured]:
+    """Measure every number of agents, ours, over TLS as well if asked for, and the original's way."""
     task = load_task("2s3z")
     snapshot = await battle(task)
     found = []
@@ -237,26 +254,32 @@ async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bo
         children = await stack.enter_async_context(Children(logs))
         llm = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S))
         endpoint = LOOPBACK if tcp else stack.enter_context(local_endpoint())
-        bus = await open_bus(BusConfig(mode="router", listen=(endpoint,)))
-        stack.push_async_callback(bus.close)
-        options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
-        for count in agents:
+        links = [BusConfig(mode="router", listen=(endpoint,))]
+        links += [listener(logs / "keys", task, max(agents))] if tls else []
+        buses = [await open_bus(link) for link in links]
+        for bus in buses:
+            stack.push_async_callback(bus.close)
+        for count, bus in ((count, bus) for count in agents for bus in buses):
+            options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
+            options += ["--tls", str(logs / "keys")] if bus is not buses[0] else []
             async with Children(logs) as workers:
                 bench = Bench(bus, f"bench-{count}", task, snapshot, count)
                 measured = await bench.measure(steps, workers, [*options, "--model-name", "silent"])
+            measured.link = bus.endpoints[0].partition("/")[0]
             measured.original_s = await asyncio.to_thread(bench.original_s, llm["base_url"], original_steps)
             found.append(measured)
     return found
 
 
-def table(rows: list[dict[str, float]]) -> Table:
+def table(rows: list[dict[str, Any]]) -> Table:
     """Return the figures, in milliseconds over the endpoint's latency."""
     shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms", box=None)
-    for column in ("agents", "over", "goal", *PARTS, "original"):
+    columns = ("link", "agents", "over", "goal", *PARTS, "original")
+    for column in columns:
         shown.add_column(column, justify="right", no_wrap=True)
     for row in rows:
-        shown.add_row(*(f"{row[column]:.0f}" if column in {"agents", "goal"} else f"{row[column]:.1f}"
-                        for column in ("agents", "over", "goal", *PARTS, "original")))  # fmt: skip
+        shown.add_row(*(f"{row[column]:.1f}" if isinstance(row[column], float) else str(row[column])
+                        for column in columns))  # fmt: skip
     return shown
 
 
@@ -267,9 +290,12 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10)
     parser.add_argument("--original-steps", type=int, default=8)
     parser.add_argument("--tcp", action="store_true", help="over loopback TCP instead of a unix socket")
+    parser.add_argument("--tls", action="store_true", help="measure over TLS as well, with keys made for it")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
-    measured = asyncio.run(measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp))
+    measured = asyncio.run(
+        measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp, tls=arguments.tls)
+    )
     rows = [one.row(LATENCY_S) for one in measured]
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:

@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -23,13 +23,15 @@ import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
+from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
-from khala_orchestrator.cli import Insecure, Json, Listen
+from khala_orchestrator.cli import Insecure, Json, Listen, Tls, access_rules
 from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
 from khala_orchestrator.console import Progress, stderr_console
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
+from khala_protocol.joining import client_config, router_config
 from khala_protocol.keys import check_name
 from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
@@ -65,9 +67,9 @@ Examples:\n
 """
 HOST_EPILOG = """
 Examples:\n
-    khala host 2s3z_pair --run first --connect tcp/10.0.0.5:7447\n
-    khala host 2s3z_pair --run first --listen tcp/0.0.0.0:7447 --insecure\n
-    khala host --resume runs/first --listen tcp/0.0.0.0:7447 --insecure
+    khala host 2s3z_pair --run first --connect tls/10.0.0.5:7447 --tls keys\n
+    khala host 2s3z_pair --run first --listen tls/0.0.0.0:7447 --tls keys\n
+    khala host --resume runs/first --listen tls/0.0.0.0:7447 --tls keys
 """
 
 Task = Annotated[
@@ -188,9 +190,11 @@ def host(
     resume: Resume = None,
     run: RunName = None,
     connect: Annotated[
-        list[str] | None, typer.Option(help="Endpoint of the router.", show_default="tcp/127.0.0.1:7447")
+        list[str] | None,
+        typer.Option(help="Endpoint of the router.", show_default="tcp/127.0.0.1:7447, with --tls tls/127.0.0.1:7447"),
     ] = None,
     listen: Listen = None,
+    tls: Tls = None,
     insecure: Insecure = False,
     game: Game = "simulator",
     seed: Seed = 1,
@@ -219,17 +223,17 @@ def host(
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
-    bus = _bus(connect, listen, insecure=insecure)
+    bus = _bus(config, connect, listen, tls, insecure=insecure)
     _until_interrupted(
         config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch, past=past)
     )
 
 
-def doctor(*, as_json: Json = False) -> None:
+def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
     """Look at this machine as a match would, and say what to do."""
     from khala.doctor import examine  # noqa: PLC0415
 
-    findings = list(examine())
+    findings = list(examine(tls))
     wrong = any(finding.state == "wrong" for finding in findings)
     if as_json:
         typer.echo(json.dumps({"ok": not wrong, "findings": [finding.as_dict() for finding in findings]}))
@@ -276,6 +280,7 @@ for command, epilog in (
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
+app.add_typer(keys, name="keys")
 app.add_typer(khala_simulator.cli.app, name="sc2")
 app.add_typer(knowledge, name="knowledge")
 
@@ -330,11 +335,15 @@ def _free_recording(directory: Path) -> Path:
     return next(path for path in paths if not os.path.exists(path))  # noqa: PTH110  # Path.exists raises where it may not look
 
 
-def _bus(connect: list[str] | None, listen: list[str] | None, *, insecure: bool) -> BusConfig:
+def _bus(
+    match: MatchConfig, connect: list[str] | None, listen: list[str] | None, tls: Path | None, *, insecure: bool
+) -> BusConfig:
     if connect and listen:
         raise ConfigError("a host has a router or is one: give --connect or --listen, not both")
-    mode: Literal["router", "client"] = "router" if listen else "client"
-    return BusConfig(mode=mode, connect=tuple(connect or ()), listen=tuple(listen or ()), insecure=insecure)
+    if listen:
+        rules = access_rules([match.task], match.run) if tls else None
+        return router_config(listen, tls=tls, insecure=insecure, rules=rules)
+    return client_config(connect or (), tls=tls, names=("host",), insecure=insecure)
 
 
 def _until_interrupted(

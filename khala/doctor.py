@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from khala_protocol.bus.certificate import Certificate
+
 State = Literal["ok", "note", "wrong"]
 
 KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "DEEPSEEK_API_KEY")
@@ -42,13 +44,18 @@ class Finding:
         return asdict(self)
 
 
-def examine() -> Iterator[Finding]:
-    """Run every check, in the order in which a newcomer would ask."""
-    for check in CHECKS:
+def examine(tls: Path | None = None) -> Iterator[Finding]:
+    """Run every check, in the order in which a newcomer would ask; of certificates if a directory is given."""
+    for check in (*CHECKS, *([_certificates_in(tls)] if tls else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
-            yield Finding(check.__name__.strip("_"), "wrong", f"{type(error).__name__}: {error}", "report this")
+            yield Finding(
+                getattr(check, "__name__", "certificates").strip("_"),
+                "wrong",
+                f"{type(error).__name__}: {error}",
+                "report this",
+            )
 
 
 def _python() -> Iterator[Finding]:
@@ -106,6 +113,27 @@ def _bus() -> Iterator[Finding]:
                 )
             else:
                 yield Finding(f"port {port}", "ok", f"free for {user}")
+
+
+def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:
+    def certificates() -> Iterator[Finding]:
+        from khala_protocol import certificates  # noqa: PLC0415  # only this check needs the library
+
+        found = certificates.certificates(directory)
+        if not found:
+            yield Finding("certificates", "wrong", f"none in {directory}", "`khala keys init DIR` makes them")
+        yield from map(_certificate, found)
+
+    return certificates
+
+
+def _certificate(one: Certificate) -> Finding:
+    state: State = "wrong" if one.has_expired else "note" if one.warning or one.is_open else "ok"
+    said = f"valid for {one.days_left} days, until {one.ends:%Y-%m-%d}"
+    if one.has_expired:
+        said = f"expired on {one.ends:%Y-%m-%d}"
+    advice = one.remedy if one.warning else f"chmod 600 {one.key}: others can read it" if one.is_open else ""
+    return Finding(f"certificate {one.name}", state, said, advice)
 
 
 def _keys() -> Iterator[Finding]:

@@ -66,8 +66,9 @@ class Minds:
 
     @property
     def environ(self) -> dict[str, str]:
-        """The environment of the agents: all of ours for a policy, which is code of the user."""
-        return dict(os.environ) if self.policy else environment.with_model(load_model(self.model))
+        """The environment of the agents: all of ours for a policy, which is code of the user, but no keys of a bus."""
+        ours = {name: value for name, value in os.environ.items() if name != "KHALA_TLS"}
+        return ours if self.policy else environment.with_model(load_model(self.model))
 
     @property
     def needs_endpoint(self) -> bool:

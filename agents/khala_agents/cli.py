@@ -20,7 +20,7 @@ AGENT_EPILOG = """
 Examples:\n
     khala agent CombatGroupSmac --run demo\n
     khala agent CombatGroup1 CombatGroup2 --run demo --model openai --budget-usd 0.50\n
-    khala agent CombatGroup1 --run demo --policy my_agent:decide --connect tcp/10.0.0.5:7447\n
+    khala agent CombatGroup1 --run demo --policy my_agent:decide --connect tls/10.0.0.5:7447 --tls keys\n
     khala agent --agents configs/agents/mixed.yaml --run demo
 """
 LLM_EPILOG = """
@@ -44,8 +44,22 @@ def agent(
     side: Annotated[str, typer.Option(help="Side of the agents, as the task file names it.")] = "blue",
     connect: Annotated[
         list[str] | None,
-        typer.Option(help="Endpoint of the router, may be given several times.", show_default="tcp/127.0.0.1:7447"),
+        typer.Option(
+            help="Endpoint of the router, may be given several times.",
+            show_default="tcp/127.0.0.1:7447, with --tls tls/127.0.0.1:7447",
+        ),
     ] = None,
+    tls: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="KHALA_TLS",
+            help="Encrypt, with the agents' certificates in this directory, see `khala keys`.",
+            metavar="DIR",
+        ),
+    ] = None,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Allow a link to another machine without TLS: in your own network only.")
+    ] = False,
     model: Annotated[
         str | None,
         typer.Option(help="Model to ask: a shipped one (scripted, openai, ollama, …) or a YAML file.", metavar="NAME"),
@@ -86,7 +100,7 @@ def agent(
         commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents, fallback=fallback),
         run,
         side,
-        connect or [],
+        commands.Place(connect or [], tls, insecure=insecure),
         budget_usd=budget_usd,
         overrides={"base_url": base_url, "model": model_name},
         as_json=as_json,

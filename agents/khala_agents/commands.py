@@ -10,7 +10,9 @@ import asyncio
 import gc
 import json
 import os
-from typing import TYPE_CHECKING, Any, TypeVar
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import typer
 
@@ -20,10 +22,13 @@ from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.scripted.faults import Faults, parse_faults
 from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
-from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
-from khala_protocol.errors import ConfigError
-from khala_protocol.keys import check_name
+from khala_protocol.codec import decode_as
+from khala_protocol.errors import BusError, ConfigError, PeerError
+from khala_protocol.joining import client_config
+from khala_protocol.keys import Topic, check_name, run_key
+from khala_protocol.messages import Run
 from khala_protocol.signals import stop_on_signal
 
 if TYPE_CHECKING:
@@ -32,16 +37,54 @@ if TYPE_CHECKING:
 
     from khala_agents.policy import Policy
     from khala_agents.worker import WorkerTally
+    from khala_protocol.bus import Bus
+    from khala_protocol.bus.config import BusConfig
     from khala_protocol.messages import Usage
 
 T = TypeVar("T")
+
+PATIENCE_S = 10.0
+"""So long agents wait for a host before they say so."""
+
+
+class Link(NamedTuple):
+    """One session on the bus, and the agents that share it."""
+
+    config: BusConfig
+    names: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the bus is, and with which certificates agents join it."""
+
+    connect: Sequence[str] = ()
+    tls: Path | None = None
+    insecure: bool = False
+
+    def links(self, side: str, names: Iterable[str]) -> list[Link]:
+        """Return the sessions for these agents: with TLS one each, as each has a certificate of its own.
+
+        Raises:
+            ConfigError: an agent has no certificate.
+            BusError: an endpoint or a certificate is wrong.
+        """
+        if self.tls is None:
+            return [Link(client_config(self.connect, tls=None, insecure=self.insecure), list(names))]
+        from khala_protocol.certificates import agent_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
+
+        def link(name: str) -> Link:
+            mine = (agent_name(side, name),)
+            return Link(client_config(self.connect, tls=self.tls, names=mine, insecure=self.insecure), [name])
+
+        return [link(name) for name in names]
 
 
 def play(
     file: AgentsFile,
     run: str,
     side: str,
-    connect: Sequence[str],
+    place: Place,
     *,
     budget_usd: float | None,
     overrides: Mapping[str, str | float | None],
@@ -53,8 +96,8 @@ def play(
     check_name(run, "run")
     check_name(side, "side")
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
-    config = BusConfig(connect=tuple(connect))
-    tallies = _until_signal(lambda stop: _play(config, run, side, policies, stop))
+    links = place.links(side, policies)
+    tallies = _until_signal(lambda stop: _play(links, run, side, policies, stop))
     if as_json:
         typer.echo(json.dumps({"run": run, "agents": {name: _plain(tally) for name, tally in tallies.items()}}))
     else:
@@ -119,18 +162,53 @@ def _settle_memory() -> None:
 
 
 async def _play(
-    config: BusConfig, run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
+    links: Sequence[Link], run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
 ) -> dict[str, WorkerTally]:
     await _check(policies.values())
-    bus = await open_bus(config)
-    try:
-        _say(
-            f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {', '.join(config.connect_to)}"
-        )
+    where = ", ".join(links[0].config.connect_to)
+    async with AsyncExitStack() as stack:
+        buses = [await _opened(link, stack) for link in links]
+        _say(f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {where}")
         _settle_memory()
-        return await run_workers(bus, run, side, policies, stop=stop)
+        async with asyncio.TaskGroup() as group:
+            playing = [
+                group.create_task(run_workers(bus, run, side, {n: policies[n] for n in link.names}, stop=stop))
+                for bus, link in zip(buses, links, strict=True)
+            ]
+            waiting = group.create_task(_say_if_nobody_comes(buses[0], run, side, list(policies), where))
+            await asyncio.wait(playing)
+            waiting.cancel()
+    return {name: tally for task in playing for name, tally in task.result().items()}
+
+
+async def _opened(link: Link, stack: AsyncExitStack) -> Bus:
+    bus = await open_bus(link.config)
+    stack.push_async_callback(bus.close)
+    return bus
+
+
+async def _say_if_nobody_comes(bus: Bus, run: str, side: str, names: Sequence[str], where: str) -> None:
+    """Say who waits in vain, and for what: a misspelt name is not an error that anybody else could see."""
+    cards = await bus.subscribe(run_key(run, Topic.RUN), Delivery.STATE, depth=1)
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            card = decode_as(Run, (await anext(cards)).payload)
+    except TimeoutError:
+        _say(
+            f"{', '.join(names)} on side {side}: no host of run {run} has come to {where} within {PATIENCE_S:g} s, "
+            "and they wait on; is the name of the run right?"
+        )
+    except (PeerError, BusError, StopAsyncIteration):
+        return  # the workers say so
+    else:
+        there = [agent.name for agent in card.agents if agent.side == side]
+        if unknown := [name for name in names if name not in there]:
+            _say(
+                f"run {run} at {where} has no {' and no '.join(unknown)} on side {side}, and will ask them nothing: "
+                f"its agents are {', '.join(f'{one.side}/{one.name}' for one in card.agents)}"
+            )
     finally:
-        await bus.close()
+        await cards.close()
 
 
 async def _check(policies: Iterable[Policy]) -> None:

@@ -13,9 +13,12 @@ import typer
 from rich.padding import Padding
 from rich.text import Text
 
-from khala_orchestrator.config import all_tasks
+from khala_bridge.task.config import TaskConfig
+from khala_orchestrator.config import all_tasks, load_task
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
+from khala_protocol.errors import ConfigError
+from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import stop_on_signal
 
 if TYPE_CHECKING:
@@ -24,15 +27,27 @@ if TYPE_CHECKING:
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")]
 Listen = Annotated[
     list[str] | None,
-    typer.Option(help="Endpoint to listen on; may be given several times.", show_default="tcp/127.0.0.1:7447"),
+    typer.Option(
+        help="Endpoint to listen on; may be given several times.",
+        show_default="tcp/127.0.0.1:7447, with --tls tls/127.0.0.1:7447",
+    ),
+]
+Tls = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="KHALA_TLS", help="Encrypt, with the certificates in this directory, see `khala keys`.", metavar="DIR"
+    ),
 ]
 Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Listen without TLS where other machines can connect: your own network only.")
+    bool, typer.Option("--insecure", help="Allow links to other machines without TLS: in your own network only.")
 ]
+
+CHECK_S = 2.0
 
 ROUTER_EPILOG = """
 Examples:\n
     khala router\n
+    khala router --tls keys --task 2s3z_pair --listen tls/0.0.0.0:7447\n
     khala router --listen tcp/0.0.0.0:7447 --insecure\n
     khala router --check --connect tcp/10.0.0.5:7447
 """
@@ -48,23 +63,51 @@ Examples:\n
 def router(
     *,
     listen: Listen = None,
+    tls: Tls = None,
+    task: Annotated[
+        list[str] | None,
+        typer.Option(help="With --tls: a task whose agents may join; may be given several times.", metavar="TASK"),
+    ] = None,
+    run: Annotated[
+        str | None,
+        typer.Option(envvar="KHALA_RUN", help="With --tls: the only run that may be played.", metavar="NAME"),
+    ] = None,
     insecure: Insecure = False,
     check: Annotated[bool, typer.Option("--check", help="Ask whether a router answers, and end.")] = False,
     connect: Annotated[
-        str, typer.Option(help="With --check: the endpoint to ask.", metavar="ENDPOINT")
-    ] = "tcp/127.0.0.1:7447",
+        str | None,
+        typer.Option(
+            help="With --check: the endpoint to ask.",
+            metavar="ENDPOINT",
+            show_default="tcp/127.0.0.1:7447, with --tls tls/127.0.0.1:7447",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Join hosts and agents: a Zenoh router, until Ctrl-C.
 
-    It is needed when host and agents are on several machines; `khala run` has its own. A zenohd of the same
-    version works as well.
+    It is needed when host and agents are on several machines; `khala run` has its own. With --tls it lets in who has
+    a certificate, and each may read and write only what its name stands for in the task.
     """
     if check:
-        routers = asyncio.run(_probe(connect))
-        _out({"endpoint": connect, "routers": routers}, f"a router answers at {connect}", as_json=as_json)
-    else:
-        asyncio.run(_route(BusConfig(mode="router", listen=tuple(listen or ()), insecure=insecure), as_json=as_json))
+        config = client_config([connect] if connect else [], tls=tls, insecure=insecure, timeout_s=CHECK_S)
+        routers = asyncio.run(_probe(config))
+        (endpoint,) = config.connect_to
+        _out({"endpoint": endpoint, "routers": routers}, f"a router answers at {endpoint}", as_json=as_json)
+        return
+    if tls and not task:
+        raise ConfigError("with --tls the agents that may join are those of a task: give --task TASK")
+    rules = access_rules([load_task(name) for name in task or ()], run) if tls else None
+    config = router_config(listen or (), tls=tls, insecure=insecure, rules=rules)
+    asyncio.run(_route(config, as_json=as_json))
+
+
+def access_rules(tasks: Sequence[TaskConfig], run: str | None) -> dict[str, Any]:
+    """Return the settings of a router that the agents of these tasks may join."""
+    from khala_protocol.access import router_settings  # noqa: PLC0415  # 60 ms, which links without TLS do without
+
+    sides = (side for task in tasks for side in task.per_side())
+    return router_settings({(side.side, agent.name) for side in sides for agent in side.agents}, run)
 
 
 def tasks(*, as_json: Json = False) -> None:
@@ -72,14 +115,19 @@ def tasks(*, as_json: Json = False) -> None:
     found = list(all_tasks())
     if as_json:
         rows = [
-            {"name": t.name, "map": t.map_spec.name, "agents": [a.name for a in t.agents], "description": t.description}
+            {
+                "name": t.name,
+                "map": t.map_spec.name,
+                "agents": [card.name for card in t.cards()],
+                "description": t.description,
+            }
             for t in found
         ]
         typer.echo(json.dumps({"tasks": rows}))
         return
     console = stdout_console()
     for task in found:
-        console.print(Text.assemble((task.name, "bold"), "  ", (people([a.name for a in task.agents]), "dim")))
+        console.print(Text.assemble((task.name, "bold"), "  ", (people([card.name for card in task.cards()]), "dim")))
         console.print(Padding(task.description, (0, 0, 0, 4), expand=False))
 
 
@@ -140,10 +188,10 @@ def replay(
         console.print(part, soft_wrap=isinstance(part, Text))
 
 
-async def _probe(endpoint: str) -> list[str]:
+async def _probe(config: BusConfig) -> list[str]:
     from khala_protocol.bus.zenoh import probe  # noqa: PLC0415  # loads the native library, which --help need not wait for
 
-    return list(await probe(BusConfig(connect=(endpoint,), connect_timeout_s=2.0)))
+    return list(await probe(config))
 
 
 async def _route(config: BusConfig, *, as_json: bool) -> None:

@@ -5,8 +5,9 @@
     khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
     khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
 
-An agent may write only below its own name; the access rules of a router enforce this. Names of
-runs, sides, agents and instances must pass `check_name`, so that no name can widen a key expression.
+An agent writes below its own name: reply, exchange, alive. Over TLS the router enforces this, by the rules of
+`khala_protocol.access`; without TLS nothing does. Names of runs, sides, agents and instances must pass `check_name`,
+so that no name can widen a key expression.
 """
 
 from __future__ import annotations

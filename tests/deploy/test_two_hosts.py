@@ -1,6 +1,6 @@
 """One match on two machines: two network namespaces with a cable between them, and the commands a person would type.
 
-On the first machine are router and host, on the second the agents and their model.
+On the first machine are the keys, router and host, on the second the agents and their model.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.netns, pytest.mark.game]
 
-ROUTER = "tcp/192.0.2.1:7447"  # addresses of this range belong to nobody (RFC 5737)
-RUN = "two-hosts"
+ROUTER = "tls/192.0.2.1:7447"  # addresses of this range belong to nobody (RFC 5737)
+RUN, TASK = "two-hosts", "2s3z_pair"
 AGENTS = ("Stalkers", "Zealots")
 READY_S, MATCH_S, END_S = 30.0, 60.0, 15.0
 
@@ -55,13 +55,17 @@ class Command:
                     return
         pytest.fail(f"it never said {text!r}: {self.log.read_text()}")
 
-    async def result(self, within_s: float) -> Any:
-        """Return its result as JSON when it has ended well."""
+    async def ended(self, within_s: float = READY_S) -> bytes:
+        """Return what it wrote on stdout when it has ended well."""
         async with asyncio.timeout(within_s):
             out, err = await self.process.communicate()
         self._keep(err)
         assert self.process.returncode == 0, self.log.read_text()
-        return json.loads(out)
+        return out
+
+    async def result(self, within_s: float) -> Any:
+        """Return its result as JSON when it has ended well."""
+        return json.loads(await self.ended(within_s))
 
     def _keep(self, said: bytes) -> None:
         with self.log.open("ab") as log:
@@ -132,11 +136,17 @@ async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine]]:
 
 async def _router_and_agents(first: Machine, second: Machine, *, latency_s: float) -> Command:
     """Start a router here, both agents and their model there, ready to play."""
-    router = await first.khala("router", "--listen", ROUTER, "--insecure", "--json")
+    keys = str(first.directory / "keys")
+    await (await first.khala("keys", "init", keys, "--host", "192.0.2.1")).ended()
+    for name in AGENTS:
+        await (await first.khala("keys", "agent", name, keys)).ended()
+        shutil.copytree(f"{keys}/agent.blue.{name}", first.directory / "copied" / name)
+    copied = str(first.directory / "copied")
+    router = await first.khala("router", "--listen", ROUTER, "--tls", keys, "--task", TASK, "--run", RUN, "--json")
     model = await second.khala("llm", "--port", "0", "--latency", str(latency_s), "--json")
     await router.line()
-    check = await second.khala("router", "--check", "--connect", ROUTER, "--json")
-    where = ("--run", RUN, "--connect", ROUTER, "--base-url", (await model.line())["base_url"])
+    check = await second.khala("router", "--check", "--connect", ROUTER, "--tls", copied, "--json")
+    where = ("--run", RUN, "--connect", ROUTER, "--tls", copied, "--base-url", (await model.line())["base_url"])
     agents = await second.khala("agent", *AGENTS, *where, "--json")
     assert len((await check.result(READY_S))["routers"]) == 1
     await agents.said("waiting for the host")
@@ -144,8 +154,8 @@ async def _router_and_agents(first: Machine, second: Machine, *, latency_s: floa
 
 
 async def _host(first: Machine, *options: str) -> Command:
-    out = str(first.directory / "runs")
-    return await first.khala("host", "2s3z_pair", "--run", RUN, "--connect", ROUTER, "--out", out, "--json", *options)
+    where = ("--connect", ROUTER, "--tls", str(first.directory / "keys"), "--out", str(first.directory / "runs"))
+    return await first.khala("host", TASK, "--run", RUN, *where, "--json", *options)
 
 
 async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, Machine]) -> None:

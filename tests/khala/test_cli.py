@@ -59,6 +59,16 @@ BAD = [
     ("host 2s3z --listen tcp/127.0.0.1:{taken}", "another process uses it"),
     ("host 2s3z --listen tcp/0.0.0.0:7499", "would let every machine that reaches it join without TLS"),
     ("host 2s3z --connect x --listen y", "give --connect or --listen, not both"),
+    ("host 2s3z --connect tcp/10.0.0.5:7447", "would send everything to another machine without TLS"),
+    ("host 2s3z --tls nowhere", "nowhere: no certificate of host, there are none: make it with `khala keys init DIR`"),
+    ("router --tls nowhere", "with --tls the agents that may join are those of a task: give --task TASK"),
+    ("router --tls nowhere --task 2s3z", "nowhere: no certificate of router"),
+    (
+        "agent Stalkers --run r --tls nowhere --policy silent",
+        "make it with `khala keys agent Stalkers DIR --side blue`",
+    ),
+    ("keys agent Stalkers nowhere", "nowhere: holds no authority: make one with `khala keys init DIR`"),
+    ("keys show nowhere", "nowhere: holds no certificates"),
     ("router --listen tcp/127.0.0.1:{taken}", "another process uses it"),
     ("router --check --connect tcp/127.0.0.1:{closed}", "no router answered"),
     ("agent Stalkers --run r --connect tcp/127.0.0.1:{closed} --policy silent", "no router answered"),
@@ -276,13 +286,32 @@ def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
     assert "khala sc2 install" in wrong["advice"]
 
 
+def test_keys_are_made_shown_and_examined(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    keys = str(tmp_path / "keys")
+    for made in (["init", keys, "--host", "10.0.0.5"], ["agent", "Stalkers", keys, "--days", "7"]):
+        assert tell(capsys, "keys", *made)[0] == 0
+    _, out = tell(capsys, "keys", "show", keys, "--json")
+    rows = json.loads(out)["certificates"]
+    shown = {row["name"]: (row["days_left"], row["hosts"]) for row in rows}
+    assert shown["agent:blue/Stalkers"] == (7, [])
+    assert shown["router"] == (365, ["10.0.0.5"])
+    (tmp_path / "keys" / "host" / "key.pem").chmod(0o644)
+    _, out = tell(capsys, "doctor", "--tls", keys, "--json")
+    found = {finding["name"]: finding for finding in json.loads(out)["findings"]}
+    assert found["certificate router"]["state"] == "ok"
+    assert "`khala keys agent Stalkers DIR --side blue`" in found["certificate agent:blue/Stalkers"]["advice"]
+    assert found["certificate host"]["advice"].startswith("chmod 600 ")
+
+
 def test_every_task_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
     _, out = tell(capsys, "tasks", "--json")
     names = {task["name"] for task in json.loads(out)["tasks"]}
     assert {"2s3z", "2s3z_pair", "3s5z", "1c3s5z", "3s5z_vs_3s6z", "2c_vs_64zg", "2s_vs_1sc"} <= names
 
 
-@pytest.mark.parametrize("command", ["", "run", "host", "agent", "router", "llm", "replay", "doctor", "tasks", "sc2"])
+@pytest.mark.parametrize(
+    "command", ["", "run", "host", "agent", "router", "keys", "llm", "replay", "doctor", "tasks", "sc2"]
+)
 def test_help_teaches(capsys: pytest.CaptureFixture[str], command: str) -> None:
     code, out = tell(capsys, *command.split(), "--help")
     assert code == 0

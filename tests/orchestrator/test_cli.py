@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from khala_orchestrator.cli import people, replay, router, tasks
+from khala_orchestrator.cli import access_rules, people, replay, router, tasks
 from khala_orchestrator.config import load_task
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -198,6 +198,14 @@ async def test_a_router_that_answers_is_counted(capsys: pytest.CaptureFixture[st
         assert capsys.readouterr() == ("", f"a router answers at {endpoint}\n")
     finally:
         await bus.close()
+
+
+def test_a_router_with_tls_lets_the_agents_of_its_tasks_in_and_nobody_else() -> None:
+    rules = access_rules([load_task("2s3z_pair"), load_task("2s3z")], "first")["access_control"]
+    assert rules["default_permission"] == "deny"
+    assert [subject["id"] for subject in rules["subjects"]] == [
+        "host", "observer", "agent:blue/CombatGroupSmac", "agent:blue/Stalkers", "agent:blue/Zealots",
+    ]  # fmt: skip
 
 
 def test_a_router_does_not_let_other_machines_in_without_being_told_to() -> None:

@@ -259,7 +259,7 @@ def test_host_and_agents_of_the_compose_file_belong_together(environment: Callab
 def test_a_command_of_the_documentation_can_be_given(line: str, environment: Callable[[str], None]) -> None:
     words = khala_words(shlex.split(line))
     if words is None:
-        assert line.partition(" ")[0] in {"docker", "ssh", "mkdir", "export"}
+        assert line.partition(" ")[0] in {"docker", "scp", "ssh", "mkdir", "export"}
         return
     if line.startswith("docker compose"):
         environment("agents")

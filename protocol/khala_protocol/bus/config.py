@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from khala_protocol.errors import BusError
 
 SECURE = frozenset({"tls", "quic"})
-TRANSPORTS = frozenset({"tcp", "ws", "unixsock-stream"}) | SECURE
+PLAIN = frozenset({"tcp", "ws"})
+TRANSPORTS = PLAIN | SECURE | {"unixsock-stream"}
 TX_SLOTS = 16
 """Batches that may wait for the link, per priority; Zenoh's largest. With its default of 2, bursts of 300 kB on a
 100 Mbit link lost 2 of 96, with 16 none."""
@@ -44,7 +45,7 @@ class TlsFiles(BaseModel):
     key: Path
     """Private key of `certificate`, in PKCS#8."""
     mutual: bool = True
-    """Ask connecting sessions for a certificate, too; what an agent may write is tied to its name."""
+    """Ask connecting sessions for a certificate, too; `khala_protocol.access` ties what they may do to its name."""
 
 
 class BusConfig(BaseModel):
@@ -64,8 +65,9 @@ class BusConfig(BaseModel):
     """Endpoints to listen on. Port 0 means a free port, see `ZenohBus.endpoints`. Empty for a router means the default
     endpoint on this machine."""
     insecure: bool = False
-    """Allow listening without TLS where other machines can connect."""
+    """Allow links to other machines without TLS, in both directions."""
     tls: TlsFiles | None = None
+    """Encrypt, and show who we are. Then no endpoint is without TLS, but unix sockets."""
     connect_timeout_s: float = Field(default=5.0, gt=0)
     """How long a client tries to reach its router before it gives up; the router may start meanwhile."""
     lease_s: float = Field(default=2.5, gt=0)
@@ -83,36 +85,48 @@ class BusConfig(BaseModel):
     @property
     def connect_to(self) -> tuple[str, ...]:
         """`connect`, or its default."""
-        return self.connect or ((DEFAULT_ENDPOINT,) if self.mode == "client" else ())
+        return self.connect or ((self._default,) if self.mode == "client" else ())
 
     @property
     def listen_on(self) -> tuple[str, ...]:
         """`listen`, or its default."""
-        return self.listen or ((DEFAULT_ENDPOINT,) if self.mode == "router" else ())
+        return self.listen or ((self._default,) if self.mode == "router" else ())
+
+    @property
+    def exposed(self) -> tuple[str, ...]:
+        """Endpoints beyond this machine without encryption, that only `insecure` allows."""
+        endpoints = (*self.connect_to, *self.listen_on)
+        return tuple(one for one in endpoints if transport_of(one) not in SECURE and not is_local(one))
+
+    @property
+    def _default(self) -> str:
+        return DEFAULT_ENDPOINT if self.tls is None else DEFAULT_TLS_ENDPOINT
 
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 """Zenoh's port, on this machine only."""
+DEFAULT_TLS_ENDPOINT = "tls/127.0.0.1:7447"
 
 
 def check(config: BusConfig) -> None:
     """Find what is wrong before a socket is opened.
 
     Raises:
-        BusError: an endpoint is malformed, would admit strangers, or lacks its TLS files.
+        BusError: an endpoint is malformed, would admit strangers or show them what is sent, or its TLS files are
+            missing, wrong or expired.
     """
     for endpoint in (*config.connect_to, *config.listen_on):
         _check_endpoint(endpoint, listening=endpoint in config.listen_on)
-        if transport_of(endpoint) in SECURE:
-            _check_tls(endpoint, config.tls)
+        if transport_of(endpoint) in SECURE and config.tls is None:
+            raise BusError(f"{endpoint} needs TLS files: give `tls` with ca, certificate and key, or --tls DIR")
+        if config.tls is not None and transport_of(endpoint) in PLAIN:
+            raise BusError(f"{endpoint} is not encrypted, though TLS is asked for: write {_over_tls(endpoint)}")
     if config.mode == "client" and config.listen:
         raise BusError("a client does not listen: remove `listen`, or use mode 'peer' or 'router'")
-    for endpoint in config.listen_on:
-        if transport_of(endpoint) not in SECURE and not config.insecure and not is_local(endpoint):
-            raise BusError(
-                f"{endpoint} would let every machine that reaches it join without TLS: listen on 127.0.0.1 or on a "
-                "unixsock-stream, give TLS files and a tls/ endpoint, or say `insecure` if the network is yours alone"
-            )
+    if config.exposed and not config.insecure:
+        raise BusError(_exposed(config.exposed[0], listening=config.exposed[0] in config.listen_on))
+    if config.tls is not None:
+        _check_tls(config.tls)
 
 
 def settings(config: BusConfig) -> dict[str, Any]:
@@ -196,18 +210,26 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
         raise BusError(f"{endpoint[:100]!r} needs a host and a port between 1 and 65535, such as tcp/127.0.0.1:7447")
 
 
-def _check_tls(endpoint: str, tls: TlsFiles | None) -> None:
-    if tls is None:
-        raise BusError(f"{endpoint} needs TLS files: give `tls` with ca, certificate and key")
-    for what, path in (("ca", tls.ca), ("certificate", tls.certificate), ("key", tls.key)):
-        try:
-            text = path.read_text(encoding="ascii", errors="replace")
-        except OSError as error:
-            raise BusError(f"cannot read the TLS {what} {path}: {error.strerror or error}") from None
-        marker = "-----BEGIN PRIVATE KEY-----" if what == "key" else "-----BEGIN CERTIFICATE-----"
-        if marker not in text:
-            hint = "; convert it with `openssl pkcs8 -topk8 -nocrypt`" if "PRIVATE KEY-----" in text else ""
-            raise BusError(f"the TLS {what} {path} holds no {marker.strip('-')[6:].lower()} in PEM{hint}")
+def _exposed(endpoint: str, *, listening: bool) -> str:
+    if listening:
+        harm = "would let every machine that reaches it join without TLS"
+        remedy = f"make keys with `khala keys init DIR` and say `--tls DIR --listen {_over_tls(endpoint)}`"
+    else:
+        harm = "would send everything to another machine without TLS"
+        remedy = f"say `--tls DIR --connect {_over_tls(endpoint)}`, with keys of `khala keys`"
+    return f"{endpoint} {harm}: {remedy}, or `--insecure` if the network is yours alone"
+
+
+def _over_tls(endpoint: str) -> str:
+    return f"tls/{endpoint.partition('/')[2]}"
+
+
+def _check_tls(tls: TlsFiles) -> None:
+    from khala_protocol.bus import certificate  # noqa: PLC0415  # 60 ms, which links without TLS do without
+
+    certificate.check_valid(tls.ca, "ca")
+    certificate.check_valid(tls.certificate)
+    certificate.check_key(tls.key, tls.certificate)
 
 
 def _tls_settings(tls: TlsFiles) -> dict[str, Any]:

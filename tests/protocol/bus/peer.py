@@ -15,7 +15,7 @@ from khala_protocol.bus.zenoh import open_bus
 
 async def agent(*endpoints: str) -> None:
     """Reply to each observation with its first eight bytes."""
-    bus = await open_bus(BusConfig(connect=endpoints))
+    bus = await open_bus(BusConfig(connect=endpoints, insecure=True))
     observations = await bus.subscribe("agent/observation", Delivery.STATE, depth=1)
     replies = await bus.publisher("agent/reply", Delivery.SPEECH)
     await bus.announce("agent/alive")
@@ -35,7 +35,7 @@ async def router(*endpoints: str) -> None:
 
 async def forgetful(*endpoints: str) -> None:
     """Use everything, close nothing, and end."""
-    bus = await open_bus(BusConfig(connect=endpoints))
+    bus = await open_bus(BusConfig(connect=endpoints, insecure=True))
     for delivery in Delivery:
         subscription = await bus.subscribe("a/*", delivery)
         await (await bus.publisher(f"a/{delivery.value}", delivery)).put(bytes(200_000))

@@ -8,6 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from khala_protocol.bus.config import BusConfig, TlsFiles, check, host_port_of, is_local, settings
+from khala_protocol.certificates import files_of, make_authority
 from khala_protocol.errors import BusError
 
 if TYPE_CHECKING:
@@ -28,8 +29,15 @@ def needs_port(text: str) -> str:
 
 def open_to_all(endpoint: str) -> str:
     return (
-        f"{endpoint} would let every machine that reaches it join without TLS: listen on 127.0.0.1 or on a "
-        "unixsock-stream, give TLS files and a tls/ endpoint, or say `insecure` if the network is yours alone"
+        f"{endpoint} would let every machine that reaches it join without TLS: make keys with `khala keys init DIR` "
+        f"and say `--tls DIR --listen tls/{endpoint.partition('/')[2]}`, or `--insecure` if the network is yours alone"
+    )
+
+
+def in_the_open(address: str) -> str:
+    return (
+        f"tcp/{address} would send everything to another machine without TLS: say `--tls DIR --connect "
+        f"tls/{address}`, with keys of `khala keys`, or `--insecure` if the network is yours alone"
     )
 
 
@@ -62,8 +70,10 @@ LONG = "unixsock-stream//tmp/" + "x" * 103
         ({"mode": "router", "listen": ["ws/router.example:80"]}, open_to_all("ws/router.example:80")),
         (
             {"connect": ["tls/router.example:7447"]},
-            "tls/router.example:7447 needs TLS files: give `tls` with ca, certificate and key",
+            "tls/router.example:7447 needs TLS files: give `tls` with ca, certificate and key, or --tls DIR",
         ),
+        ({"connect": ["tcp/10.0.0.5:7447"]}, in_the_open("10.0.0.5:7447")),
+        ({"mode": "router", "connect": ["tcp/router.example:1"]}, in_the_open("router.example:1")),
     ],
 )
 def test_a_wrong_configuration_is_refused_with_what_to_do(config: dict[str, Any], text: str) -> None:
@@ -76,8 +86,9 @@ def test_a_wrong_configuration_is_refused_with_what_to_do(config: dict[str, Any]
     "config",
     [
         {},
-        {"connect": ["tcp/router.example:7447", "ws/10.0.0.1:80", "unixsock-stream//run/bus.sock"]},
-        {"connect": ["tcp/[fe80::1]:7447#so_sndbuf=65536"]},
+        {"connect": ["tcp/router.example:7447", "ws/10.0.0.1:80", "unixsock-stream//run/bus.sock"], "insecure": True},
+        {"connect": ["tcp/[fe80::1]:7447#so_sndbuf=65536"], "insecure": True},
+        {"connect": ["tcp/127.0.0.1:7447", "tcp/[::1]:7447"]},
         {"mode": "router"},
         {"mode": "router", "listen": ["tcp/127.0.0.1:0", "tcp/[::1]:7447", "tcp/localhost:7447"]},
         {"mode": "router", "listen": ["unixsock-stream//run/bus.sock"]},
@@ -96,10 +107,8 @@ def test_a_word_that_is_not_in_the_configuration_is_refused() -> None:
 
 @pytest.fixture
 def tls(tmp_path: Path) -> TlsFiles:
-    for name in ("ca", "certificate"):
-        (tmp_path / name).write_text("-----BEGIN CERTIFICATE-----\n")
-    (tmp_path / "key").write_text("-----BEGIN PRIVATE KEY-----\n")
-    return TlsFiles(ca=tmp_path / "ca", certificate=tmp_path / "certificate", key=tmp_path / "key")
+    make_authority(tmp_path, ["router.example"])
+    return files_of(tmp_path, "router")
 
 
 def test_with_tls_a_router_may_listen_anywhere(tls: TlsFiles) -> None:
@@ -114,6 +123,7 @@ def test_with_tls_a_router_may_listen_anywhere(tls: TlsFiles) -> None:
         ("ca", None, "cannot read the TLS ca {}: No such file or directory"),
         ("certificate", "hello", "the TLS certificate {} holds no certificate in PEM"),
         ("key", "-----BEGIN CERTIFICATE-----", "the TLS key {} holds no private key in PEM"),
+        ("key", "-----BEGIN PRIVATE KEY-----", "the TLS key {} cannot be read: is the file whole?"),
         (
             "key",
             "-----BEGIN RSA PRIVATE KEY-----",
@@ -132,8 +142,24 @@ def test_a_wrong_tls_file_is_named(tls: TlsFiles, broken: str, content: str | No
     assert str(error.value) == text.format(path)
 
 
-def test_a_client_and_a_router_without_endpoints_meet_on_this_machine() -> None:
+def test_the_key_of_another_certificate_is_refused(tls: TlsFiles, tmp_path: Path) -> None:
+    theirs = files_of(tmp_path, "host").key
+    with pytest.raises(BusError, match=f"the TLS key {theirs} is not that of the certificate {tls.certificate}"):
+        check(BusConfig(tls=tls.model_copy(update={"key": theirs})))
+
+
+@pytest.mark.parametrize("transport", ["tcp", "ws"])
+def test_with_tls_no_endpoint_is_without_it(tls: TlsFiles, transport: str) -> None:
+    with pytest.raises(BusError) as error:
+        check(BusConfig(connect=(f"{transport}/127.0.0.1:1",), tls=tls))
+    assert str(error.value) == (
+        f"{transport}/127.0.0.1:1 is not encrypted, though TLS is asked for: write tls/127.0.0.1:1"
+    )
+
+
+def test_a_client_and_a_router_without_endpoints_meet_on_this_machine(tls: TlsFiles) -> None:
     assert BusConfig().connect_to == BusConfig(mode="router").listen_on == ("tcp/127.0.0.1:7447",)
+    assert BusConfig(tls=tls).connect_to == BusConfig(mode="router", tls=tls).listen_on == ("tls/127.0.0.1:7447",)
     assert BusConfig(mode="peer").connect_to == BusConfig(mode="peer").listen_on == ()
 
 
