@@ -4,9 +4,9 @@
     python -m bench.duels --task duel_8m --games 40 --a skilled --b skilled
     python -m bench.duels --a openai --b anthropic/claude-opus-4 --json
 
-Each seed is played twice, in the second game with sides swapped, so that neither ground nor seed favours one of them.
-`a` and `b` are what `khala run --blue` takes. Both sides have the same clock. The intervals are Wilson's, of 95 %. A
-game that is not valid is not counted, and makes the exit code 1.
+Each seed is played twice, in the second game with sides swapped, so that neither ground nor seed favours one of them;
+a player against itself plays each seed once. `a` and `b` are what `khala run --blue` takes, and both have the same
+clock. The intervals are Wilson's, of 95 %. A game that is not valid is not counted, and makes the exit code 1.
 """
 
 from __future__ import annotations
@@ -55,8 +55,10 @@ def duels(task: str, a: str, b: str, *, games: int, seed: int, out: Path, option
         RuntimeError: a run failed.
     """
     first, second = (side.side for side in load_task(task).per_side())
-    halves = (first, {first: a, second: b}, games - games // 2), (second, {first: b, second: a}, games // 2)
-    played = [game for side, models, n in halves for game in _half(task, side, models, n, seed, out, options)]
+    half = games - games // 2
+    played = [*_half(task, first, {first: a, second: b}, half, seed, out, options)]
+    again = seed + half if a == b else seed  # a scripted player would play the very same game again
+    played += _half(task, second, {first: b, second: a}, games // 2, again, out, options)
     return sorted(played, key=lambda game: game.seed)
 
 
@@ -72,7 +74,7 @@ def _half(
     if done.returncode not in {0, NOT_VALID}:
         raise RuntimeError(done.stderr.strip().splitlines()[-1])
     results: list[dict[str, Any]] = json.loads(done.stdout)["results"]
-    valid = {episode: True for episode in range(episodes)}
+    valid = dict.fromkeys(range(episodes), True)
     for result in results:
         valid[result["episode"]] &= result["valid"]
     for result in results:
