@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_orchestrator.host import host
-from khala_orchestrator.resume import ResumeError, unfinished
+from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.messages import Observation, Report, Run
 from khala_protocol.recording import Recorder, Recording
@@ -86,7 +86,7 @@ async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:
 
 
 def _plain(result: Result) -> dict[str, Any]:
-    return result.model_dump(exclude={"wall_s", "latency_p50_s", "latency_p95_s", "lag_s"})
+    return result.model_dump(exclude={"incidents", "wall_s", "latency_p50_s", "latency_p95_s", "lag_s"})
 
 
 async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
@@ -98,6 +98,8 @@ async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
     heard = await hall.broker.session().subscribe("**/Zealots/*", Delivery.STATE)
     await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
     await heard.close()
+    steps = list(Recording.open(tmp_path / "resumed.mcap").of(Report))
+    assert [report.incidents for report in steps] == [(), (), (RESUMED,), ()]
     topics = [sample.key.rsplit("/", 1)[1] async for sample in heard]
     assert topics == ["briefing", "observation", "reply", "observation", "reply"]
 
