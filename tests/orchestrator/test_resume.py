@@ -14,7 +14,7 @@ from khala_protocol.messages import Observation, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Iterable
     from pathlib import Path
 
     from khala_bridge.game.game import Sides
@@ -60,14 +60,15 @@ def digest(recording: Recording) -> str:
 
 
 @pytest.mark.parametrize("clock", CLOCKS, ids=lambda clock: clock["rule"])
+@pytest.mark.parametrize("killed", [(0, 3, 6), pytest.param(range(10), marks=pytest.mark.slow)], ids=["some", "all"])
 async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
-    hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any]
+    hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any], killed: Iterable[int]
 ) -> None:
     hall.game.after = EVENTS
     match = config(game=GAME, episodes=2, max_steps=5, step_loops=8, **clock)
     whole = tmp_path / "whole.mcap"
     results = await hall.play(match.model_copy(update={"record": whole}), Stalkers=stalkers)
-    for reports in range(10):
+    for reports in killed:
         past = unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
         assert (past.episode, past.steps) == divmod(reports, 5)
         path = tmp_path / f"resumed-{reports}.mcap"
