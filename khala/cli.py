@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,6 +63,7 @@ Examples:\n
     khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
     khala run my_task.yaml --policy my_agent:decide --json\n
     khala run 2s3z_pair --clock realtime --speed 2\n
+    khala run simple64_duel --blue openai --red anthropic\n
     khala run --resume runs/2s3z-20260101-120000-ab12
 """
 HOST_EPILOG = """
@@ -123,6 +124,13 @@ Images = Annotated[
 ]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
 Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
+Mind = Annotated[
+    str | None,
+    typer.Option(
+        help="Model of this side instead of --model, in a match of two: openai, scripted/skilled, a file, a policy.",
+        metavar="MODEL",
+    ),
+]
 
 
 def run(
@@ -147,7 +155,16 @@ def run(
             metavar="NAME",
         ),
     ] = None,
-    budget_usd: Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")] = None,
+    blue: Mind = None,
+    red: Mind = None,
+    side_model: Annotated[
+        list[str] | None,
+        typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
+    ] = None,
+    budget_usd: Annotated[
+        float | None,
+        typer.Option(min=0, help="Limit of all agents together in US dollars; two sides may spend half of it each."),
+    ] = None,
     latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
     game: Game = "simulator",
     seed: Seed = 1,
@@ -171,14 +188,17 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+    from khala.local import play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+    from khala.minds import Minds, minds_of, named_sides  # noqa: PLC0415
 
     config, past = _match(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
-    minds = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
+    common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
+    named = named_sides(side_model or ()) | {side: text for side, text in (("blue", blue), ("red", red)) if text}
+    minds = minds_of([side.side for side in config.task.per_side()], common, named)
     _until_interrupted(
         config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
     )
@@ -360,6 +380,17 @@ def _until_interrupted(
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    if reasons := dict.fromkeys(result.invalid_because for result in results if not result.valid):
+    if reasons := list(_why_not_valid(results)):
         screen.print(f"[bold red]not valid:[/] {escape('; '.join(reasons))}", soft_wrap=True)
         raise typer.Exit(NOT_VALID)
+
+
+def _why_not_valid(results: Sequence[Result]) -> Iterator[str]:
+    """Yield each reason once, after the name of the side if it is not every side's."""
+    sides: dict[str, list[str]] = {}
+    for result in results:
+        if not result.valid and result.side not in sides.setdefault(result.invalid_because, []):
+            sides[result.invalid_because].append(result.side)
+    every = {result.side for result in results}
+    for reason, those in sides.items():
+        yield reason if every == set(those) else f"{', '.join(those)}: {reason}"
