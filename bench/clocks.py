@@ -143,12 +143,12 @@ def table(rows: Iterable[Row]) -> Table:
         shown.add_column(column, justify="right", no_wrap=True)
     for row in rows:
         found = row.as_dict()
-        twice = "" if len(row.played) < 2 else "same" if len(set(found["hashes"])) == 1 else "differs"  # noqa: PLR2004
+        twice = "" if len(row.played) < 2 else "same" if len(set(found["hashes"])) == 1 else "differs"
         kd = "none lost" if found["kd"] is None else f"{found['kd']:.2f}"
         shown.add_row(
-            row.rule, str(row.seed), found["outcome"], kd, f"{found['game_s']:.1f}", f"{found['lag_s']:.2f}", str(found["decisions"]),
-            *(str(number) for number in found["fates"].values()), f"{found['age_loops']:g}", twice,
-            "same" if not found["differences"] else f"{found['differences']} differ",
+            row.rule, str(row.seed), found["outcome"], kd, f"{found['game_s']:.1f}", f"{found['lag_s']:.2f}",
+            str(found["decisions"]), *(str(number) for number in found["fates"].values()),
+            f"{found['age_loops']:g}", twice, "same" if not found["differences"] else f"{found['differences']} differ",
         )  # fmt: skip
     return shown
 
