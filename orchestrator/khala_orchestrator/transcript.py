@@ -84,7 +84,8 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
                 yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
             case Message() as said if selection.holds(said.step, said.agent):
                 yield Text.assemble(
-                    (f"  {said.agent} → {visible_line(said.recipient)}: ", "magenta"), visible_line(said.text)
+                    (f"  {said.agent}{' (human)' if said.human else ''} → {visible_line(said.recipient)}: ", "magenta"),
+                    visible_line(said.text),
                 )
             case Report() as report if selection.holds(report.step):
                 yield from _report(report, selection)

@@ -25,11 +25,12 @@ from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from types import TracebackType
 
     from khala_orchestrator.roster import Roster
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.messages import Advice
 
 log = logging.getLogger(__name__)
 
@@ -70,6 +71,8 @@ class Answers:
     wait_s: float = 0.0
     lost: Collection[Seat] = ()
     """Required agents that went away and did not come back within the grace."""
+    advice: Sequence[Advice] = ()
+    """What advisers have written since they were last asked."""
 
 
 class Question(NamedTuple):
@@ -119,14 +122,25 @@ class Turn:
     """An `AgentPool` over a bus. An asynchronous context manager."""
 
     def __init__(
-        self, bus: Bus, run: str, roster: Roster, *, required: Iterable[Seat] = (), grace_s: float = 0.0
+        self,
+        bus: Bus,
+        run: str,
+        roster: Roster,
+        *,
+        required: Iterable[Seat] = (),
+        grace_s: float = 0.0,
+        advice: Callable[[], Sequence[Advice]] = lambda: (),
     ) -> None:
-        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away."""
+        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away.
+
+        `advice` returns what advisers have written since it was last called.
+        """
         self._bus = bus
         self._run = run
         self._roster = roster
         self._required = frozenset(required)
         self._grace_s = grace_s
+        self._advice = advice
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inbox: Subscription[Sample] | None = None
@@ -251,7 +265,7 @@ class Turn:
             del self._open[seat]
         answers = {seat: self._answer(seat, asked) for seat, asked in settled.items()}
         lost = [seat for seat, asked in settled.items() if asked.held]
-        return Answers(answers, publish_s, wait_s, lost)
+        return Answers(answers, publish_s, wait_s, lost, self._advice())
 
     def _answer(self, seat: Seat, asked: _Question) -> Answer:
         ignored = self._ignored.pop(seat, 0)
