@@ -66,6 +66,11 @@ Examples:\n
     khala run simple64_duel --blue openai --red anthropic\n
     khala run --resume runs/2s3z-20260101-120000-ab12
 """
+ADVISE_EPILOG = """
+Examples:\n
+    khala advise first\n
+    khala advise first --agent Stalkers --name Coach --connect tls/10.0.0.5:7447 --tls keys
+"""
 HOST_EPILOG = """
 Examples:\n
     khala host 2s3z_pair --run first --connect tls/10.0.0.5:7447 --tls keys\n
@@ -249,6 +254,38 @@ def host(
     )
 
 
+def advise(
+    run: Annotated[str, typer.Argument(help="Name of the run; the host prints it.")],
+    *,
+    agent: Annotated[
+        str | None, typer.Option(help="Write to this agent.", show_default="to all of the side", metavar="NAME")
+    ] = None,
+    name: Annotated[str, typer.Option(help="Who writes: an adviser that the task names.")] = "Adviser",
+    side: Annotated[str, typer.Option(help="Side whose agents are advised.")] = "blue",
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Endpoint of the router.",
+            show_default="the newest `khala run` of this machine, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
+        ),
+    ] = None,
+    tls: Tls = None,
+    insecure: Insecure = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print messages of the host as JSON, one a line.")] = False,
+) -> None:
+    """Read the reports of a running match, and write to its agents.
+
+    Each line of stdin is a message, which agents read in their next observation; `@Stalkers fall back` is for one of
+    them. The recording marks it as human, and the result counts it.
+    """
+    from khala.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
+    from khala_orchestrator.mailbox import EVERYONE  # noqa: PLC0415
+
+    names = {what: check_name(value, what) for what, value in (("run", run), ("side", side), ("name", name))}
+    adviser = Adviser(**names, recipient=agent or EVERYONE)
+    run_advise(adviser, connect=connect or (), tls=tls, insecure=insecure, as_json=as_json)
+
+
 def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
     """Look at this machine as a match would, and say what to do."""
     from khala.doctor import examine  # noqa: PLC0415
@@ -291,6 +328,7 @@ def front_door(
 for command, epilog in (
     (run, RUN_EPILOG),
     (host, HOST_EPILOG),
+    (advise, ADVISE_EPILOG),
     (khala_agents.cli.agent, khala_agents.cli.AGENT_EPILOG),
     (khala_agents.cli.llm, khala_agents.cli.LLM_EPILOG),
     (khala_orchestrator.cli.router, khala_orchestrator.cli.ROUTER_EPILOG),

@@ -25,11 +25,12 @@ from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from types import TracebackType
 
     from khala_orchestrator.roster import Roster
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.messages import Advice
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +73,8 @@ class Answers:
     """Required agents that went away and did not come back within the grace."""
     incidents: Sequence[str] = ()
     """What failed while the agents were asked, and was overcome or not; a sentence each."""
+    advice: Sequence[Advice] = ()
+    """What advisers have written since they were last asked."""
 
 
 class Question(NamedTuple):
@@ -126,14 +129,25 @@ class Turn:
     """An `AgentPool` over a bus. An asynchronous context manager."""
 
     def __init__(
-        self, bus: Bus, run: str, roster: Roster, *, required: Iterable[Seat] = (), grace_s: float = 0.0
+        self,
+        bus: Bus,
+        run: str,
+        roster: Roster,
+        *,
+        required: Iterable[Seat] = (),
+        grace_s: float = 0.0,
+        advice: Callable[[], Sequence[Advice]] = lambda: (),
     ) -> None:
-        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away."""
+        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away.
+
+        `advice` returns what advisers have written since it was last called.
+        """
         self._bus = bus
         self._run = run
         self._roster = roster
         self._required = frozenset(required)
         self._grace_s = grace_s
+        self._advice = advice
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inbox: Subscription[Sample] | None = None
@@ -264,7 +278,7 @@ class Turn:
         for seat in lost:
             self._note(f"required agent {seat} did not come back within {self._grace_s:g} s")
         incidents, self._incidents = self._incidents, []
-        return Answers(answers, publish_s, wait_s, lost, incidents)
+        return Answers(answers, publish_s, wait_s, lost, incidents, self._advice())
 
     def _note(self, incident: str) -> None:
         log.warning("%s", incident)
