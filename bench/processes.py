@@ -78,6 +78,10 @@ class Processes:
             process.kill()
             process.wait()
 
+    def last_words(self, log: str) -> str:
+        """Return the end of a log."""
+        return (self.directory / f"{log}.log").read_text(errors="replace")[-2000:]
+
     def children(self, name: bytes) -> list[int]:
         """Return the processes that this name is in the command line of, such as those of a game."""
         found = []
