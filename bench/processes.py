@@ -82,14 +82,9 @@ class Processes:
         """Return the end of a log."""
         return (self.directory / f"{log}.log").read_text(errors="replace")[-2000:]
 
-    def children(self, name: bytes) -> list[int]:
-        """Return the processes that this name is in the command line of, such as those of a game."""
-        found = []
-        for pid in processes_of(self._mark):
-            with contextlib.suppress(OSError):
-                if name in Path(f"/proc/{pid}/cmdline").read_bytes():
-                    found.append(pid)
-        return found
+    def strangers(self) -> set[int]:
+        """Return the processes that were started by those started here, such as games."""
+        return processes_of(self._mark) - {process.pid for process in self._started}
 
 
 def free_port() -> int:
