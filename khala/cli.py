@@ -1,15 +1,13 @@
 """The command line: mount the packages' commands, add those that need all packages, print errors as one sentence."""
 
 import asyncio
-import itertools
 import json
 import logging
-import os
 import signal
 import sys
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -26,19 +24,15 @@ from khala.actions import actions
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls, access_rules
-from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
+from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.console import Progress, stderr_console
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
-from khala_protocol.keys import check_name
 from khala_protocol.messages import ClockRule, Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
-
-if TYPE_CHECKING:
-    from khala_orchestrator.resume import Unfinished
 
 SIGNALLED = 128
 """Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
@@ -172,8 +166,9 @@ def run(
     messages go into a recording, see `khala replay`.
     """
     from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+    from khala.matches import new_or_resumed  # noqa: PLC0415
 
-    config, past = _match(
+    config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
@@ -217,8 +212,9 @@ def host(
     With --listen the host is its own router; with --connect it uses one, see `khala router`.
     """
     from khala.local import play_hosted  # noqa: PLC0415
+    from khala.matches import new_or_resumed  # noqa: PLC0415
 
-    config, past = _match(
+    config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
@@ -288,51 +284,6 @@ app.add_typer(knowledge, name="knowledge")
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
     run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
-
-
-def _match(
-    task: str | None, resume: Path | None, run: str | None, out: Path, **given: Any
-) -> "tuple[MatchConfig, Unfinished | None]":
-    """Return the match that the options describe, and what was played of it."""
-    if (task is None) == (resume is None):
-        raise ConfigError("give a task, or a recording with --resume: one of them")
-    if resume is None:
-        assert task is not None
-        return _config(task, run, out, **given), None
-    from khala_orchestrator.resume import unfinished  # noqa: PLC0415  # as below
-    from khala_protocol.recording import Recording  # noqa: PLC0415
-
-    past = unfinished(Recording.open(_newest_recording(resume)))
-    changes = {"record": _free_recording(out / past.config.run), "assemble_s": given["assemble_s"]}
-    return past.config.model_copy(update=changes), past
-
-
-def _newest_recording(path: Path) -> Path:
-    """Return the recording at a path, or the newest one in the directory of a run."""
-    if not path.is_dir():
-        return path
-    found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
-    if not found:
-        raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
-    return found[-1]
-
-
-def _config(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
-    """Return the match that the options describe; its recording is in its own directory below `out`."""
-    from khala_bridge.observe import Observer  # noqa: PLC0415  # half a second that other commands do without
-
-    match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
-    loaded = change(load_task(task), **given)
-    Observer(loaded)  # report an unknown section before a game is started
-    name = check_name(run or new_run_name(loaded.name), "run")
-    return MatchConfig(task=loaded, run=name, record=_free_recording(out / name), **match)
-
-
-def _free_recording(directory: Path) -> Path:
-    """Return an unused file for the recording: containers, for example, start a run again under its name."""
-    names = itertools.chain(["recording"], (f"recording-{number}" for number in itertools.count(2)))
-    paths = (directory / f"{name}.mcap" for name in names)
-    return next(path for path in paths if not os.path.exists(path))  # noqa: PTH110  # Path.exists raises where it may not look
 
 
 def _bus(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from khala import environment, games
-from khala.children import Children
+from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
 from khala_agents.build import Workshop
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from khala_bridge.game.pysc2_game import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
@@ -76,6 +77,18 @@ class Minds:
         return self.policy is None and self.base_url is None and self.model == SCRIPTED
 
 
+@dataclass(frozen=True, slots=True)
+class Supplies:
+    """What a match finds ready; what is missing, it makes."""
+
+    bus: BusConfig | None = None
+    """How to join a router that is there."""
+    spawn: Spawn = spawn
+    """Where the processes of agents come from."""
+    launched: Launched | None = None
+    """A process of the game."""
+
+
 async def play(
     config: MatchConfig,
     minds: Minds,
@@ -84,6 +97,7 @@ async def play(
     game: str,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
+    supplies: Supplies | None = None,
 ) -> list[Result]:
     """Play a match with everything it needs on this machine.
 
@@ -94,16 +108,19 @@ async def play(
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
         past: what was played of this match before its host was lost.
+        supplies: what is ready for it.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
     minds.check()
+    supplies = supplies or Supplies()
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
-        bus = await open_bus(BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),)))
+        joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
+        bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
-        children = await stack.enter_async_context(Children(directory))
+        children = await stack.enter_async_context(Children(directory, supplies.spawn))
         started = await _start_agents(children, config, minds, bus)
         begun = asyncio.Event()
 
@@ -115,7 +132,8 @@ async def play(
                     children.start_again_with(share.process, *share.arguments)
             watch(message)
 
-        return await _unless_one_dies(hosted(config, sc2path, bus, watch=see, past=past), children, begun)
+        match = hosted(config, sc2path, bus, watch=see, past=past, launched=supplies.launched)
+        return await _unless_one_dies(match, children, begun)
 
 
 async def play_hosted(
