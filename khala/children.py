@@ -134,9 +134,7 @@ class Children:
 class _Child:
     """One process, and what it takes to start it again."""
 
-    def __init__(
-        self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path, spawn: Spawn
-    ) -> None:
+    def __init__(self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path, spawn: Spawn) -> None:
         self.arguments = arguments
         self._spawn = spawn
         self._name = name

@@ -23,6 +23,33 @@ from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
+from khala.options import (
+    Assemble,
+    BaseUrl,
+    BudgetUsd,
+    Episodes,
+    ExecutorName,
+    Fallback,
+    Game,
+    Grace,
+    Images,
+    Latency,
+    MaxSteps,
+    MaxWait,
+    Model,
+    ModelName,
+    Out,
+    PolicyName,
+    Resume,
+    Rule,
+    RunName,
+    Seed,
+    Speed,
+    StepLoops,
+    Task,
+    ThinkingLoops,
+)
+from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls, access_rules
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.console import Progress, stderr_console
@@ -30,7 +57,7 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
-from khala_protocol.messages import ClockRule, Result, Wire
+from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
 
@@ -66,83 +93,18 @@ Examples:\n
     khala host --resume runs/first --listen tls/0.0.0.0:7447 --tls keys
 """
 
-Task = Annotated[
-    str | None, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")
-]
-Resume = Annotated[
-    Path | None,
-    typer.Option(
-        help="Instead of a task: go on with a match whose host was lost; its recording, or the directory of its run.",
-        metavar="RUN",
-    ),
-]
-Game = Annotated[
-    str,
-    typer.Option(help="Game to use: simulator, starcraft2 (at SC2PATH), or a directory of either.", metavar="GAME"),
-]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; each further one adds 1.")]
-Episodes = Annotated[int, typer.Option(min=1, help="Number of episodes.")]
-RunName = Annotated[
-    str | None,
-    typer.Option(envvar="KHALA_RUN", help="Name of the run.", show_default="task, time, digits", metavar="NAME"),
-]
-MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
-StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
-Rule = Annotated[
-    ClockRule | None,
-    typer.Option(
-        "--clock",
-        help="Time that thinking costs: frozen (none), budget (always the same), token (by tokens), realtime.",
-        show_default="as the task says",
-    ),
-]
-ThinkingLoops = Annotated[
-    int | None, typer.Option(min=0, help="Clock budget: game loops that each decision costs; 22.4 are a second.")
-]
-Speed = Annotated[float | None, typer.Option(min=0.01, help="Clock realtime: speed of the game; 1 is that of ladders.")]
-Grace = Annotated[
-    float | None, typer.Option(min=0, help="How long a required agent may be away before the match ends, in seconds.")
-]
-MaxSteps = Annotated[int | None, typer.Option(min=1, help="End an episode after this many steps.")]
-ExecutorName = Annotated[
-    str | None, typer.Option(help="raw (one env step a turn) or screen (as in the paper).", metavar="EXECUTOR")
-]
-Images = Annotated[
-    str | None,
-    typer.Option(
-        help="Pictures for all agents: paper (those of their kind), none, or a list such as screen,minimap.",
-        show_default="as the task says",
-        metavar="LIST",
-    ),
-]
-Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
-Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
-
 
 def run(
     task: Task = None,
     *,
     resume: Resume = None,
-    model: Annotated[
-        str, typer.Option(help="Model to ask: scripted, openai, deepseek, …, or a YAML file.", metavar="NAME")
-    ] = "scripted",
-    model_name: Annotated[
-        str | None,
-        typer.Option(help="Another model of the endpoint; scripted has skilled, focus-fire, random-legal, silent."),
-    ] = None,
-    base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
-    policy: Annotated[
-        str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
-    ] = None,
-    fallback: Annotated[
-        str | None,
-        typer.Option(
-            help="Policy where the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
-            metavar="NAME",
-        ),
-    ] = None,
-    budget_usd: Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")] = None,
-    latency: Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")] = 0.2,
+    model: Model = "scripted",
+    model_name: ModelName = None,
+    base_url: BaseUrl = None,
+    policy: PolicyName = None,
+    fallback: Fallback = None,
+    budget_usd: BudgetUsd = None,
+    latency: Latency = 0.2,
     game: Game = "simulator",
     seed: Seed = 1,
     episodes: Episodes = 1,
@@ -273,6 +235,11 @@ for command, epilog in (
     (khala_orchestrator.cli.replay, khala_orchestrator.cli.REPLAY_EPILOG),
     (khala_orchestrator.cli.tasks, None),
     (actions, ACTIONS_EPILOG),
+    (serve, SERVE_EPILOG),
+    (submit, SUBMIT_EPILOG),
+    (matches, None),
+    (watch, None),
+    (stop, None),
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)

@@ -77,9 +77,7 @@ async def hosted(
             )
 
 
-def game_of(
-    config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launched: Launched | None = None
-) -> Sides:
+def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launched: Launched | None = None) -> Sides:
     """Return the game of a match, not started yet; it takes a process that is launched already, if it can."""
     task = config.task
     sides = task.per_side()

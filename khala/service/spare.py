@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import importlib
 import json
 import os
+import runpy
 import subprocess
 import sys
 from collections import deque
@@ -24,6 +26,9 @@ from khala_protocol.parent_watch import PARENT, end_with_parent, named_parent
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from types import TracebackType
+
+NEEDED = ("khala.cli", "khala_agents.commands")
+"""Modules of the command line, which knows the service and so is above it, and of what it does for agents."""
 
 
 class Spares:
@@ -60,7 +65,12 @@ class Spares:
         """Turn a process of the stock into `khala <arguments>`; start one if there is none."""
         while self._stock:
             process = self._stock.popleft()
-            job = {"arguments": arguments, "environ": dict(environ), "log": str(log), "silent": stdout != subprocess.PIPE}
+            job = {
+                "arguments": arguments,
+                "environ": dict(environ),
+                "log": str(log),
+                "silent": stdout != subprocess.PIPE,
+            }
             with contextlib.suppress(ConnectionError):
                 assert process.stdin is not None
                 process.stdin.write(json.dumps(job).encode() + b"\n")
@@ -85,9 +95,8 @@ async def _started() -> asyncio.subprocess.Process:
 def main() -> None:
     """Import everything, wait for a job on stdin, and do it."""
     end_with_parent()
-    import khala.cli  # noqa: PLC0415  # what takes so long
-    import khala_agents.commands  # noqa: F401, PLC0415
-
+    for module in NEEDED:
+        importlib.import_module(module)
     sys.stdout.write("ready\n")
     sys.stdout.flush()
     line = sys.stdin.readline()
@@ -98,15 +107,14 @@ def main() -> None:
     os.environ.update({name: value for name, value in job["environ"].items() if name != PARENT})
     _redirect(Path(job["log"]), silent=job["silent"])
     sys.argv = ["khala", *job["arguments"]]
-    khala.cli.main(job["arguments"])
+    runpy.run_module("khala", run_name="__main__")
 
 
 def _redirect(log: Path, *, silent: bool) -> None:
-    for path, flags, number in (
-        (os.devnull, os.O_RDONLY, 0),
-        (log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 2),
-        *([(os.devnull, os.O_WRONLY, 1)] if silent else []),
-    ):
+    ends = [(Path(os.devnull), os.O_RDONLY, 0), (log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 2)]
+    if silent:
+        ends.append((Path(os.devnull), os.O_WRONLY, 1))
+    for path, flags, number in ends:
         opened = os.open(path, flags, 0o600)
         os.dup2(opened, number)
         os.close(opened)

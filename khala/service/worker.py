@@ -13,7 +13,6 @@ import json
 import logging
 import signal
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from khala import environment, games
@@ -24,13 +23,15 @@ from khala.service.spare import Spares
 from khala_bridge.game.pysc2_game import Launched
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, load_task
-from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.config import BusConfig  # noqa: TC001  # pydantic evaluates it
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import Frozen, Report
 from khala_protocol.parent_watch import end_with_parent, named_parent
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.messages import Wire
 
@@ -98,9 +99,7 @@ async def _play(job: Job, game: str, stock: Spares, launched: Launched) -> dict[
     config, past = job.match()
     logs.here["run"] = config.run
     supplies = Supplies(bus=job.bus, spawn=stock, launched=launched)
-    results = await play(
-        config, job.minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies
-    )
+    results = await play(config, job.minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
     invalid = dict.fromkeys(result.invalid_because for result in results if not result.valid)
     return {"done": "; ".join(invalid)}
 

@@ -41,7 +41,7 @@ class Submit(Wire):
     """Who wants it: matches of different owners take turns."""
     match: dict[str, Any]
     """A `khala_orchestrator.config.MatchConfig`."""
-    minds: dict[str, Any] = {}
+    minds: dict[str, Any] = Field(default={})
     """A `khala.local.Minds`: how the agents decide."""
 
 
@@ -75,7 +75,7 @@ class MatchCard(Frozen):
     starts: Count = 0
     """How often a worker began to play it; more than one if one was lost."""
     recording: str = ""
-    """Where the service has it."""
+    """The directory where the service has its recordings and logs."""
 
 
 class Matches(Wire):
