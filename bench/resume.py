@@ -309,7 +309,9 @@ def main() -> None:
     for line in failed:
         print(line, file=sys.stderr)
     unequal = sum(not one.equal for one in found)
-    print(f"{len(found)} resumed, {len(failed)} matches failed, {unequal} not equal, {orphans} orphans", file=sys.stderr)
+    print(
+        f"{len(found)} resumed, {len(failed)} matches failed, {unequal} not equal, {orphans} orphans", file=sys.stderr
+    )
     if arguments.json:
         print(json.dumps({"kills": [asdict(one) for one in found], "failed": failed, "orphans": orphans}))
     raise SystemExit(1 if failed or unequal or orphans else 0)
