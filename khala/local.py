@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from khala import games
-from khala.children import Children
+from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
 from khala_protocol.bus.config import BusConfig
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.minds import Minds
+    from khala_bridge.game.pysc2_game import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
@@ -37,6 +38,18 @@ MAX_PROCESSES = 4
 of two sides never share one, and each side gets half of the processes."""
 
 
+@dataclass(frozen=True, slots=True)
+class Supplies:
+    """What a match finds ready; what is missing, it makes."""
+
+    bus: BusConfig | None = None
+    """How to join a router that is there."""
+    spawn: Spawn = spawn
+    """Where the processes of agents come from."""
+    launched: Launched | None = None
+    """A process of the game."""
+
+
 async def play(
     config: MatchConfig,
     minds: Mapping[str, Minds],
@@ -45,6 +58,7 @@ async def play(
     game: str,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
+    supplies: Supplies | None = None,
 ) -> list[Result]:
     """Play a match with everything it needs on this machine.
 
@@ -55,17 +69,20 @@ async def play(
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
         past: what was played of this match before its host was lost.
+        supplies: what is ready for it.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
     for mind in minds.values():
         mind.check()
+    supplies = supplies or Supplies()
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
-        bus = await open_bus(BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),)))
+        joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
+        bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
-        children = await stack.enter_async_context(Children(directory))
+        children = await stack.enter_async_context(Children(directory, supplies.spawn))
         started = await _start_agents(children, config, minds, bus)
         begun = asyncio.Event()
 
@@ -77,7 +94,8 @@ async def play(
                     children.start_again_with(share.process, *share.arguments)
             watch(message)
 
-        return await _unless_one_dies(hosted(config, sc2path, bus, watch=see, past=past), children, begun)
+        match = hosted(config, sc2path, bus, watch=see, past=past, launched=supplies.launched)
+        return await _unless_one_dies(match, children, begun)
 
 
 async def play_hosted(

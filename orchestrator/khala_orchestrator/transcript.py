@@ -94,7 +94,7 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
                 title = Text.assemble(f"step {reply.step}, ", _speaker(reply, named=named), " says")
                 yield _words(title, reply.text, "magenta")
             case Message() as said if selection.holds(said.step, _seat(said)):
-                words = (f" → {visible_line(said.recipient)}: ", "magenta")
+                words = (f"{' (human)' if said.human else ''} → {visible_line(said.recipient)}: ", "magenta")
                 yield Text.assemble("  ", _speaker(said, named=named), words, visible_line(said.text))
             case Report() as report if selection.holds(report.step):
                 yield from _report(report, selection, named=named)
