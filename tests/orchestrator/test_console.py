@@ -131,7 +131,8 @@ def test_a_result_says_what_became_of_decisions_and_what_went_wrong(printed: Pri
     lines = printed(
         table(
             make_result(
-                outcome="aborted", cause="agents gone", valid=False, invalid_because="required agents went away: blue/A",
+                outcome="aborted", cause="agents gone", valid=False,
+                invalid_because="required agents went away: blue/A",
                 fates={"A": {"fresh": 3}, "B": {"stale": 2, "fresh": 1}}, age_p50_loops=8, age_p95_loops=40, lag_s=1.25,
                 incidents=("step 7: required agent blue/A did not come back within 15 s",),
             )
