@@ -144,7 +144,10 @@ class Match:
         with watch.phase("game"):
             results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
         timings = watch.timings(answers, lag_s)
-        reports = [s.report(at, p, r, timings) for s, p, r in zip(self.sides, played, results, strict=True)]
+        reports = [
+            side.report(at, does, result, timings, answers.incidents)
+            for side, does, result in zip(self.sides, played, results, strict=True)
+        ]
         return StepOutcome(self._whole(at, reports, results), [result.snapshot for result in results], answers.lost)
 
     async def _begin(self, episode: int) -> None:

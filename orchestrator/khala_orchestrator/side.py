@@ -191,7 +191,9 @@ class Side:
 
     # --- reporting ----------------------------------------------------------------------------------
 
-    def report(self, at: StepId, played: Played, result: StepResult, timings: Timings) -> Report:
+    def report(
+        self, at: StepId, played: Played, result: StepResult, timings: Timings, incidents: Sequence[str] = ()
+    ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
         heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
         for agent, feedback in heard.items():
@@ -208,6 +210,7 @@ class Side:
             functions=result.played.functions,
             env_steps=result.env_steps,
             score=result.snapshot.score.total,
+            incidents=tuple(incidents),
             timings=timings,
         )
 

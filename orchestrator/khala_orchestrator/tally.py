@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from khala_orchestrator.roster import Seat
     from khala_protocol.messages import Ending, Outcome
 
+MAX_INCIDENTS = 100
+"""Incidents that a result lists; the reports have all of them."""
+
 
 class Tally:
     """The running account of one episode."""
@@ -34,6 +37,7 @@ class Tally:
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
         self._advisers: Counter[str] = Counter()
+        self._incidents: list[str] = []
         self._lag_s = 0.0
         self._accepted = 0
         self._steps = self._env_steps = 0
@@ -57,6 +61,7 @@ class Tally:
                 self._latencies_s.append(agent.latency_s)
                 self._ages_loops.append(agent.age_loops)
         self._advisers.update(report.advisers)
+        self._incidents += [f"step {report.step}: {incident}" for incident in report.incidents]
         self._lag_s = report.timings.lag_s
         self._note(after)
 
@@ -96,6 +101,7 @@ class Tally:
             fates={name: dict(count) for name, count in self._fates.items()},
             fallbacks={name: dict(count) for name, count in self._fallbacks.items()},
             advisers=dict(self._advisers),
+            incidents=tuple(self._incidents[:MAX_INCIDENTS]),
             age_p50_loops=_quantile(self._ages_loops, 0.5),
             age_p95_loops=_quantile(self._ages_loops, 0.95),
             lag_s=self._lag_s,

@@ -755,6 +755,8 @@ class Report(Wire):
     env_steps: int = 0
     """Number of `SC2Env.step` calls of the joint action."""
     score: float = 0.0
+    incidents: tuple[str, ...] = ()
+    """What failed in this step and was overcome, or not: an agent that was away, a match that was resumed."""
     timings: Timings = Timings()
 
 
@@ -801,6 +803,8 @@ class Result(Wire):
     """By agent: how often it fell back, by reason."""
     advisers: dict[str, int] = {}
     """By adviser: how many messages from outside the match its agents got."""
+    incidents: tuple[str, ...] = ()
+    """The first incidents of its reports, each with its step."""
     age_p50_loops: float | None = None
     """Game loops from an observation to the effect of the decision."""
     age_p95_loops: float | None = None

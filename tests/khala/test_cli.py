@@ -165,26 +165,39 @@ def test_a_key_that_the_endpoint_refuses_ends_the_match_before_it_begins(tmp_pat
     assert KEY not in done.stderr
 
 
-POLICY = """
-import os, signal
+DEADLY = """
+import os, pathlib, signal
 
 def decide(briefing, observation):
-    if observation.agent == "Stalkers" and observation.step == 2:
+    killed = pathlib.Path("killed")
+    if observation.agent == "Stalkers" and observation.step == 2 and (not killed.exists() or {always}):
+        killed.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return ""
 """
+PLAYED = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
 
 
 @pytest.mark.game
-def test_a_process_killed_in_a_step_costs_its_agent_and_not_the_game(tmp_path: Path) -> None:
-    (tmp_path / "deadly.py").write_text(POLICY)
-    command = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
-    done = khala(*command, cwd=tmp_path)
+def test_a_process_that_is_killed_is_started_again_and_no_step_is_lost(tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(DEADLY.format(always=False))
+    done = khala(*PLAYED, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["results"][0]["statuses"] == {"Stalkers": {"ok": 2, "gone": 3}, "Zealots": {"ok": 5}}
-    reports = Recording.open(tmp_path / told["recording"]).of(Report)
-    assert max(report.timings.wait_s for report in reports) < 5  # far from the 20 s of the longest wait
+    (result,) = json.loads(done.stdout)["results"]
+    assert result["statuses"] == {"Stalkers": {"ok": 5}, "Zealots": {"ok": 5}}
+    assert [text.partition(" was away for ")[0] for text in result["incidents"]] == [
+        "step 2: required agent blue/Stalkers"
+    ]
+
+
+@pytest.mark.game
+@pytest.mark.slow
+def test_a_process_that_dies_again_and_again_ends_the_match(tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(DEADLY.format(always=True))
+    done = khala(*PLAYED, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "agents-0" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.game
