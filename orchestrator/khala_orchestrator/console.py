@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import TracebackType
 
-    from khala_protocol.messages import AgentReport
+    from khala_protocol.messages import AgentReport, Clock
 
 STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "malformed": "red"}
-OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
+OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
 SIDE = {"blue": "bold blue", "red": "bold red"}
 """Sides of other names are all of one colour."""
 
@@ -141,17 +141,28 @@ def speaker(seat: Seat, *, named: bool) -> Text:
 
 def card(run: Run) -> Panel:
     """Return a panel with the run card."""
-    wait = "as long as it takes" if run.clock.max_wait_s is None else f"at most {run.clock.max_wait_s:g} s"
     rows = Table.grid(padding=(0, 2))
     rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
     rows.add_row("game", f"{run.game}, {run.executor} executor")
-    rows.add_row("clock", f"{run.clock.rule}: {run.clock.step_loops} loops a step, waits {wait}")
+    rows.add_row("clock", rule(run.clock))
     sides: dict[str, list[str]] = {}
     for agent in run.agents:
         sides.setdefault(agent.side, []).append(f"{agent.name} ({', '.join(agent.teams)})")
     for name, agents in sides.items():
         rows.add_row(side(name) if two_sides(run) else "agents", ", ".join(agents))
     return Panel(rows, title=Text(run.run), border_style="dim", box=box.ROUNDED)
+
+
+def rule(clock: Clock) -> str:
+    """Return what a clock says of a match, on one line."""
+    wait = "as long as it takes" if clock.max_wait_s is None else f"at most {clock.max_wait_s:g} s"
+    price = {
+        "frozen": "",
+        "budget": f"{clock.thinking_loops} for a decision, ",
+        "token": "more for more tokens, ",
+        "realtime": f"{LOOPS_PER_S * clock.speed:g} in a second, ",
+    }
+    return f"{clock.rule}: {clock.step_loops} loops a step, {price[clock.rule]}waits {wait}"
 
 
 def table(result: Result, *, named: bool = False) -> Panel:
@@ -171,6 +182,12 @@ def table(result: Result, *, named: bool = False) -> Panel:
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
     rows.add_row("tokens", _tokens(result.usage.values()))
+    if fates := sum(map(Counter, result.fates.values()), Counter()):
+        rows.add_row("decisions", _decisions(result, fates))
+    for incident in result.incidents:
+        rows.add_row("incident", Text(incident, "yellow"))
+    if not result.valid:
+        rows.add_row("not valid", Text(result.invalid_because, "bold red"))
     for agent, statuses in sorted(result.statuses.items()):
         rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
     whose = Text.assemble(side(result.side), ": ") if named else Text()
@@ -206,6 +223,14 @@ def _tokens(usages: Iterable[Usage]) -> str:
     if total.unknown_requests:
         text += f", {total.unknown_requests} of unknown size"
     return text + (", no price known" if total.cost_usd is None else f", {total.cost_usd:.4f} USD")
+
+
+def _decisions(result: Result, fates: Counter[str]) -> str:
+    counts = ", ".join(f"{count} {fate}" for fate, count in fates.most_common())
+    lag = f"; the game was {result.lag_s:.1f} s behind" if result.lag_s else ""
+    if not result.age_p50_loops and not result.age_p95_loops:
+        return counts + lag
+    return f"{counts}; median age {result.age_p50_loops:g} loops, 95 % below {result.age_p95_loops:g}{lag}"
 
 
 def _losses(units: int, value: float) -> str:
