@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 from khala_orchestrator.cards import briefing
 from khala_orchestrator.pacing import AtOnce
 from khala_orchestrator.schedule import Cadence, Schedule, StepId
-from khala_orchestrator.tally import Tally
+from khala_orchestrator.tally import Tally, valid_together
 from khala_protocol.messages import Timings
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ class Match:
                 await self.match_observer.report(report)
             at = StepId(episode, at.step + 1)
         wall_s = time.perf_counter() - began
-        results = [tally.result(self.config.run, episode, wall_s=wall_s, gone=lost) for tally in tallies]
+        results = valid_together([t.result(self.config.run, episode, wall_s=wall_s, gone=lost) for t in tallies])
         for result in results:
             await self.match_observer.result(result)
         return results

@@ -10,7 +10,7 @@ from khala_bridge.state import Alliance
 from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from khala_bridge.state import Snapshot
     from khala_orchestrator.roster import Seat
@@ -134,6 +134,13 @@ class Tally:
 
 CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
 """What a result of the game means on maps that end by the death of one side or by a clock."""
+
+
+def valid_together(results: Sequence[Result]) -> Sequence[Result]:
+    """Return the results of all sides: a win over a side that never answered says nothing, either."""
+    faults = {result.side: result.invalid_because for result in results if not result.valid}
+    why = "; ".join(f"side {side}: {fault}" for side, fault in faults.items())
+    return [r.but(valid=False, invalid_because=why) if faults and r.valid else r for r in results]
 
 
 def _quantile(values: list[float], share: float) -> float | None:

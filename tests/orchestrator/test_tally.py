@@ -7,7 +7,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.state import Snapshot, read_info, read_snapshot
-from khala_orchestrator.tally import Tally
+from khala_orchestrator.tally import Tally, valid_together
 from khala_protocol.messages import AgentReport, Rejection, Report, Usage
 
 if TYPE_CHECKING:
@@ -126,3 +126,13 @@ def test_rejections_are_counted_by_their_reason() -> None:
 def test_a_unit_that_changed_sides_is_counted_for_the_last_one() -> None:
     found = result(snapshot({1, 11}, {12}), snapshot({1}, {12}, dead={11}))
     assert (found.lost.units, found.killed.units) == (1, 0)
+
+
+def test_a_win_over_a_side_that_never_answered_is_not_valid_either() -> None:
+    units = snapshot({1}, {11})
+    silent = Tally(units, "red", required=["A"])
+    silent.add(report(0, "fallback"), units)
+    won = Tally(units, "blue").result("r", 0, wall_s=1.0)
+    blue, red = valid_together([won, silent.result("r", 0, wall_s=1.0)])
+    assert (blue.valid, blue.invalid_because) == (False, f"side red: {red.invalid_because}")
+    assert valid_together([won]) == [won]
