@@ -141,6 +141,8 @@ def table(result: Result) -> Panel:
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
     rows.add_row("tokens", _tokens(result.usage.values()))
+    if result.advisers:
+        rows.add_row("advice", ", ".join(f"{count} by {name}" for name, count in result.advisers.items()))
     for agent, statuses in sorted(result.statuses.items()):
         rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
     title = Text.assemble((result.outcome, OUTCOME[result.outcome]), f", {result.cause} (episode {result.episode})")
