@@ -27,7 +27,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from khala.local import Minds, play
+from khala.local import play
+from khala.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import LOOPS_PER_S, Report
 from khala_protocol.recording import Recording
@@ -90,7 +91,7 @@ async def measure(sleeps_s: Sequence[float], game_s: float, directory: Path, *, 
     sleeps = dict(zip((agent.name for agent in task.agents), sleeps_s, strict=True))
     os.environ[SLEEPS_VARIABLE] = json.dumps(sleeps)
     config = MatchConfig(task=task, run="pace", record=directory / "pace.mcap")
-    (result,) = await play(config, Minds(policy="bench.pace:sleeper"), directory, game="simulator")
+    (result,) = await play(config, {config.task.side: Minds(policy="bench.pace:sleeper")}, directory, game="simulator")
     recording = Recording.open(directory / "pace.mcap")
     reports = list(recording.of(Report))
     agents = tuple(_figures(name, sleep_s, reports) for name, sleep_s in sleeps.items())

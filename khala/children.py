@@ -15,14 +15,14 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from khala import environment
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from types import TracebackType
 
@@ -41,11 +41,39 @@ class ChildDied(KhalaError):
     """A process that the match needs has ended, or did not start."""
 
 
+class Spawn(Protocol):
+    """How a process comes to be."""
+
+    async def __call__(
+        self, arguments: Sequence[str], environ: Mapping[str, str], log: Path, stdout: int
+    ) -> asyncio.subprocess.Process:
+        """Return a process that runs `khala <arguments>`, with this environment, and stderr at the end of `log`."""
+
+
+async def spawn(
+    arguments: Sequence[str], environ: Mapping[str, str], log: Path, stdout: int
+) -> asyncio.subprocess.Process:
+    """Start a new process; see `Spawn`."""
+    with log.open("ab") as stderr:
+        return await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "khala",
+            *arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=stdout,
+            stderr=stderr,
+            env=environ,
+            start_new_session=True,
+        )
+
+
 class Children:
     """The child processes of a match. An asynchronous context manager that ends them all."""
 
-    def __init__(self, logs: Path) -> None:
+    def __init__(self, logs: Path, spawn: Spawn = spawn) -> None:
         self._logs = logs
+        self._spawn = spawn
         self._children: dict[str, _Child] = {}
 
     async def __aenter__(self) -> Self:
@@ -98,7 +126,7 @@ class Children:
 
     def _add(self, name: str, arguments: tuple[str, ...], environ: Mapping[str, str] | None) -> _Child:
         environ = environment.plain() if environ is None else environ
-        child = _Child(name, arguments, {**environ, **named_parent()}, self._logs / f"{name}.log")
+        child = _Child(name, arguments, {**environ, **named_parent()}, self._logs / f"{name}.log", self._spawn)
         self._children[name] = child
         return child
 
@@ -106,8 +134,9 @@ class Children:
 class _Child:
     """One process, and what it takes to start it again."""
 
-    def __init__(self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path) -> None:
+    def __init__(self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path, spawn: Spawn) -> None:
         self.arguments = arguments
+        self._spawn = spawn
         self._name = name
         self._environ = environ
         self._log = log
@@ -119,20 +148,9 @@ class _Child:
     async def start(self, stdout: int = subprocess.DEVNULL) -> asyncio.subprocess.Process:
         """Start the process."""
         self._log.touch(0o600)
-        with self._log.open("ab") as log:
-            self._begins_at = log.tell()
-            self._started_s = asyncio.get_running_loop().time()
-            self._process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                "khala",
-                *self.arguments,
-                stdin=subprocess.DEVNULL,
-                stdout=stdout,
-                stderr=log,
-                env=self._environ,
-                start_new_session=True,
-            )
+        self._begins_at = self._log.stat().st_size
+        self._started_s = asyncio.get_running_loop().time()
+        self._process = await self._spawn(self.arguments, self._environ, self._log, stdout)
         return self._process
 
     async def keep(self, begun: asyncio.Event) -> None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from khala_bridge.game.pysc2_game import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus import Bus
@@ -41,6 +42,7 @@ async def hosted(
     *,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
+    launched: Launched | None = None,
 ) -> list[Result]:
     """Play a match, and go on in a new game if the game dies or hangs and the task says so.
 
@@ -52,6 +54,7 @@ async def hosted(
         bus: a session on the bus that agents join.
         watch: is called with the run card, every new report and every result.
         past: what was played of this match before.
+        launched: a process of the game that is there already.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
@@ -59,7 +62,8 @@ async def hosted(
     restarts = 0
     while True:
         try:
-            async with game_of(config, sc2path, first_episode=past.episode if past else 0) as game:
+            first = past.episode if past else 0
+            async with game_of(config, sc2path, first_episode=first, launched=launched) as game:
                 return await host(config, game, bus, watch=watch, past=past)
         except GameMissing:
             raise
@@ -73,8 +77,8 @@ async def hosted(
             )
 
 
-def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0) -> Sides:
-    """Return the game of a match, not started yet."""
+def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launched: Launched | None = None) -> Sides:
+    """Return the game of a match, not started yet; it takes a process that is launched already, if it can."""
     task = config.task
     sides = task.per_side()
     started = GameConfig(
@@ -85,7 +89,7 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0) -> Si
         render_px=task.render_px,
         environment=environment.plain() | named_parent(),
     )
-    return Sides(GameThread(lambda: PySC2Game(started)), [executor_of(side) for side in sides])
+    return Sides(GameThread(lambda: PySC2Game(started, launched)), [executor_of(side) for side in sides])
 
 
 def _played(config: MatchConfig) -> Unfinished | None:

@@ -146,7 +146,9 @@ def people(names: Sequence[str]) -> str:
 def replay(
     file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
     *,
-    agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
+    agent: Annotated[
+        str | None, typer.Option(help="Only what this agent saw, said and did; red/NAME is the one of side red.")
+    ] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
     text: Annotated[bool, typer.Option("--text", help="Show observations and replies word for word.")] = False,
     images: Annotated[

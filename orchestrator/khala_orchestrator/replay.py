@@ -54,7 +54,7 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
         raise RecordingError(
             f"{recording.path}: its run card is not one of this version: {place}: {fault['msg']}"
         ) from None
-    if foreign := sorted(_modules(task) - set(modules)):
+    if foreign := sorted(modules_of(task) - set(modules)):
         raise RecordingError(
             f"{recording.path} names the module {foreign[0]!r} for a section of its text, and a recording imports "
             f"nothing by itself: if you trust it, allow modules=[{foreign[0]!r}]"
@@ -62,7 +62,8 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
     return config
 
 
-def _modules(task: TaskConfig) -> set[str]:
+def modules_of(task: TaskConfig) -> set[str]:
+    """Return the Python modules that a task names for sections of its text."""
     names = (name.rpartition(":") for agent in task.agents for name in agent.sections)
     return {module for module, colon, _ in names if colon}
 

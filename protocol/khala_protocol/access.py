@@ -8,6 +8,11 @@ subject to them, which is right for a host that is its own router.
     agent       run, result; briefing, observation, images of its own              its reply, exchange, alive
     adviser     run, report, result                                                its advice
     observer    everything of the run                                              nothing
+    service     everything of every run, on the unix socket of `khala serve`       the same
+
+The service `khala serve` knows no run before it is asked for one: its router has rules for any. There the host's
+certificate may order matches, and the observer's may list and watch them; its workers come over a unix socket, in a
+directory of their own.
 
 A report is not for agents: it has the accepted calls of all of them. Messages reach an agent in its observations.
 A rule covers a key only if it includes it, and `**` does not include a part that begins with `@`, such as those under
@@ -53,7 +58,7 @@ def router_settings(
     """
     root = f"{ROOT}/{check_name(run, 'run') if run else '*'}"
     names, advising = sorted(set(agents)), sorted(set(advisers))
-    rules = [*_host(root), *_observer(root)]
+    rules, rates = [*_host(root), *_observer(root)], list(_rates(names, advising))
     subjects, policies = [HOST, OBSERVER], {HOST: ["host"], OBSERVER: ["listen:observer", "hear:observer"]}
     agents_rules = {agent_name(*who): _agent(root, agent_name(*who), f"{root}/{'/'.join(who)}") for who in names}
     advisers_rules = {adviser_name(*who): _adviser(root, *who) for who in advising}
@@ -70,9 +75,17 @@ def router_settings(
             "policies": [{"subjects": [name], "rules": ids} for name, ids in policies.items()],
         },
         "low_pass_filter": list(_sizes()),
-        "downsampling": [{"flows": ["ingress"], "messages": ["put"], "rules": list(_rates(names, advising))}],
+        **({"downsampling": [{"flows": ["ingress"], "messages": ["put"], "rules": rates}]} if rates else {}),
         "transport/link/rx/max_message_size": MESSAGE_BYTES,
     }
+
+
+def service_settings() -> dict[str, Any]:
+    """Return the settings of Zenoh for the router of `khala serve`, for `BusConfig.zenoh`."""
+    settings = router_settings(())
+    settings["access_control"]["subjects"].append({"id": "worker", "link_protocols": ["unixsock-stream"]})
+    settings["access_control"]["policies"].append({"subjects": ["worker"], "rules": ["host"]})
+    return settings
 
 
 def _host(root: str) -> list[dict[str, Any]]:

@@ -5,10 +5,13 @@
     khala/<run>/<side>/<adviser>/advice          what somebody outside the match writes to agents
     khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
     khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
+    khala/service/matches                        the matches of `khala serve`
+    khala/service/order/<id>                     what a client asks of it: to play a match, or to stop one
 
 An agent writes below its own name: reply, exchange, alive; an adviser: advice. No agent has an adviser's name. Over TLS
 the router enforces this, by the rules of `khala_protocol.access`; without TLS nothing does. Names of runs, sides,
-agents, advisers and instances must pass `check_name`, so that no name can widen a key expression.
+agents, advisers and instances must pass `check_name`, so that no name can widen a key expression. No run may be
+called `service`.
 """
 
 from __future__ import annotations
@@ -20,6 +23,10 @@ from enum import StrEnum
 from khala_protocol.errors import WrongKey
 
 ROOT = "khala"
+SERVICE = "service"
+"""In the place of a run: what belongs to `khala serve`, see `khala_protocol.service`."""
+MATCHES_KEY = f"{ROOT}/{SERVICE}/matches"
+EVERY_ORDER = f"{ROOT}/{SERVICE}/order/*"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _PLACE = re.compile(r"0|[1-9][0-9]{0,3}")
 _LONGEST_SHOWN = 200
@@ -68,6 +75,8 @@ def check_name(name: str, what: str = "name") -> str:
     Raises:
         WrongKey: it is empty, longer than 64 characters, or has other characters than letters, digits, `_`, `.`, `-`.
     """
+    if what == "run" and name == SERVICE:
+        raise WrongKey(f"no run can be called {SERVICE!r}: under this name `khala serve` is asked for matches")
     if not _NAME.fullmatch(name):
         raise WrongKey(
             f"{what} {name[:_LONGEST_SHOWN]!r} cannot stand in a key: use 1 to 64 letters, digits, '_', '.' or '-', "
@@ -105,12 +114,24 @@ def images_of(run: str, side: str, agent: str) -> str:
     return f"{_agent_root(run, side, agent)}/{Topic.IMAGE}/*"
 
 
-def every_agent(run: str, topic: Topic) -> str:
-    """Return the expression that matches this topic of every agent of a run, on every side."""
+def every_run(topic: Topic) -> str:
+    """Return the expression that matches this topic of every run."""
+    if topic not in RUN_TOPICS:
+        raise WrongKey(f"{topic} belongs to an agent, not to the run")
+    return f"{ROOT}/*/{topic}"
+
+
+def order_key(number: str) -> str:
+    """Return the key under which a client of the service sends one order."""
+    return f"{ROOT}/{SERVICE}/order/{check_name(number, 'order')}"
+
+
+def every_agent(run: str | None, topic: Topic) -> str:
+    """Return the expression that matches this topic of every agent of a run, on every side; None: of all runs."""
     if topic not in AGENT_TOPICS:
         raise WrongKey(f"{topic} belongs to the run, not to an agent")
     tail = f"{topic}/*" if topic in NUMBERED_TOPICS else str(topic)
-    return f"{ROOT}/{check_name(run, 'run')}/*/*/{tail}"
+    return f"{ROOT}/{'*' if run is None else check_name(run, 'run')}/*/*/{tail}"
 
 
 def everything(run: str) -> str:
@@ -125,7 +146,7 @@ def parse(key: str) -> Address:
         WrongKey: it has none of the forms in the module's docstring.
     """
     parts = key.split("/")
-    if all(_NAME.fullmatch(part) for part in parts):
+    if all(_NAME.fullmatch(part) for part in parts) and SERVICE not in parts[1:2]:
         match parts:
             case [root, run, topic] if root == ROOT and topic in RUN_TOPICS:
                 return Address(run, Topic(topic))

@@ -801,10 +801,10 @@ class Result(Wire):
     """By agent: how many of its decisions were `fresh`, `stale`, …"""
     fallbacks: dict[str, dict[str, int]] = {}
     """By agent: how often it fell back, by reason."""
-    advisers: dict[str, int] = {}
-    """By adviser: how many messages from outside the match its agents got."""
     incidents: tuple[str, ...] = ()
     """The first incidents of its reports, each with its step."""
+    advisers: dict[str, int] = {}
+    """By adviser: how many messages from outside the match its agents got."""
     age_p50_loops: float | None = None
     """Game loops from an observation to the effect of the decision."""
     age_p95_loops: float | None = None

@@ -52,6 +52,11 @@ BAD = [
     ("run 2s3z --model nope", "there is no model file 'nope'"),
     ("run 2s3z --model openai", "no key: set the environment variable OPENAI_API_KEY"),
     ("run 2s3z --policy nope:decide", "there is no module 'nope'"),
+    ("run 2s3z --red openai", "the task has no side red: its only side is blue"),
+    ("run duel_3m --side-model green=openai", "the task has no side green: its sides are blue and red"),
+    ("run duel_3m --side-model openai", "--side-model: 'openai' names no side and its model: write red=openai"),
+    ("run duel_3m --red nope/gpt", "there is no model file 'nope'"),
+    ("run duel_3m --blue skilled --red nope:decide", "there is no module 'nope'"),
     ("run 2s3z --game nowhere", "there is no StarCraft II in nowhere"),
     ("run 2s3z --game starcraft2", "there is no StarCraft II in nowhere (SC2PATH)"),
     ("run 2s3z --out file/below", "cannot be made: Not a directory; --out names another place"),
@@ -139,6 +144,20 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -
     assert replayed.returncode == 0
     assert "step 2" in replayed.stdout
     assert "step 3" not in replayed.stdout
+
+
+@pytest.mark.game
+def test_each_side_of_a_duel_plays_with_its_own_model_and_has_its_own_result(tmp_path: Path) -> None:
+    sides = ("--blue", "scripted/skilled", "--red", "silent")
+    done = khala("run", "duel_3m", *sides, "--max-steps", "25", "--latency", "0", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    blue, red = json.loads(done.stdout)["results"]
+    assert [(result["side"], result["outcome"]) for result in (blue, red)] == [("blue", "win"), ("red", "loss")]
+    assert blue["usage"]["Captain"]["requests"] == blue["steps"]
+    assert red["usage"]["Captain"]["requests"] == 0
+    assert "blue: win, enemy defeated" in done.stderr
+    assert "red: loss, defeated" in done.stderr
+    assert done.stderr.count("step 0, ") == 1
 
 
 class Refusing(BaseHTTPRequestHandler):

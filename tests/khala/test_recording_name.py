@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.cli import _config
+from khala.matches import new
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,10 +27,10 @@ def test_a_run_begun_anew_gets_a_recording_of_its_own(tmp_path: Path, there: lis
     (tmp_path / "again").mkdir()
     for name in there:
         (tmp_path / "again" / name).touch()
-    config = _config("2s3z_pair", "again", tmp_path, **MATCH)
+    config = new("2s3z_pair", "again", tmp_path, **MATCH)
     assert config.record == tmp_path / "again" / written
 
 
 def test_a_place_that_cannot_be_looked_at_is_the_recorders_to_complain_about(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    assert _config("2s3z_pair", "again", tmp_path / "file", **MATCH).record == tmp_path / "file/again/recording.mcap"
+    assert new("2s3z_pair", "again", tmp_path / "file", **MATCH).record == tmp_path / "file/again/recording.mcap"

@@ -49,7 +49,9 @@ def numbers(field: FieldInfo) -> dict[object, st.SearchStrategy[Any]]:
     return {int: st.integers(int(least), int(most)), float: st.floats(least, most, exclude_min=Gt in limits)}
 
 
-def values(annotation: Any, limited: dict[object, st.SearchStrategy[Any]] | None = None) -> st.SearchStrategy[Any]:
+def values(  # noqa: PLR0911  # one a type
+    annotation: Any, limited: dict[object, st.SearchStrategy[Any]] | None = None
+) -> st.SearchStrategy[Any]:
     """Return a strategy for all values of a field of this annotation."""
     arguments = get_args(annotation)
     origin = get_origin(annotation)

@@ -19,7 +19,7 @@ from absl import flags
 
 from khala_bridge.act.plan import PlanStep, Played
 from khala_bridge.catalogue.functions import check_against_pysc2
-from khala_bridge.compat import maps, sc2_env
+from khala_bridge.compat import maps, run_configs, sc2_env
 from khala_bridge.errors import GameError, GameMissing
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.state import read_info, read_snapshot
@@ -49,8 +49,12 @@ class PySC2Game:
     Two players have two processes of the game, which PySC2 joins over LAN ports of this machine.
     """
 
-    def __init__(self, config: GameConfig) -> None:
+    def __init__(self, config: GameConfig, launched: Launched | None = None) -> None:
         """Start the game.
+
+        Args:
+            config: which game, and how.
+            launched: a process of this install that is there already; used if it fits, ended if not.
 
         Raises:
             GameMissing: there is no game or no such map in the install.
@@ -65,7 +69,7 @@ class PySC2Game:
         check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
-        self._env = _start(config)
+        self._env = _start(config, launched)
         with _explained("the game could not be asked for its version"):
             ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
         self._info = GameIdentity(
@@ -156,16 +160,44 @@ class PySC2Game:
         )
 
 
+class Launched:
+    """A process of the game that has no map yet: it takes any, and so can be started before the match is known."""
+
+    def __init__(self, sc2path: Path, environment: dict[str, str] | None = None) -> None:
+        """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
+        check_install(sc2path)
+        _settle_flags()
+        with _sc2path(sc2path), _explained("the game could not be started"):
+            run_config = run_configs.get()
+            run_config.env = _environment_of(run_config, environment)
+            self._process: Any = run_config.start(want_rgb=False)
+
+    def take(self) -> Any:
+        """Return the process, once, and only if it still runs; the taker ends it."""
+        process, self._process = self._process, None
+        return process if process is not None and process.running else None
+
+    def close(self) -> None:
+        """End the process, if nobody took it."""
+        if (process := self.take()) is not None:
+            process.close()
+
+
 class _Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
     """`SC2Env` whose game gets an environment of its own, where PySC2 passes on ours, with every key that is in it."""
 
     environment: dict[str, str] | None = None
+    launched: Launched | None = None
 
     def _launch_game(self) -> None:
-        if self.environment is not None:
-            ours = self._run_config.env or {}  # on Linux, with the libraries of the game
-            libraries = {name: ours[name] for name in ("LD_LIBRARY_PATH",) if name in ours}
-            self._run_config.env = self.environment | libraries
+        draws = any(interface.HasField("render") for interface in self._interface_options)
+        alone = self._num_agents == 1 and not draws  # several players have ports in their command lines
+        if self.launched is not None and alone and (process := self.launched.take()) is not None:
+            self._ports: list[int] = []
+            self._sc2_procs = [process]
+            self._controllers = [process.controller]
+            return
+        self._run_config.env = _environment_of(self._run_config, self.environment)
         super()._launch_game()
 
 
@@ -232,7 +264,19 @@ def _map_data(config: GameConfig) -> bytes:
         raise GameMissing(f"the map {path} cannot be read: {error.strerror}") from None
 
 
-def _start(config: GameConfig) -> Any:
+def _environment_of(run_config: Any, environment: dict[str, str] | None) -> dict[str, str] | None:
+    ours: dict[str, str] | None = run_config.env  # on Linux, with the libraries of the game
+    if environment is None:
+        return ours
+    return environment | {name: (ours or {})[name] for name in ("LD_LIBRARY_PATH",) if name in (ours or {})}
+
+
+def _settle_flags() -> None:
+    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
+        flags.FLAGS.mark_as_parsed()
+
+
+def _start(config: GameConfig, launched: Launched | None = None) -> Any:
     pictures = config.render_px and sc2_env.Dimensions(screen=config.render_px, minimap=config.render_px)
     interface = sc2_env.AgentInterfaceFormat(
         feature_dimensions=sc2_env.Dimensions(screen=config.screen_px, minimap=config.minimap_px),
@@ -244,11 +288,10 @@ def _start(config: GameConfig) -> Any:
         send_observation_proto=True,
         hide_specific_actions=False,  # a general action would do what the unit can, not what the call says
     )
-    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
-        flags.FLAGS.mark_as_parsed()
+    _settle_flags()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
     env: Any = object.__new__(_Env)  # kept while it starts, so that a start that fails leaves no process
-    env.environment = config.environment
+    env.environment, env.launched = config.environment, launched
     try:
         with _sc2path(config.sc2path), _explained("the game could not be started"):
             env.__init__(
@@ -262,6 +305,9 @@ def _start(config: GameConfig) -> Any:
     except BaseException:
         env.close()
         raise
+    finally:
+        if launched is not None:
+            launched.close()
     return env
 
 

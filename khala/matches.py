@@ -1,0 +1,72 @@
+"""The match that options describe: a new one, or what is left of one whose host was lost; and where it is recorded.
+
+Above: `khala run`, `khala host` and `khala submit`, which take the same options, and the workers of `khala serve`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from typing import TYPE_CHECKING, Any
+
+from khala_bridge.observe import Observer
+from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
+from khala_orchestrator.resume import unfinished
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import check_name
+from khala_protocol.recording import Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala_orchestrator.resume import Unfinished
+
+
+def new_or_resumed(
+    task: str | None, resume: Path | None, run: str | None, out: Path, **given: Any
+) -> tuple[MatchConfig, Unfinished | None]:
+    """Return the match that the options describe, and what was played of it.
+
+    Raises:
+        ConfigError: an option or a file is wrong.
+        RecordingError: there is nothing to go on with.
+    """
+    if (task is None) == (resume is None):
+        raise ConfigError("give a task, or a recording with --resume: one of them")
+    if resume is None:
+        assert task is not None
+        return new(task, run, out, **given), None
+    return resumed(resume, out, assemble_s=given["assemble_s"])
+
+
+def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
+    """Return the match that the options describe; its recording is in its own directory below `out`."""
+    match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
+    loaded = change(load_task(task), **given)
+    Observer(loaded)  # report an unknown section before a game is started
+    name = check_name(run or new_run_name(loaded.name), "run")
+    return MatchConfig(task=loaded, run=name, record=free_recording(out / name), **match)
+
+
+def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
+    """Return the match of a recording, or of the newest one in the directory of a run, and what was played of it."""
+    past = unfinished(Recording.open(newest_recording(path)))
+    changes = {"record": free_recording(out / past.config.run), "assemble_s": assemble_s}
+    return past.config.model_copy(update=changes), past
+
+
+def newest_recording(path: Path) -> Path:
+    """Return the recording at a path, or the newest one in the directory of a run."""
+    if not path.is_dir():
+        return path
+    found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
+    if not found:
+        raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
+    return found[-1]
+
+
+def free_recording(directory: Path) -> Path:
+    """Return an unused file for the recording: containers, for example, start a run again under its name."""
+    names = itertools.chain(["recording"], (f"recording-{number}" for number in itertools.count(2)))
+    paths = (directory / f"{name}.mcap" for name in names)
+    return next(path for path in paths if not os.path.exists(path))  # noqa: PTH110  # Path.exists raises where it may not look

@@ -1,0 +1,163 @@
+"""Which matches the service has, what became of them, and whose turn it is. It knows no process and no bus.
+
+Matches of different owners take turns: the next one is of the owner with the fewest running, the oldest of these first.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from khala_protocol.service import MAX_WORDS, OPEN, MatchCard, Matches
+
+if TYPE_CHECKING:
+    from khala.minds import Minds
+    from khala_orchestrator.config import MatchConfig
+    from khala_protocol.messages import Report, Result
+    from khala_protocol.service import MatchState, Submit
+
+KEPT = 100
+"""Matches that are over and still listed."""
+USUAL_MB = 700
+"""Memory of a match before one has shown what it takes: host, game, endpoint and two processes of agents."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the service may take."""
+
+    matches: int = 2
+    """At once."""
+    memory_mb: int = 2**20
+    """Of all processes of the service together."""
+    queued: int = 100
+    """Further ones are refused."""
+    trusts: bool = False
+    """Whether an order may name code and addresses, which this machine then runs and calls."""
+
+
+@dataclass(slots=True)
+class Entry:
+    """One match."""
+
+    card: MatchCard
+    config: MatchConfig | None = None
+    """None for one that was refused."""
+    minds: Minds | None = None
+    results: dict[tuple[int, str], str] = field(default_factory=dict)
+    """Outcomes, by episode and side."""
+    stop_because: str = ""
+    """Set once it shall end."""
+
+    def update(self, **changes: object) -> None:
+        """Change what its card says."""
+        self.card = self.card.but(**changes)
+
+
+@dataclass(slots=True)
+class Book:
+    """The matches of the service, in the order in which they came."""
+
+    limits: Limits = field(default_factory=Limits)
+    draining: bool = False
+    _entries: dict[str, Entry] = field(default_factory=dict)
+    """By the number of the order."""
+    _largest_mb: int = 0
+
+    def entry(self, run: str) -> Entry | None:
+        """Return the newest match of this name that was taken."""
+        return next((e for e in reversed(self._entries.values()) if e.card.run == run and e.config), None)
+
+    def knows(self, number: str) -> bool:
+        """Return whether this order came before."""
+        return number in self._entries
+
+    def why_not(self, run: str) -> str:
+        """Return why a match of this name is not taken now, as a sentence; empty if it is."""
+        if self.draining:
+            return "the service is ending, and takes no more matches"
+        if len(self.of("queued")) >= self.limits.queued:
+            return f"{self.limits.queued} matches are waiting already: try again when some are over"
+        if (entry := self.entry(run)) is not None and entry.card.state in OPEN:
+            return f"a match called {run} is {entry.card.state} already: give another --run"
+        return ""
+
+    def add(self, order: Submit, config: MatchConfig, minds: Minds) -> Entry:
+        """Take a match."""
+        card = MatchCard(
+            run=order.run,
+            number=order.number,
+            owner=order.owner,
+            task=config.task.name,
+            state="queued",
+            episodes=config.episodes,
+            recording=str(config.record.parent) if config.record else "",
+        )
+        return self._put(Entry(card, config, minds))
+
+    def refuse(self, order: Submit, reason: str) -> Entry:
+        """Keep in mind why a match was not taken, for the one who asks."""
+        card = MatchCard(run=order.run, number=order.number, owner=order.owner, task="", state="refused")
+        return self._put(Entry(card.but(reason=reason[:MAX_WORDS])))
+
+    def next(self, used_mb: int) -> Entry | None:
+        """Return the match to begin now, if one is waiting and there is room.
+
+        Args:
+            used_mb: memory that all processes of the service take.
+        """
+        waiting, running = self.of("queued"), self.of("running")
+        if not waiting or len(running) >= self.limits.matches:
+            return None
+        if running and used_mb + (self._largest_mb or USUAL_MB) > self.limits.memory_mb:
+            return None
+        busy = Counter(entry.card.owner for entry in running)
+        return min(waiting, key=lambda entry: busy[entry.card.owner])
+
+    def measured(self, entry: Entry, rss_mb: int) -> None:
+        """Take what a match takes in memory."""
+        self._largest_mb = max(self._largest_mb, rss_mb)
+        entry.update(rss_mb=rss_mb)
+
+    def too_large(self, used_mb: int) -> Entry | None:
+        """Return the match to end because all together take too much: the largest."""
+        running = [entry for entry in self.of("running") if not entry.stop_because]
+        if used_mb <= self.limits.memory_mb or not running:
+            return None
+        return max(running, key=lambda entry: entry.card.rss_mb)
+
+    def report(self, report: Report) -> None:
+        """Count a step of a match."""
+        if (entry := self.entry(report.run)) is not None:
+            costs = (agent.usage.cost_usd or 0.0 for agent in report.agents)
+            cost_usd = entry.card.cost_usd + sum(costs)
+            entry.update(episode=report.episode, step=report.step + 1, cost_usd=cost_usd)
+
+    def result(self, result: Result) -> None:
+        """Take the result of an episode, which a match that was gone on with brings again."""
+        if (entry := self.entry(result.run)) is not None:
+            known = entry.results | {(result.episode, result.side): result.outcome}
+            entry.results = known
+            entry.update(outcomes=tuple(known[place] for place in sorted(known)))
+
+    def ended(self, entry: Entry, state: MatchState, reason: str = "") -> None:
+        """Close a match; the oldest of those that are over are forgotten."""
+        entry.update(state=state, reason=reason[:MAX_WORDS], rss_mb=0)
+        over = [number for number, entry in self._entries.items() if entry.card.state not in OPEN]
+        for number in over[: max(0, len(over) - KEPT)]:
+            del self._entries[number]
+
+    def of(self, *states: MatchState) -> list[Entry]:
+        """Return the matches in these states."""
+        return [entry for entry in self._entries.values() if entry.card.state in states]
+
+    def listed(self) -> Matches:
+        """Return the list for all to read."""
+        return Matches(matches=tuple(entry.card for entry in self._entries.values()), draining=self.draining)
+
+    def _put(self, entry: Entry) -> Entry:
+        self._entries[entry.card.number] = entry
+        if entry.card.state not in OPEN:
+            self.ended(entry, entry.card.state, entry.card.reason)
+        return entry

@@ -1,0 +1,77 @@
+"""What the service counts for Prometheus, from the messages of its matches and from its list of them.
+
+A match is no label: a series for each would stay for ever. `khala matches` tells of single ones.
+"""
+
+from __future__ import annotations
+
+from collections import Counter as Count
+from typing import TYPE_CHECKING, get_args
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, start_http_server
+
+from khala_protocol.messages import Report, Result
+from khala_protocol.service import MatchState
+
+if TYPE_CHECKING:
+    from khala.service.book import Book
+    from khala_protocol.messages import AgentReport, Wire
+
+BUCKETS_S = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60)
+"""Of a step, which waits for models: 0.2 s with the scripted one, at most `max_wait_s`, 15 by default, with others."""
+MB = 2**20
+
+
+class Metrics:
+    """A `khala.service.daemon.Listener` with a registry of its own."""
+
+    def __init__(self) -> None:
+        self.registry = registry = CollectorRegistry()
+        self._matches = Gauge(
+            "khala_matches", "Matches by state, some of those that are over.", ["state"], registry=registry
+        )
+        self._episodes = Counter("khala_episodes", "Results of episodes.", ["outcome", "valid"], registry=registry)
+        self._steps = Counter("khala_steps", "Steps of all matches.", registry=registry)
+        self._step_s = Histogram("khala_step_seconds", "Wall time of a step.", buckets=BUCKETS_S, registry=registry)
+        self._decisions = Counter("khala_decisions", "Decisions of agents by status.", ["status"], registry=registry)
+        self._rejections = Counter("khala_rejections", "Calls that were not executed.", ["reason"], registry=registry)
+        self._tokens = Counter("khala_tokens", "Tokens of models.", ["kind"], registry=registry)
+        self._cost = Counter("khala_cost_usd", "Cost of models in US dollars, where known.", registry=registry)
+        self._queue = Gauge("khala_queue_length", "Matches that wait.", registry=registry)
+        self._rss = Gauge("khala_rss_bytes", "Memory of all processes of the service.", registry=registry)
+        self._largest = Gauge("khala_match_rss_bytes", "Memory of the largest match.", registry=registry)
+
+    def serve(self, port: int, host: str = "127.0.0.1") -> int:
+        """Answer `GET /metrics` in a thread of its own; return the port."""
+        server, _ = start_http_server(port, host, registry=self.registry)
+        return int(server.server_port)
+
+    def hear(self, message: Wire) -> None:
+        """Count a message of a match."""
+        match message:
+            case Report():
+                timings = message.timings
+                self._steps.inc()
+                took_s = timings.observe_s + timings.publish_s + timings.wait_s + timings.act_s + timings.game_s
+                self._step_s.observe(took_s)
+                for agent in message.agents:
+                    self._decision(agent)
+            case Result():
+                self._episodes.labels(message.outcome, str(message.valid).lower()).inc()
+
+    def book(self, book: Book, used_mb: int) -> None:
+        """Take the list of matches."""
+        by_state = Count(card.state for card in book.listed().matches)
+        for state in get_args(MatchState):
+            self._matches.labels(state).set(by_state[state])
+        self._queue.set(by_state["queued"])
+        self._rss.set(used_mb * MB)
+        self._largest.set(max((entry.card.rss_mb for entry in book.of("running")), default=0) * MB)
+
+    def _decision(self, agent: AgentReport) -> None:
+        self._decisions.labels(agent.status).inc()
+        for rejection in agent.rejections:
+            self._rejections.labels(rejection.reason).inc()
+        self._tokens.labels("prompt").inc(agent.usage.prompt_tokens)
+        self._tokens.labels("completion").inc(agent.usage.completion_tokens)
+        self._cost.inc(agent.usage.cost_usd or 0.0)

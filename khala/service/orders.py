@@ -1,0 +1,64 @@
+"""From an order to a match that can be played: all that `khala run` checks, and what a machine must not do for others.
+
+A policy, a section of a task and a model file are code or files of this machine, and a base URL is an address to which
+it would send a model's key. Who orders a match is somewhere else, so these need `khala serve --trust`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter, ValidationError
+
+from khala.matches import free_recording
+from khala.minds import Minds
+from khala_bridge.observe import Observer
+from khala_orchestrator.config import MatchConfig
+from khala_orchestrator.replay import modules_of
+from khala_protocol.configfile import words_of
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import check_name
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala_protocol.service import Submit
+
+_MINDS = TypeAdapter(Minds)
+
+
+def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, Minds]:
+    """Return the match that an order describes, recorded below `out`.
+
+    Raises:
+        KhalaError: it cannot be played, or needs more trust than there is; the text says why.
+    """
+    check_name(order.run, "run")
+    try:
+        config = MatchConfig.model_validate({**order.match, "run": order.run, "record": None})
+        minds = _MINDS.validate_python(order.minds)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        raise ConfigError(f"{'.'.join(map(str, first['loc']))}: {words_of(first)}", source="match") from None
+    if unknown := sorted(order.minds.keys() - {field.name for field in dataclasses.fields(Minds)}):
+        raise ConfigError(f"there is no option {unknown[0]!r}; is the service of the same version?", source="match")
+    if not trusts and (asked := _needs_trust(config, minds)):
+        raise ConfigError(f"{asked} is for a service that was started with --trust: this machine would run or call it")
+    Observer(config.task)
+    minds.check()
+    return config.model_copy(update={"record": free_recording(out / order.run)}), minds
+
+
+def _needs_trust(config: MatchConfig, minds: Minds) -> str:
+    if minds.base_url is not None:
+        return "--base-url"
+    if minds.policy is not None and ":" in minds.policy:
+        return "--policy MODULE:NAME"
+    if minds.fallback is not None and ":" in minds.fallback:
+        return "--fallback MODULE:NAME"
+    if minds.model.endswith((".yaml", ".yml")):
+        return "a model file"
+    if modules := sorted(modules_of(config.task)):
+        return f"the section of {modules[0]} in the task"
+    return ""
