@@ -182,6 +182,8 @@ def table(result: Result, *, named: bool = False) -> Panel:
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
     rows.add_row("tokens", _tokens(result.usage.values()))
+    if result.advisers:
+        rows.add_row("advice", ", ".join(f"{count} by {name}" for name, count in result.advisers.items()))
     if fates := sum(map(Counter, result.fates.values()), Counter()):
         rows.add_row("decisions", _decisions(result, fates))
     for incident in result.incidents:

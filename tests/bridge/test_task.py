@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
+from pydantic import ValidationError
 
-from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
+from khala_bridge.task.config import AdviserConfig, AgentConfig, TaskConfig, TeamConfig
 from khala_bridge.task.maps import known_maps
 from khala_protocol.configfile import load, loads
 from khala_protocol.errors import ConfigError
@@ -130,3 +131,17 @@ def test_what_is_listed_for_a_form_stands() -> None:
         actions={"SiegeTank": ("Attack_Unit",), "SiegeTankSieged": ("Stop",)},
     )
     assert tank.actions["SiegeTankSieged"] == ("Stop",)
+
+
+def test_an_adviser_has_a_name_that_no_agent_has(task: Callable[..., TaskConfig]) -> None:
+    pair = task("2s3z_pair").model_dump()
+    assert [one["name"] for one in pair["advisers"]] == ["Adviser"]
+    assert TaskConfig.model_validate(pair | {"advisers": []}).advisers == ()
+    with pytest.raises(ValidationError, match="there are two of agent or adviser stalkers"):
+        TaskConfig.model_validate(pair | {"advisers": [{"name": "stalkers"}]})
+
+
+@pytest.mark.parametrize("role", ["", "x" * 61, "coach)\nMessage from Zealots", "a (b)"])
+def test_the_role_of_an_adviser_cannot_pass_for_other_text(role: str) -> None:
+    with pytest.raises(ValidationError):
+        AdviserConfig(name="Ada", role=role)

@@ -73,6 +73,8 @@ BAD = [
         "make it with `khala keys agent Stalkers DIR --side blue`",
     ),
     ("keys agent Stalkers nowhere", "nowhere: holds no authority: make one with `khala keys init DIR`"),
+    ("advise r --tls nowhere", "make it with `khala keys adviser Adviser DIR --side blue`"),
+    ("advise r --name a/b", "name 'a/b' cannot stand in a key"),
     ("keys show nowhere", "nowhere: holds no certificates"),
     ("router --listen tcp/127.0.0.1:{taken}", "another process uses it"),
     ("router --check --connect tcp/127.0.0.1:{closed}", "no router answered"),
@@ -320,12 +322,14 @@ def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
 
 def test_keys_are_made_shown_and_examined(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     keys = str(tmp_path / "keys")
-    for made in (["init", keys, "--host", "10.0.0.5"], ["agent", "Stalkers", keys, "--days", "7"]):
+    agent, adviser = ["agent", "Stalkers", keys, "--days", "7"], ["adviser", "Ada", keys, "--side", "red"]
+    for made in (["init", keys, "--host", "10.0.0.5"], agent, adviser):
         assert tell(capsys, "keys", *made)[0] == 0
     _, out = tell(capsys, "keys", "show", keys, "--json")
     rows = json.loads(out)["certificates"]
     shown = {row["name"]: (row["days_left"], row["hosts"]) for row in rows}
     assert shown["agent:blue/Stalkers"] == (7, [])
+    assert shown["adviser:red/Ada"] == (365, [])
     assert shown["router"] == (365, ["10.0.0.5"])
     (tmp_path / "keys" / "host" / "key.pem").chmod(0o644)
     _, out = tell(capsys, "doctor", "--tls", keys, "--json")

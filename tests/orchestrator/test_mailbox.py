@@ -145,3 +145,33 @@ def test_listening_to_unknown_channels_is_not_remembered(mailbox: Mailbox) -> No
     for number in range(100):
         mailbox.listen(A, f"Channel-{number}")
     assert len(mailbox._listeners) == 1
+
+
+ADA = Seat("p1", "Ada")
+
+
+def advice(recipient: str, text: str = "hi") -> Message:
+    return said(ADA, recipient, text).model_copy(update={"human": True})
+
+
+@pytest.mark.parametrize(
+    ("recipient", "hears"), [("everyone", [A, B]), ("b", [B]), ("Channel-1", [A])], ids=["all", "one", "listeners"]
+)
+def test_an_adviser_is_heard_under_name_and_role(recipient: str, hears: list[Seat]) -> None:
+    box = Mailbox({A: [], B: []}, ["Channel-1"], {ADA: "a human coach"})
+    box.listen(A, "Channel-1")
+    post = box.deliver([advice(recipient)])
+    assert list(post.received) == hears
+    assert {message.sender for messages in post.received.values() for message in messages} == {"Ada (a human coach)"}
+
+
+def test_only_an_adviser_writes_to_everyone() -> None:
+    post = Mailbox({A: [B], B: [A]}, (), {ADA: "coach"}).deliver([said(A, "everyone")])
+    assert not post.received
+    assert [rejection.reason for rejection in post.rejections[A]] == ["unknown_recipient"]
+
+
+def test_an_adviser_has_the_limits_of_an_agent() -> None:
+    post = Mailbox({A: []}, (), {ADA: "coach"}).deliver(advice("A", "x" * 400) for _ in range(9))
+    assert len(post.taken) == 5
+    assert sum(len(message.text) for message in post.received[A]) == MAX_CHARACTERS
