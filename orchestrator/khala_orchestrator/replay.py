@@ -149,14 +149,16 @@ class RecordedTurn:
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
         sent = {(one.side, one.agent): encode(one).decode() for one in observations}
+        missing = dict(sent)
         for sample in step.samples:
             message = sample.message
-            if not isinstance(message, Observation):
-                continue
-            now, recorded = sent.pop((message.side, message.agent), ""), sample.payload.decode()
+            if not isinstance(message, Observation) or message.step != step.step:
+                continue  # a host that goes on after it was killed asks again what was open, maybe for some steps
+            now, recorded = sent.get((message.side, message.agent), ""), sample.payload.decode()
+            missing.pop((message.side, message.agent), None)
             if now != recorded:
                 self._differ(message.agent, step, recorded, now)
-        for (_, agent), now in sent.items():
+        for (_, agent), now in missing.items():
             self._differ(agent, step, "", now)
 
     def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:

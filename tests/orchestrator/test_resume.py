@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,27 @@ async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
             assert [_plain(result) for result in again] == [_plain(result) for result in results]
             assert digest(Recording.open(path)) == digest(Recording.open(whole))
         assert [report.step for report in Recording.open(path).of(Report)] == [0, 1, 2, 3, 4] * 2
+
+
+async def test_a_match_that_was_resumed_with_open_questions_is_resumed_once_more(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    async def slow(peer: Peer, seen: Observation) -> None:
+        await asyncio.sleep(0.1)  # for three steps of the game
+        await peer.answer(seen)
+
+    path = tmp_path / "0.mcap"
+    match = config(game=GAME, max_steps=12, rule="realtime", speed=10.0, step_loops=8)
+    await hall.play(match.model_copy(update={"record": path}), Stalkers=slow)
+    for reports in (4, 5, 7):
+        past = unfinished(killed_after(path, reports, tmp_path / f"killed-{reports}.mcap"))
+        path = tmp_path / f"{reports}.mcap"
+
+        async def played(*arguments: Any, past: Any = past, **options: Any) -> list[Result]:
+            return await host(*arguments, **options, past=past)
+
+        await hall.play(past.config.model_copy(update={"record": path}), by=played, Stalkers=slow)
+    assert [report.step for report in Recording.open(path).of(Report)] == [*range(12)]
 
 
 async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:
