@@ -321,6 +321,7 @@ class Arena:
             self.lost.append(kind)
             fault.recovered_ns = time.time_ns()
         self.faults.append(fault)
+        print(f"{kind}: {(fault.recovered_ns - fault.began_ns) / 1e9:.1f} s {' '.join(self.lost)}", file=sys.stderr)
 
     async def killed(self, name: str, pause_s: float = 0.0) -> int:
         """Kill a process, and start it again."""
@@ -481,7 +482,6 @@ async def everything(processes: Processes, faults: int, seed: int) -> Verdict:
                 todo = [kind for kind in ways(match, endpoint) for _ in range(-(-SLOW.get(kind, 8) * faults // 1000))]
                 dice.shuffle(todo)
                 for kind in todo:
-                    print(f"{kind} …", file=sys.stderr)
                     await match.inject(kind, ways(match, endpoint)[kind])
                 while _sum(failing.counted, saboteur.counted, match.faults) < faults:
                     await match.steady()
