@@ -18,6 +18,7 @@ from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
+from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report
 from khala_protocol.recording.difference import Difference
 
@@ -98,8 +99,10 @@ class RecordedTurn:
         self._sides = len({report.side for report in recording.of(Report)} or {None})
         self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
         self._replies: dict[tuple[int, int, Seat], Reply] = {}
-        for reply in recording.of(Reply):
-            self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
+        for sample in recording:
+            reply = sample.message
+            if isinstance(reply, Reply) and sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):
+                self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
         self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
         for report in recording.of(Report):
             for agent in report.agents:
