@@ -319,8 +319,10 @@ class Arena:
             fault.recovered_ns = self._good_ns
         except TimeoutError:
             self.lost.append(kind)
+            print(self.processes.last_words("host"), file=sys.stderr)
             fault.recovered_ns = time.time_ns()
         self.faults.append(fault)
+        print(f"{kind}: {(fault.recovered_ns - fault.began_ns) / 1e9:.1f} s {' '.join(self.lost)}", file=sys.stderr)
 
     async def killed(self, name: str, pause_s: float = 0.0) -> int:
         """Kill a process, and start it again."""
@@ -469,7 +471,7 @@ SLOW = {"game hangs": 1, "game killed": 2, "host killed": 3, "two processes of o
 """How many of 1 000 faults are of these kinds; 8 of each other one that takes time."""
 
 
-async def everything(processes: Processes, faults: int, seed: int) -> Verdict:
+async def everything(processes: Processes, faults: int, seed: int, only: Sequence[str] | None) -> Verdict:
     """Inject faults of every kind until there were enough."""
     dice = random.Random(seed)
     failing = CountedFaults(ENDPOINT, seed)
@@ -478,12 +480,12 @@ async def everything(processes: Processes, faults: int, seed: int) -> Verdict:
         os.environ[MODEL] = endpoint.base_url
         async with arena(processes, dice, "bench.faults:Marked", MAX_WAIT_S) as match:
             async with _sabotage(match) as saboteur:
-                todo = [kind for kind in ways(match, endpoint) for _ in range(-(-SLOW.get(kind, 8) * faults // 1000))]
+                kinds = only or ways(match, endpoint)
+                todo = [kind for kind in kinds for _ in range(-(-SLOW.get(kind, 8) * faults // 1000))]
                 dice.shuffle(todo)
                 for kind in todo:
-                    print(f"{kind} …", file=sys.stderr)
                     await match.inject(kind, ways(match, endpoint)[kind])
-                while _sum(failing.counted, saboteur.counted, match.faults) < faults:
+                while not match.lost and _sum(failing.counted, saboteur.counted, match.faults) < faults:
                     await match.steady()
             counted = failing.counted + saboteur.counted
         return _judged(match, counted)
@@ -572,13 +574,13 @@ def summary(verdict: Verdict) -> str:
     )
 
 
-def measure(faults: int, restarts: int | None, seed: int) -> Verdict:
+def measure(faults: int, restarts: int | None, seed: int, only: Sequence[str] | None) -> Verdict:
     """Inject faults; return what came of it."""
     with tempfile.TemporaryDirectory() as directory, Processes(Path(directory)) as processes:
         if restarts is not None:
             verdict = asyncio.run(routers(processes, restarts, seed))
         else:
-            verdict = asyncio.run(everything(processes, faults, seed))
+            verdict = asyncio.run(everything(processes, faults, seed, only))
             for rule in ("end", "go_on"):
                 verdict.counted["disk full"] += 1
                 verdict.lost = [*verdict.lost, *([] if full_disk(processes, rule) else [f"disk full: {rule}"])]
@@ -591,10 +593,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--faults", type=int, default=1000)
     parser.add_argument("--routers", type=int, metavar="N", help="restart the router N times, and nothing else")
+    parser.add_argument("--only", nargs="+", metavar="KIND", help="of the faults that take time, only these")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
-    verdict = measure(arguments.faults, arguments.routers, arguments.seed)
+    verdict = measure(arguments.faults, arguments.routers, arguments.seed, arguments.only)
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(verdict))
     print(summary(verdict), file=sys.stderr if arguments.json else sys.stdout)
     if arguments.json:

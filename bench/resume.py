@@ -174,7 +174,7 @@ class Watch:
             group.create_task(self._asked(asked))
             group.create_task(self._reports(reports))
 
-    async def until_step(self, step: int, host: subprocess.Popen[bytes]) -> None:
+    async def until_step(self, step: int, host: subprocess.Popen[bytes], processes: Processes) -> None:
         """Return when a step is over.
 
         Raises:
@@ -183,7 +183,8 @@ class Watch:
         async with asyncio.timeout(PATIENCE_S):
             while self.step < step:
                 if host.poll() is not None:
-                    raise RuntimeError(f"the host ended with code {host.returncode} at step {self.step}")
+                    said = processes.last_words("host")
+                    raise RuntimeError(f"the host ended with code {host.returncode} at step {self.step}: {said}")
                 self._changed.clear()
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._changed.wait(), 0.5)
@@ -214,7 +215,7 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
     following = asyncio.create_task(watch.follow())
     try:
         for moment in moments:
-            await watch.until_step(int(moment), host)
+            await watch.until_step(int(moment), host, processes)
             await asyncio.sleep((moment % 1) * 0.1)  # a step takes about 0.1 s
             step, killed_s = watch.step, time.monotonic()
             host.kill()
@@ -224,13 +225,13 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
                     agent.kill()
                 stage.start_agents()
             host = stage.host(resume=True)
-            await watch.until_step(step + 1, host)
+            await watch.until_step(step + 1, host, processes)
             kills.append(
                 Kill(case.name, step, watch.asked_s - watch.card_s, watch.over_s - killed_s, equal=False, prompts=0)
             )
         code = await asyncio.to_thread(host.wait, PATIENCE_S)
         if code:
-            raise RuntimeError(f"the host ended with code {code}")
+            raise RuntimeError(f"the host ended with code {code}: {processes.last_words('host')}")
     finally:
         following.cancel()
         await asyncio.wait([following])

@@ -56,13 +56,14 @@ def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, U
 
 
 def newest_recording(path: Path) -> Path:
-    """Return the recording at a path, or the newest one in the directory of a run."""
+    """Return the recording at a path, or the newest one with a run card in the directory of a run."""
     if not path.is_dir():
         return path
     found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
     if not found:
         raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
-    return found[-1]
+    begun = (path for path in reversed(found) if Recording.open(path).run is not None)
+    return next(begun, found[-1])
 
 
 def free_recording(directory: Path) -> Path:

@@ -120,7 +120,8 @@ class Worker:
         self._pictures = PictureStore()
         self._card: Run | None = None
         self._last_result: int | None = None
-        self._newest: tuple[int, int] | None = None
+        self._newest: Observation | None = None
+        self._began_again = False
         self._last_reply: Reply | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
@@ -171,8 +172,8 @@ class Worker:
 
     async def _hear_run(self, links: Links) -> None:
         async for card in self._read(Run, links.runs):
-            if self._card is not None:  # the host began again under the same name: its steps count from 0 again
-                self._newest = self._last_result = None
+            if self._card is not None:  # the host began again under the same name: its steps may count from 0 again
+                self._began_again, self._last_result = True, None
             self._card = card
             self._end_if_over()
 
@@ -184,13 +185,20 @@ class Worker:
     async def _hear_observations(self, links: Links, group: asyncio.TaskGroup) -> None:
         async for observation in self._read(Observation, links.observations):
             at = (observation.episode, observation.step)
-            if self._newest is not None and at <= self._newest:
+            if not self._is_new(observation):
                 await self._repeat(at, links)
                 continue
-            self._newest = at
+            self._newest, self._began_again = observation, False
             self._supersede()
             self._deciding = group.create_task(self._answer(observation, links), name=f"answer {self._name} {at}")
         self._end("bus closed")
+
+    def _is_new(self, observation: Observation) -> bool:
+        """Return whether to decide; a host that goes on after it was killed asks for its open step word for word."""
+        newest = self._newest
+        if newest is None or self._began_again:
+            return observation != newest
+        return (observation.episode, observation.step) > (newest.episode, newest.step)
 
     async def _read(self, kind: type[M], samples: Subscription[Sample]) -> AsyncIterator[M]:
         """Yield the messages of this kind, without anything else that arrives."""

@@ -69,6 +69,7 @@ async def host(
             recorder = stack.enter_context(_recorder(config, config.record))
             for sample in past.kept() if past else ():
                 recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+            recorder.flush()
             bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
@@ -76,6 +77,7 @@ async def host(
         inbox = await stack.enter_async_context(AdviceInbox(bus, config.run, advisers))
         turn = await stack.enter_async_context(_turn(config, bus, roster, required, inbox))
         await announcer.run(card)
+        flush()  # a host that is killed before its first report can be resumed, too
         watch(card)
         await roster.assemble(required, config.assemble_s)
         gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms

@@ -18,6 +18,7 @@ from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
+from khala_protocol.keys import Topic
 from khala_protocol.messages import Advice, Message, Observation, Reply, Report
 from khala_protocol.recording.difference import Difference
 
@@ -99,8 +100,10 @@ class RecordedTurn:
         self._sides = len({report.side for report in recording.of(Report)} or {None})
         self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
         self._replies: dict[tuple[int, int, Seat], Reply] = {}
-        for reply in recording.of(Reply):
-            self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
+        for sample in recording:
+            reply = sample.message
+            if isinstance(reply, Reply) and sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):
+                self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
         self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
         for report in recording.of(Report):
             for agent in report.agents:
@@ -151,14 +154,16 @@ class RecordedTurn:
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
         sent = {(one.side, one.agent): encode(one).decode() for one in observations}
+        missing = dict(sent)
         for sample in step.samples:
             message = sample.message
-            if not isinstance(message, Observation):
-                continue
-            now, recorded = sent.pop((message.side, message.agent), ""), sample.payload.decode()
+            if not isinstance(message, Observation) or message.step != step.step:
+                continue  # a host that goes on after it was killed asks again what was open, maybe for some steps
+            now, recorded = sent.get((message.side, message.agent), ""), sample.payload.decode()
+            missing.pop((message.side, message.agent), None)
             if now != recorded:
                 self._differ(message.agent, step, recorded, now)
-        for (_, agent), now in sent.items():
+        for (_, agent), now in missing.items():
             self._differ(agent, step, "", now)
 
     def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:

@@ -184,6 +184,30 @@ async def test_a_host_that_begins_anew_is_answered_from_step_0_again(
     assert [reply.step for reply in host.of(Reply)] == [0, 0]
 
 
+async def test_a_host_that_goes_on_gets_the_reply_to_its_open_step_again_without_a_new_decision(
+    host: Any,
+    players: Players,
+    card: Callable[..., Run],
+    briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
+) -> None:
+    decided: list[int] = []
+
+    async def decide(briefing: Briefing, observation: Observation) -> str:
+        decided.append(observation.step)
+        return ATTACK
+
+    await players.start(FunctionPolicy(decide))
+    for steps in ((4, 5), (5, 6)):
+        await host.say(card())
+        await host.say(briefing())
+        for step in steps:
+            await host.say(observation(step=step))
+            await asyncio.sleep(0.1)
+    assert decided == [4, 5, 6]
+    assert [reply.step for reply in host.of(Reply)] == [4, 5, 5, 6]
+
+
 async def test_what_is_no_observation_is_dropped_and_the_next_one_answered(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation],
     caplog: pytest.LogCaptureFixture,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
-    from khala_protocol.messages import Result
+    from khala_protocol.messages import Result, Wire
     from tests.orchestrator.conftest import Hall, Peer, StillGame
 
     MakeConfig = Callable[..., MatchConfig]
@@ -79,6 +80,49 @@ async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
         assert [report.step for report in Recording.open(path).of(Report)] == [0, 1, 2, 3, 4] * 2
 
 
+async def test_a_host_that_is_killed_before_its_first_report_can_be_resumed(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    path = tmp_path / "whole.mcap"
+    left: list[tuple[int, int]] = []
+
+    def look(message: Wire) -> None:
+        if isinstance(message, Run):  # what a host leaves that is killed now
+            past = unfinished(Recording.open(path))
+            left.append((past.episode, past.steps))
+
+    await hall.play(config(game=GAME, max_steps=4, record=path), Stalkers=stalkers, watch=look)
+    past = unfinished(killed_after(path, 3, tmp_path / "killed.mcap"))
+    path = tmp_path / "resumed.mcap"
+
+    async def played(*arguments: Any, **options: Any) -> list[Result]:
+        return await host(*arguments, **options, past=past)
+
+    await hall.play(past.config.model_copy(update={"record": path}), by=played, Stalkers=stalkers, watch=look)
+    assert left == [(0, 0), (0, 3)]
+
+
+async def test_a_match_that_was_resumed_with_open_questions_is_resumed_once_more(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    async def slow(peer: Peer, seen: Observation) -> None:
+        await asyncio.sleep(0.1)  # for three steps of the game
+        await peer.answer(seen)
+
+    path = tmp_path / "0.mcap"
+    match = config(game=GAME, max_steps=12, rule="realtime", speed=10.0, step_loops=8)
+    await hall.play(match.model_copy(update={"record": path}), Stalkers=slow)
+    for reports in (4, 5, 7):
+        past = unfinished(killed_after(path, reports, tmp_path / f"killed-{reports}.mcap"))
+        path = tmp_path / f"{reports}.mcap"
+
+        async def played(*arguments: Any, past: Any = past, **options: Any) -> list[Result]:
+            return await host(*arguments, **options, past=past)
+
+        await hall.play(past.config.model_copy(update={"record": path}), by=played, Stalkers=slow)
+    assert [report.step for report in Recording.open(path).of(Report)] == [*range(12)]
+
+
 async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:
     async def played(*arguments: Any, **options: Any) -> list[Result]:
         return await host(*arguments, **options, past=past)
@@ -103,6 +147,25 @@ async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
     assert [report.incidents for report in steps] == [(), (), (RESUMED,), ()]
     topics = [sample.key.rsplit("/", 1)[1] async for sample in heard]
     assert topics == ["briefing", "observation", "reply", "observation", "reply"]
+
+
+async def test_a_reply_under_the_key_of_another_agent_is_not_taken_for_one_of_its_own(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    async def forge(peer: Peer, seen: Observation) -> None:
+        await peer.answer(seen, ATTACK.format("forged"), agent="Stalkers")  # from Zealots, under their key
+        await peer.answer(seen)
+
+    async def later(peer: Peer, seen: Observation) -> None:
+        await asyncio.sleep(0.1)
+        await stalkers(peer, seen)
+
+    whole = tmp_path / "whole.mcap"
+    match = config(game=GAME, max_steps=4, record=whole)
+    await hall.play(match, Stalkers=later, Zealots=forge)
+    past = unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
+    await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
+    assert digest(Recording.open(tmp_path / "resumed.mcap")) == digest(Recording.open(whole))
 
 
 async def test_a_game_that_goes_another_way_is_found_out(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:
