@@ -1,6 +1,6 @@
-"""How long a match takes from its order to its first observation, with and without a worker that waits, and many at once.
+"""How long a match takes from its order to its first observation, cold and warm, and how many steps several make at once.
 
-    python -m bench serve [--orders 5] [--matches 4]
+python -m bench serve [--orders 5] [--matches 4]
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from typing import TYPE_CHECKING
 
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
@@ -13,16 +14,19 @@ from khala.service import logs
 from khala.service.book import Book
 from khala.service.metrics import Metrics
 from khala.service.traces import KEPT, Traces
-from khala_protocol.messages import AgentReport, ModelCall, Rejection, Report, Timings, Usage
+from khala_protocol.messages import AgentReport, AgentStatus, ModelCall, Rejection, Report, Timings, Usage
+
+if TYPE_CHECKING:
+    from opentelemetry.sdk.trace import ReadableSpan
 
 USAGE = Usage(requests=1, prompt_tokens=100, completion_tokens=7, cost_usd=0.5)
 
 
-def report(step: int = 3, status: str = "ok") -> Report:
+def report(step: int = 3, status: AgentStatus = "ok") -> Report:
     rejection = Rejection(reason="dead_target", message="it is dead", text="<x>", start=0)
     agent = AgentReport(
         agent="Stalkers", side="blue", status=status, latency_s=1.0, rejections=(rejection,), usage=USAGE
-    )  # type: ignore[arg-type]  # a status, as text
+    )
     timings = Timings(observe_s=0.1, publish_s=0.1, wait_s=1.0, act_s=0.1, game_s=0.2)
     return Report(run="first", episode=0, step=step, game_loop=9, agents=(agent,), timings=timings)
 
@@ -71,9 +75,9 @@ def test_a_step_has_a_span_with_its_agents_and_their_model_calls() -> None:
     assert seconds(step) == 1.5
     assert seconds(agent) == 1.0
     assert seconds(well) == 0.5
-    assert well.start_time - agent.start_time == 250_000_000
-    assert step.start_time <= agent.start_time
-    assert agent.end_time <= step.end_time
+    assert times(well)[0] - times(agent)[0] == 250_000_000
+    (step_begins, step_ends), (agent_begins, agent_ends) = times(step), times(agent)
+    assert step_begins <= agent_begins <= agent_ends <= step_ends
     assert dict(step.attributes or {})["khala.step"] == 3
 
 
@@ -101,5 +105,12 @@ def test_a_log_line_is_json_with_run_agent_and_step() -> None:
     assert "ValueError: broken" in said["error"]
 
 
-def seconds(span: object) -> float:
-    return (span.end_time - span.start_time) / 1e9  # type: ignore[attr-defined,no-any-return]  # of a finished span
+def times(span: ReadableSpan) -> tuple[int, int]:
+    assert span.start_time is not None
+    assert span.end_time is not None
+    return span.start_time, span.end_time
+
+
+def seconds(span: ReadableSpan) -> float:
+    begins, ends = times(span)
+    return (ends - begins) / 1e9

@@ -195,9 +195,10 @@ async def test_a_match_is_stopped_while_it_waits_and_while_it_plays(stage: Stage
     for run in ("first", "second", "third"):
         await stage.submit(run)
     await stage.report("first", 4)
-    for run in ("third", "first"):
-        card = await client.stop(stage.bus, Stop(run=run, number=client.new_number()))
-        assert card.state == "stopped"
+    waiting = await client.stop(stage.bus, Stop(run="third", number=client.new_number()))
+    assert (waiting.state, waiting.reason) == ("stopped", "stopped by an order")
+    card = await client.stop(stage.bus, Stop(run="first", number=client.new_number()))
+    assert card.state == "stopped"
     assert card.reason.startswith("stopped by an order; `khala run --resume ")
     with pytest.raises(ConfigError, match="the service has no match 'fourth'; its newest are first, second, third"):
         await client.stop(stage.bus, Stop(run="fourth", number=client.new_number()))
