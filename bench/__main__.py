@@ -12,7 +12,8 @@ from pathlib import Path
 
 MEASUREMENTS = (
     "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "act",
-    "recognition", "macro", "image", "http_client", "recording", "orphans", "serve", "strangers",
+    "recognition", "macro", "image", "http_client", "recording", "orphans", "strangers", "clocks",
+    "pace", "serve",
 )  # fmt: skip
 
 

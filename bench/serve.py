@@ -1,4 +1,4 @@
-"""How long a match takes from its order to its first observation, cold and warm, and how many steps several make at once.
+"""How long a match takes from its order to its first observation, cold and warm, and how fast several are at once.
 
 python -m bench serve [--orders 5] [--matches 4]
 """
@@ -17,8 +17,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.local import Minds
 from khala.matches import new
+from khala.minds import Minds
 from khala.service import client
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig

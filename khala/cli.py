@@ -5,7 +5,7 @@ import json
 import logging
 import signal
 import sys
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,6 +36,7 @@ from khala.options import (
     Latency,
     MaxSteps,
     MaxWait,
+    Mind,
     Model,
     ModelName,
     Out,
@@ -57,6 +58,7 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.commandline import run_command
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
+from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
@@ -84,7 +86,13 @@ Examples:\n
     khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
     khala run my_task.yaml --policy my_agent:decide --json\n
     khala run 2s3z_pair --clock realtime --speed 2\n
+    khala run simple64_duel --blue openai --red anthropic\n
     khala run --resume runs/2s3z-20260101-120000-ab12
+"""
+ADVISE_EPILOG = """
+Examples:\n
+    khala advise first\n
+    khala advise first --agent Stalkers --name Coach --connect tls/10.0.0.5:7447 --tls keys
 """
 HOST_EPILOG = """
 Examples:\n
@@ -103,6 +111,12 @@ def run(
     base_url: BaseUrl = None,
     policy: PolicyName = None,
     fallback: Fallback = None,
+    blue: Mind = None,
+    red: Mind = None,
+    side_model: Annotated[
+        list[str] | None,
+        typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
+    ] = None,
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     game: Game = "simulator",
@@ -127,15 +141,18 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.local import Minds, play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+    from khala.local import play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
     from khala.matches import new_or_resumed  # noqa: PLC0415
+    from khala.minds import Minds, minds_of, named_sides  # noqa: PLC0415
 
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
-    minds = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
+    common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
+    named = named_sides(side_model or ()) | {side: text for side, text in (("blue", blue), ("red", red)) if text}
+    minds = minds_of([side.side for side in config.task.per_side()], common, named)
     _until_interrupted(
         config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
     )
@@ -187,6 +204,38 @@ def host(
     )
 
 
+def advise(
+    run: Annotated[str, typer.Argument(help="Name of the run; the host prints it.")],
+    *,
+    agent: Annotated[
+        str | None, typer.Option(help="Write to this agent.", show_default="to all of the side", metavar="NAME")
+    ] = None,
+    name: Annotated[str, typer.Option(help="Who writes: an adviser that the task names.")] = "Adviser",
+    side: Annotated[str, typer.Option(help="Side whose agents are advised.")] = "blue",
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Endpoint of the router.",
+            show_default="the newest `khala run` of this machine, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
+        ),
+    ] = None,
+    tls: Tls = None,
+    insecure: Insecure = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print messages of the host as JSON, one a line.")] = False,
+) -> None:
+    """Read the reports of a running match, and write to its agents.
+
+    Each line of stdin is a message, which agents read in their next observation; `@Stalkers fall back` is for one of
+    them. The recording marks it as human, and the result counts it.
+    """
+    from khala.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
+    from khala_orchestrator.mailbox import EVERYONE  # noqa: PLC0415
+
+    names = {what: check_name(value, what) for what, value in (("run", run), ("side", side), ("name", name))}
+    adviser = Adviser(**names, recipient=agent or EVERYONE)
+    run_advise(adviser, connect=connect or (), tls=tls, insecure=insecure, as_json=as_json)
+
+
 def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
     """Look at this machine as a match would, and say what to do."""
     from khala.doctor import examine  # noqa: PLC0415
@@ -229,6 +278,7 @@ def front_door(
 for command, epilog in (
     (run, RUN_EPILOG),
     (host, HOST_EPILOG),
+    (advise, ADVISE_EPILOG),
     (khala_agents.cli.agent, khala_agents.cli.AGENT_EPILOG),
     (khala_agents.cli.llm, khala_agents.cli.LLM_EPILOG),
     (khala_orchestrator.cli.router, khala_orchestrator.cli.ROUTER_EPILOG),
@@ -278,6 +328,17 @@ def _until_interrupted(
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    if reasons := dict.fromkeys(result.invalid_because for result in results if not result.valid):
+    if reasons := list(_why_not_valid(results)):
         screen.print(f"[bold red]not valid:[/] {escape('; '.join(reasons))}", soft_wrap=True)
         raise typer.Exit(NOT_VALID)
+
+
+def _why_not_valid(results: Sequence[Result]) -> Iterator[str]:
+    """Yield each reason once, after the name of the side if it is not every side's."""
+    sides: dict[str, list[str]] = {}
+    for result in results:
+        if not result.valid and result.side not in sides.setdefault(result.invalid_because, []):
+            sides[result.invalid_because].append(result.side)
+    every = {result.side for result in results}
+    for reason, those in sides.items():
+        yield reason if every == set(those) else f"{', '.join(those)}: {reason}"

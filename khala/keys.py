@@ -15,6 +15,7 @@ INIT_EPILOG = """
 Examples:\n
     khala keys init keys --host 10.0.0.5 --host router.example.org\n
     khala keys agent Stalkers keys\n
+    khala keys adviser Coach keys\n
     khala keys show keys
 """
 
@@ -65,6 +66,20 @@ def agent(
     from khala_protocol.certificates import certify_agent  # noqa: PLC0415
 
     _made(certify_agent(directory, side, name, days=days))
+
+
+@app.command()
+def adviser(
+    name: Annotated[str, typer.Argument(help="The adviser, as the task file names it.")],
+    directory: Directory,
+    *,
+    side: Annotated[str, typer.Option(help="Side whose agents it advises, as the task file names it.")] = "blue",
+    days: Days = 365,
+) -> None:
+    """Make a certificate for one adviser, who may read reports and write to agents; see `khala advise`."""
+    from khala_protocol.certificates import certify_adviser  # noqa: PLC0415
+
+    _made(certify_adviser(directory, side, name, days=days))
 
 
 @app.command()

@@ -8,73 +8,34 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from khala import environment, games
+from khala import games
 from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
-from khala_agents.build import Workshop
-from khala_agents.config import WorkerSpec, load_model
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import Report
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Sequence
+    from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
+    from khala.minds import Minds
     from khala_bridge.game.pysc2_game import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
     from khala_protocol.messages import Result, Wire
 
-SCRIPTED = "scripted"
-"""The model whose endpoint is started along with a match."""
 MAX_PROCESSES = 4
-"""Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB."""
-
-
-@dataclass(frozen=True, slots=True)
-class Minds:
-    """How the agents of a local match decide; see `khala agent --help`."""
-
-    model: str = SCRIPTED
-    model_name: str | None = None
-    base_url: str | None = None
-    policy: str | None = None
-    budget_usd: float | None = None
-    latency_s: float = 0.0
-    """Latency of the scripted endpoint, if it is started."""
-    fallback: str | None = None
-    """Policy that decides where the model has no reply."""
-
-    def check(self) -> None:
-        """Check that an agent could decide this way, before anything is started.
-
-        Raises:
-            ConfigError: a model file, a key or a policy is missing or wrong.
-        """
-        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
-        overrides = {"model": self.model_name, "base_url": self.base_url}
-        Workshop(budget_usd=self.budget_usd, overrides=overrides).policy(spec)
-
-    @property
-    def environ(self) -> dict[str, str]:
-        """The environment of the agents: all of ours for a policy, which is code of the user, but no keys of a bus."""
-        ours = {name: value for name, value in os.environ.items() if name != "KHALA_TLS"}
-        return ours if self.policy else environment.with_model(load_model(self.model))
-
-    @property
-    def needs_endpoint(self) -> bool:
-        """Whether the scripted endpoint is needed."""
-        return self.policy is None and self.base_url is None and self.model == SCRIPTED
+"""Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB. Agents
+of two sides never share one, and each side gets half of the processes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +52,7 @@ class Supplies:
 
 async def play(
     config: MatchConfig,
-    minds: Minds,
+    minds: Mapping[str, Minds],
     directory: Path,
     *,
     game: str,
@@ -103,7 +64,7 @@ async def play(
 
     Args:
         config: the match to play.
-        minds: how its agents decide.
+        minds: by side, how its agents decide.
         directory: is created, and gets the logs of the processes.
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
@@ -113,7 +74,8 @@ async def play(
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
-    minds.check()
+    for mind in minds.values():
+        mind.check()
     supplies = supplies or Supplies()
     config, sc2path = _prepared(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
@@ -163,6 +125,7 @@ class _Share:
     """The agents of one process, and what they may still spend, also after the process was started again."""
 
     process: str
+    side: str
     names: list[str]
     options: list[str]
     left_usd: float | None
@@ -171,30 +134,39 @@ class _Share:
     def arguments(self) -> list[str]:
         """The command line of the process."""
         budget = [] if self.left_usd is None else ["--budget-usd", str(max(self.left_usd, 0.0))]
-        return ["agent", *self.names, *self.options, *budget]
+        return ["agent", *self.names, "--side", self.side, *self.options, *budget]
 
     def spend(self, report: Report) -> None:
         """Take off what a step has cost."""
-        if self.left_usd is not None:
+        if self.left_usd is not None and report.side == self.side:
             self.left_usd -= sum(a.usage.cost_usd or 0.0 for a in report.agents if a.agent in self.names)
 
 
-async def _start_agents(children: Children, config: MatchConfig, minds: Minds, bus: ZenohBus) -> list[_Share]:
-    base_url = await start_endpoint(children, minds.latency_s) if minds.needs_endpoint else minds.base_url
-    options = ["--run", config.run, "--side", config.task.side, "--connect", bus.endpoints[0]]
-    options += ["--policy", minds.policy] if minds.policy else ["--model", minds.model]
-    for option, value in (
-        ("--base-url", base_url),
-        ("--model-name", minds.model_name),
-        ("--fallback", minds.fallback),
-    ):
-        options += [option, value] if value and not minds.policy else []
-    groups = shares([agent.name for agent in config.task.agents])
-    each_usd = None if minds.budget_usd is None else minds.budget_usd / len(groups)
-    started = [_Share(f"agents-{number}", names, options, each_usd) for number, names in enumerate(groups)]
-    for share in started:
-        await children.start(share.process, *share.arguments, environ=minds.environ)
+async def _start_agents(
+    children: Children, config: MatchConfig, minds: Mapping[str, Minds], bus: ZenohBus
+) -> list[_Share]:
+    scripted = [mind.latency_s for mind in minds.values() if mind.needs_endpoint]
+    base_url = await start_endpoint(children, scripted[0]) if scripted else None
+    joined = ["--run", config.run, "--connect", bus.endpoints[0]]
+    sides = config.task.per_side()
+    started = []
+    for task in sides:
+        names, mind = [agent.name for agent in task.agents], minds[task.side]
+        options = [*joined, *mind.options(base_url)]
+        for share in _shares_of(task.side, names, options, mind.budget_usd, sides=len(sides)):
+            await children.start(share.process, *share.arguments, environ=mind.environ)
+            started.append(share)
     return started
+
+
+def _shares_of(
+    side: str, names: Sequence[str], options: list[str], budget_usd: float | None, *, sides: int
+) -> Iterator[_Share]:
+    groups = shares(names, MAX_PROCESSES // sides)
+    each_usd = None if budget_usd is None else budget_usd / len(groups)
+    for number, group in enumerate(groups):
+        process = f"agents-{number}" if sides == 1 else f"agents-{side}-{number}"
+        yield _Share(process, side, group, options, each_usd)
 
 
 async def start_endpoint(children: Children, latency_s: float) -> str:

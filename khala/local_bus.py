@@ -35,12 +35,24 @@ def local_endpoint() -> Iterator[str]:
         yield f"unixsock-stream/{path}" if len(os.fsencode(path)) <= LONGEST_PATH_BYTES else LOOPBACK
 
 
+def running() -> list[str]:
+    """Return the endpoints of our matches on this machine that are being played, the newest first."""
+    found = [path / SOCKET for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*") if _is_ours(path)]
+    alive = [path for path in found if path.exists() and not _is_dead(path)]
+    return [f"unixsock-stream/{path}" for path in sorted(alive, key=lambda path: -path.stat().st_mtime)]
+
+
 def remove_forgotten() -> None:
     """Remove the directories of our matches that were killed: nobody listens on their sockets."""
     for directory in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):
-            if directory.stat(follow_symlinks=False).st_uid == os.getuid() and _is_dead(directory / SOCKET):
-                shutil.rmtree(directory, ignore_errors=True)
+        if _is_ours(directory) and _is_dead(directory / SOCKET):
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+def _is_ours(directory: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return directory.stat(follow_symlinks=False).st_uid == os.getuid()
+    return False
 
 
 def _is_dead(path: Path) -> bool:

@@ -79,5 +79,15 @@ Fallback = Annotated[
         metavar="NAME",
     ),
 ]
-BudgetUsd = Annotated[float | None, typer.Option(min=0, help="Limit of all agents together in US dollars.")]
+Mind = Annotated[
+    str | None,
+    typer.Option(
+        help="Model of this side instead of --model, in a match of two: openai, scripted/skilled, a file, a policy.",
+        metavar="MODEL",
+    ),
+]
+BudgetUsd = Annotated[
+    float | None,
+    typer.Option(min=0, help="Limit of all agents together in US dollars; two sides may spend half of it each."),
+]
 Latency = Annotated[float, typer.Option(min=0, help="Seconds that the scripted model takes to answer.")]

@@ -45,10 +45,15 @@ async def replay_agents(path: Path | str, policies: Mapping[str, object] | None 
 
     Args:
         path: a recording.
-        policies: by agent, a policy or what `khala_agents.policy.as_policy` accepts; other agents decide with their
-            recorded completions.
+        policies: by agent (`red/Captain`, if both sides have one of this name), a policy or what
+            `khala_agents.policy.as_policy` accepts; other agents decide with their recorded completions.
     """
     recording = Recording.open(path)
-    agents = [card.name for card in recording.run.agents] if recording.run else []
+    cards = recording.run.agents if recording.run else ()
     given = {name: as_policy(policy) for name, policy in (policies or {}).items()}
-    return [difference for name in agents for difference in await replay_agent(recording, name, given.get(name))]
+    agents = [(f"{card.side}/{card.name}", card.name) for card in cards]
+    return [
+        difference
+        for whole, name in agents
+        for difference in await replay_agent(recording, whole, given.get(whole) or given.get(name))
+    ]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_protocol.messages import ChatMessage
+from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -99,19 +99,21 @@ def _rules(briefing: Briefing) -> str:
 
 
 def _clock(clock: Clock) -> str:
-    seconds = f"{clock.step_loops / 22.4:.2g} s of game time pass between two observations"
+    between_s, thinking_s = clock.step_loops / LOOPS_PER_S, clock.thinking_loops / LOOPS_PER_S
     answer = (
         "" if clock.max_wait_s is None else f" Answer within {clock.max_wait_s:g} s, or your teams go on as before."
     )
     match clock.rule:
         case "frozen":
-            return f"The game stands still while you think; {seconds}.{answer}"
+            between = f"{between_s:.2g} s of game time pass between two observations"
+            return f"The game stands still while you think; {between}.{answer}"
         case "budget":
-            return f"Each decision costs the same game time however long you think; {seconds}.{answer}"
+            later = f"your actions are carried out {thinking_s:.2g} s of game time after what you see"
+            return f"Each decision costs the same game time however long you think: {later}.{answer}"
         case "token":
             return f"The more you write, the more game time passes before your actions are carried out.{answer}"
         case "realtime":
-            return f"The game goes on while you think: be brief.{answer}"
+            return f"The game goes on while you think, and your actions meet what is there then: be brief.{answer}"
 
 
 def _actions(actions: Iterable[ActionSpec]) -> str:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from khala_agents.policy import Policy
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
-    from khala_protocol.messages import Run
+    from khala_protocol.messages import AgentCard, Run
     from khala_protocol.recording import Recording
 
 PATIENCE_S = 30.0
@@ -37,7 +37,7 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
 
     Args:
         recording: of a run.
-        agent: its name.
+        agent: its name, or that of its side before it (`red/Captain`), if both sides have an agent of this name.
         policy: decides; by default the language model policy with the recorded completions.
 
     Returns:
@@ -47,23 +47,23 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
         RecordingError: the recording has no such agent, or none of its requests and no policy is given.
     """
     run = recording.run
-    card = next((card for card in run.agents if card.name == agent), None) if run else None
+    card = next((one for one in run.agents if agent in {one.name, f"{one.side}/{one.name}"}), None) if run else None
     if run is None or card is None:
         raise RecordingError(f"{recording.path} has no agent {agent}")
     if policy is None:
-        policies = replay_policies(recording.of(ModelCall, agent=agent))
-        if agent not in policies:
+        policies = replay_policies(recording.of(ModelCall, agent=card.name, side=card.side))
+        if card.name not in policies:
             raise RecordingError(
                 f"{recording.path} has no requests of {agent} to a model: give the policy it played with"
             )
-        policy = policies[agent]
+        policy = policies[card.name]
     broker = MemoryBroker()
     bus = broker.session()
-    stage = await _Stage.set(bus, run, card.side, agent)
+    stage = await _Stage.set(bus, run, card.side, card.name)
     stop = asyncio.Event()
-    worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, agent, policy, stop=stop))
+    worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, card.name, policy, stop=stop))
     try:
-        return [difference async for difference in stage.play(_script(recording, agent))]
+        return [difference async for difference in stage.play(_script(recording, card))]
     finally:
         stop.set()
         await worker
@@ -87,18 +87,21 @@ class _Image(NamedTuple):
 _Part = Briefing | _Image | _Scene
 
 
-def _script(recording: Recording, agent: str) -> Iterator[_Part]:
+def _script(recording: Recording, card: AgentCard) -> Iterator[_Part]:
     """Return briefings, pictures, and the observations that were answered, in their order."""
-    replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, agent=agent)))}
+    whose = {"agent": card.name, "side": card.side}
+    replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, **whose)))}
     for sample in recording:
         address = sample.address
-        if address is not None and address.topic is Topic.IMAGE and address.agent == agent:
+        if address is None or (address.side, address.agent) != (card.side, card.name):
+            continue
+        if address.topic is Topic.IMAGE:
             yield _Image(int(address.instance or 0), sample.payload)
             continue
         match sample.message:
-            case Briefing(agent=name) as briefing if name == agent:
+            case Briefing() as briefing:
                 yield briefing
-            case Observation(agent=name) as seen if name == agent and (seen.episode, seen.step) in replies:
+            case Observation() as seen if (seen.episode, seen.step) in replies:
                 yield _Scene(seen, replies[seen.episode, seen.step])
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from khala_protocol.service import MAX_WORDS, OPEN, MatchCard, Matches
 
 if TYPE_CHECKING:
-    from khala.local import Minds
+    from khala.minds import Minds
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report, Result
     from khala_protocol.service import MatchState, Submit

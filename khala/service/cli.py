@@ -219,8 +219,8 @@ def submit(
 
     Options are those of `khala run`; keys, policies and model files are those of the service's machine.
     """
-    from khala.local import Minds  # noqa: PLC0415  # as above
     from khala.matches import new  # noqa: PLC0415
+    from khala.minds import Minds  # noqa: PLC0415  # as above
     from khala.service import client  # noqa: PLC0415
 
     config = new(

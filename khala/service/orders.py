@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from khala.local import Minds
 from khala.matches import free_recording
+from khala.minds import Minds
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.replay import modules_of

@@ -16,8 +16,9 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from khala import environment, games
-from khala.local import Minds, Supplies, play
+from khala.local import Supplies, play
 from khala.matches import resumed
+from khala.minds import Minds, minds_of
 from khala.service import logs
 from khala.service.spare import Spares
 from khala_bridge.game.pysc2_game import Launched
@@ -99,7 +100,8 @@ async def _play(job: Job, game: str, stock: Spares, launched: Launched) -> dict[
     config, past = job.match()
     logs.here["run"] = config.run
     supplies = Supplies(bus=job.bus, spawn=stock, launched=launched)
-    results = await play(config, job.minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
+    minds = minds_of([side.side for side in config.task.per_side()], job.minds, {})
+    results = await play(config, minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
     invalid = dict.fromkeys(result.invalid_because for result in results if not result.valid)
     return {"done": "; ".join(invalid)}
 

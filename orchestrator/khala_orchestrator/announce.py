@@ -25,10 +25,11 @@ _DELIVERY = {Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT
 class Announcer:
     """The host's publishers. An asynchronous context manager."""
 
-    def __init__(self, bus: Bus, run: str, seats: Iterable[Seat]) -> None:
+    def __init__(self, bus: Bus, run: str, seats: Iterable[Seat], advisers: Iterable[Seat] = ()) -> None:
         self._bus = bus
         self._run = run
         self._seats = tuple(seats)
+        self._advisers = tuple(advisers)
         self._topics: dict[Topic, Publisher] = {}
         self._briefings: dict[Seat, Publisher] = {}
         self._messages: dict[Seat, Publisher] = {}
@@ -39,6 +40,7 @@ class Announcer:
         for seat in self._seats:
             key = agent_key(self._run, seat.side, seat.agent, Topic.BRIEFING)
             self._briefings[seat] = await self._bus.publisher(key, Delivery.STATE)
+        for seat in (*self._seats, *self._advisers):
             key = agent_key(self._run, seat.side, seat.agent, Topic.MESSAGE)
             self._messages[seat] = await self._bus.publisher(key, Delivery.LOG)
         return self
@@ -58,7 +60,7 @@ class Announcer:
         await self._briefings[Seat(briefing.side, briefing.agent)].put(encode(briefing))
 
     async def message(self, message: Message) -> None:
-        """Publish a message from one agent to another or to a channel, under the name of the sender."""
+        """Publish a message to an agent or to a channel, under the name of the sender."""
         await self._messages[Seat(message.side, message.agent)].put(encode(message))
 
     async def report(self, report: Report) -> None:

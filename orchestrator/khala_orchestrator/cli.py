@@ -17,7 +17,7 @@ from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.config import all_tasks, load_task
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import stop_on_signal
 
@@ -56,6 +56,7 @@ Examples:\n
     khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
     khala replay recording.mcap --agent Stalkers --steps 10-20 --text\n
     khala replay recording.mcap --steps 7 --images pictures\n
+    khala replay recording.mcap --pace\n
     khala replay torn.mcap --recover whole.mcap
 """
 
@@ -103,11 +104,13 @@ def router(
 
 
 def access_rules(tasks: Sequence[TaskConfig], run: str | None) -> dict[str, Any]:
-    """Return the settings of a router that the agents of these tasks may join."""
+    """Return the settings of a router that the agents and advisers of these tasks may join."""
     from khala_protocol.access import router_settings  # noqa: PLC0415  # 60 ms, which links without TLS do without
 
-    sides = (side for task in tasks for side in task.per_side())
-    return router_settings({(side.side, agent.name) for side in sides for agent in side.agents}, run)
+    sides = [side for task in tasks for side in task.per_side()]
+    agents = {(side.side, agent.name) for side in sides for agent in side.agents}
+    advisers = {(side.side, adviser.name) for side in sides for adviser in side.advisers}
+    return router_settings(agents, run, advisers=advisers)
 
 
 def tasks(*, as_json: Json = False) -> None:
@@ -143,7 +146,9 @@ def people(names: Sequence[str]) -> str:
 def replay(
     file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
     *,
-    agent: Annotated[str | None, typer.Option(help="Only what this agent saw, said and did.")] = None,
+    agent: Annotated[
+        str | None, typer.Option(help="Only what this agent saw, said and did; red/NAME is the one of side red.")
+    ] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
     text: Annotated[bool, typer.Option("--text", help="Show observations and replies word for word.")] = False,
     images: Annotated[
@@ -155,6 +160,9 @@ def replay(
             "--recover", help="Write what can be read into this new recording, as a whole one.", metavar="NEW"
         ),
     ] = None,
+    pace: Annotated[
+        bool, typer.Option("--pace", help="Print how fast the models were, as `pace` of their model files.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Show what was said and done in a recorded run."""
@@ -180,12 +188,28 @@ def replay(
         data = {"pictures": [str(path) for path in saved]}
         _out(data, f"{len(saved)} pictures are in {images}", as_json=as_json)
         return
+    if pace:
+        _paces(recording, as_json=as_json)
+        return
     if as_json:
         typer.echo(json.dumps(summary(file, selection) | {"complete": recording.complete}))
         return
     console = stdout_console()
     for part in transcript(file, selection, whole=text):
         console.print(part, soft_wrap=isinstance(part, Text))
+
+
+def _paces(recording: "Recording", *, as_json: bool) -> None:
+    from khala_orchestrator.measured_pace import measured_paces, yaml  # noqa: PLC0415  # numpy is not for --help
+    from khala_protocol.messages import ModelCall  # noqa: PLC0415
+
+    found = list(measured_paces(recording.of(ModelCall)))
+    if not found:
+        raise RecordingError(f"{recording.path} has no answer of a model: a pace is measured from answers")
+    if as_json:
+        typer.echo(json.dumps({"paces": [one._asdict() | {"pace": one.pace.model_dump()} for one in found]}))
+        return
+    typer.echo("\n".join(map(yaml, found)), nl=False)
 
 
 async def _probe(config: BusConfig) -> list[str]:

@@ -15,6 +15,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from khala_orchestrator.roster import Seat
 from khala_protocol.messages import LOOPS_PER_S, Frozen, Report, Result, Run, Usage, Wire
 from khala_protocol.visible import visible, visible_line
 
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import TracebackType
 
-    from khala_protocol.messages import AgentReport
+    from khala_protocol.messages import AgentReport, Clock
 
 STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "malformed": "red"}
-OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red"}
-
+OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
+SIDE = {"blue": "bold blue", "red": "bold red"}
+"""Sides of other names are all of one colour."""
 
 M = TypeVar("M", bound=Frozen)
 
@@ -48,9 +50,10 @@ class Progress:
         self._screen = screen
         self._max_steps = max_steps
         self._run: Run | None = None
-        self._report: Report | None = None
-        self._counts: dict[str, Counter[str]] = {}
-        self._usage: dict[str, Usage] = {}
+        self._reports: dict[str, Report] = {}
+        """By side, its newest one."""
+        self._counts: dict[Seat, Counter[str]] = {}
+        self._usage: dict[Seat, Usage] = {}
         self._live = Live(console=screen, refresh_per_second=8, transient=True)
 
     def __enter__(self) -> Self:
@@ -73,37 +76,45 @@ class Progress:
             case Report():
                 self._add(message)
             case Result():
-                self._screen.print(table(message))
-        if self._screen.is_terminal and self._report is not None:
-            self._live.update(self._picture(self._report))
-        elif isinstance(message, Report) and message.step % 20 == 0:
+                self._screen.print(table(message, named=two_sides(self._run)))
+        if self._screen.is_terminal and self._reports:
+            self._live.update(self._picture())
+        elif isinstance(message, Report) and message.step % 20 == 0 and message.side == next(iter(self._reports)):
             self._screen.print(f"step {message.step}, {clock(message.game_loop)}")
 
     def _add(self, report: Report) -> None:
-        self._report = report
+        self._reports[report.side] = report
         for agent in report.agents:
-            counts = self._counts.setdefault(agent.agent, Counter())
+            seat = Seat(agent.side, agent.agent)
+            counts = self._counts.setdefault(seat, Counter())
             counts[agent.status] += 1
             counts["accepted"] += len(agent.accepted)
             counts["rejected"] += len(agent.rejections)
-            self._usage[agent.agent] = self._usage.get(agent.agent, Usage()) + agent.usage
+            self._usage[seat] = self._usage.get(seat, Usage()) + agent.usage
 
-    def _picture(self, report: Report) -> Panel:
+    def _picture(self) -> Panel:
         rows = Table(box=None, expand=True, pad_edge=False)
         for name in ("agent", "status", "latency", "accepted", "rejected", "tokens"):
             rows.add_column(name, no_wrap=True)
         rows.add_column("last action", style="dim", no_wrap=True, overflow="ellipsis", ratio=1)
-        for agent in report.agents:
+        for agent in (agent for report in self._reports.values() for agent in report.agents):
             rows.add_row(*self._row(agent))
+        newest = max(self._reports.values(), key=lambda report: (report.episode, report.step))
         steps = f" of {self._max_steps}" if self._max_steps else ""
-        line = f"step {report.step}{steps}   game {clock(report.game_loop)}   score {report.score:g}"
+        line = Text(f"step {newest.step}{steps}   game {clock(newest.game_loop)}   score ")
+        line.append_text(Text(", ").join(self._score(report) for report in self._reports.values()))
         title = f"{self._run.task} · {self._run.run}" if self._run else ""
-        return Panel(Group(Text(line), rows), title=Text(title), border_style="blue")
+        return Panel(Group(line, rows), title=Text(title), border_style="blue")
+
+    def _score(self, report: Report) -> Text:
+        score = f"{report.score:g}"
+        return Text.assemble(side(report.side), f" {score}") if two_sides(self._run) else Text(score)
 
     def _row(self, agent: AgentReport) -> tuple[str | Text, ...]:
-        counts, usage = self._counts[agent.agent], self._usage[agent.agent]
+        seat = Seat(agent.side, agent.agent)
+        counts, usage = self._counts[seat], self._usage[seat]
         return (
-            agent.agent,
+            speaker(seat, named=two_sides(self._run)),
             Text(agent.status, STATUS[agent.status]),
             "" if agent.latency_s is None else f"{agent.latency_s:.2f} s",
             str(counts["accepted"]),
@@ -113,19 +124,49 @@ class Progress:
         )
 
 
+def two_sides(run: Run | None) -> bool:
+    """Return whether agents play against agents, so that what a side did needs its name."""
+    return run is not None and len({agent.side for agent in run.agents}) > 1
+
+
+def side(name: str) -> Text:
+    """Return the name of a side in its colour."""
+    return Text(name, SIDE.get(name, "bold magenta"))
+
+
+def speaker(seat: Seat, *, named: bool) -> Text:
+    """Return the name of an agent, after that of its side if `named`."""
+    return Text.assemble(side(seat.side), "/", seat.agent) if named else Text(seat.agent)
+
+
 def card(run: Run) -> Panel:
     """Return a panel with the run card."""
-    wait = "as long as it takes" if run.clock.max_wait_s is None else f"at most {run.clock.max_wait_s:g} s"
     rows = Table.grid(padding=(0, 2))
     rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
     rows.add_row("game", f"{run.game}, {run.executor} executor")
-    rows.add_row("clock", f"{run.clock.rule}: {run.clock.step_loops} loops a step, waits {wait}")
-    rows.add_row("agents", ", ".join(f"{agent.name} ({', '.join(agent.teams)})" for agent in run.agents))
+    rows.add_row("clock", rule(run.clock))
+    sides: dict[str, list[str]] = {}
+    for agent in run.agents:
+        sides.setdefault(agent.side, []).append(f"{agent.name} ({', '.join(agent.teams)})")
+    for name, agents in sides.items():
+        rows.add_row(side(name) if two_sides(run) else "agents", ", ".join(agents))
     return Panel(rows, title=Text(run.run), border_style="dim", box=box.ROUNDED)
 
 
-def table(result: Result) -> Panel:
-    """Return a panel with the result of an episode."""
+def rule(clock: Clock) -> str:
+    """Return what a clock says of a match, on one line."""
+    wait = "as long as it takes" if clock.max_wait_s is None else f"at most {clock.max_wait_s:g} s"
+    price = {
+        "frozen": "",
+        "budget": f"{clock.thinking_loops} for a decision, ",
+        "token": "more for more tokens, ",
+        "realtime": f"{LOOPS_PER_S * clock.speed:g} in a second, ",
+    }
+    return f"{clock.rule}: {clock.step_loops} loops a step, {price[clock.rule]}waits {wait}"
+
+
+def table(result: Result, *, named: bool = False) -> Panel:
+    """Return a panel with the result of an episode; `named` if there is one of another side, too."""
     rows = Table.grid(padding=(0, 2))
     kd = "none lost" if result.kd is None else f"{result.kd:.2f}"
     rows.add_row(
@@ -141,9 +182,17 @@ def table(result: Result) -> Panel:
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
     rows.add_row("tokens", _tokens(result.usage.values()))
+    if fates := sum(map(Counter, result.fates.values()), Counter()):
+        rows.add_row("decisions", _decisions(result, fates))
+    for incident in result.incidents:
+        rows.add_row("incident", Text(incident, "yellow"))
+    if not result.valid:
+        rows.add_row("not valid", Text(result.invalid_because, "bold red"))
     for agent, statuses in sorted(result.statuses.items()):
         rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
-    title = Text.assemble((result.outcome, OUTCOME[result.outcome]), f", {result.cause} (episode {result.episode})")
+    whose = Text.assemble(side(result.side), ": ") if named else Text()
+    ending = (result.outcome, OUTCOME[result.outcome])
+    title = Text.assemble(whose, ending, f", {result.cause} (episode {result.episode})")
     return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
 
 
@@ -174,6 +223,14 @@ def _tokens(usages: Iterable[Usage]) -> str:
     if total.unknown_requests:
         text += f", {total.unknown_requests} of unknown size"
     return text + (", no price known" if total.cost_usd is None else f", {total.cost_usd:.4f} USD")
+
+
+def _decisions(result: Result, fates: Counter[str]) -> str:
+    counts = ", ".join(f"{count} {fate}" for fate, count in fates.most_common())
+    lag = f"; the game was {result.lag_s:.1f} s behind" if result.lag_s else ""
+    if not result.age_p50_loops and not result.age_p95_loops:
+        return counts + lag
+    return f"{counts}; median age {result.age_p50_loops:g} loops, 95 % below {result.age_p95_loops:g}{lag}"
 
 
 def _losses(units: int, value: float) -> str:

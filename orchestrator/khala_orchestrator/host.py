@@ -10,6 +10,7 @@ import contextlib
 import gc
 from typing import TYPE_CHECKING
 
+from khala_orchestrator.advisers import AdviceInbox
 from khala_orchestrator.announce import Announcer
 from khala_orchestrator.cards import run_card
 from khala_orchestrator.match import Match
@@ -60,6 +61,7 @@ async def host(
     sides = sides_of(config)
     seats = [seat for side in sides for seat in side.seats]
     required = [side.seat(agent) for side in sides for agent in side.required]
+    advisers = [side.seat(adviser.name) for side in sides for adviser in side.task.advisers]
     card = run_card(config, game.info)
     async with contextlib.AsyncExitStack() as stack:
         flush = _nothing
@@ -69,9 +71,10 @@ async def host(
                 recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
             bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
-        announcer = await stack.enter_async_context(Announcer(bus, config.run, seats))
+        announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
-        turn = await stack.enter_async_context(_turn(config, bus, roster, required))
+        inbox = await stack.enter_async_context(AdviceInbox(bus, config.run, advisers))
+        turn = await stack.enter_async_context(_turn(config, bus, roster, required, inbox))
         await announcer.run(card)
         watch(card)
         await roster.assemble(required, config.assemble_s)
@@ -88,14 +91,11 @@ def _recorder(config: MatchConfig, path: Path) -> OwnedSink:
     return BestEffort(recorder) if config.task.faults.recording_lost == "go_on" else recorder
 
 
-def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat]) -> Turn:
-    match config.task.faults.agent_gone:
-        case "wait":
-            return Turn(bus, config.run, roster, required=required, grace_s=config.task.clock.grace_s)
-        case "end":
-            return Turn(bus, config.run, roster, required=required)
-        case "go_on":
-            return Turn(bus, config.run, roster)
+def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat], inbox: AdviceInbox) -> Turn:
+    rule = config.task.faults.agent_gone
+    grace_s = config.task.clock.grace_s if rule == "wait" else 0.0
+    waited_for = () if rule == "go_on" else required
+    return Turn(bus, config.run, roster, required=waited_for, grace_s=grace_s, advice=inbox.take)
 
 
 def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:

@@ -2,7 +2,8 @@
 
 A message goes into the next observation of its recipients: an agent of the same side by name, or every
 agent of that side that listens to a channel, except the sender. A message without recipients
-goes back to the sender as a rejection. An agent listens to a channel until the end of the episode.
+goes back to the sender as a rejection. An agent listens to a channel until the end of the episode. An adviser's
+message goes the same way, may be for `everyone`, and says with the sender's name that it comes from an adviser.
 
 What one agent says is read by others, and paid for by them. So the number of messages of a sender in a step is limited,
 and so are the characters that a recipient gets in a step, from each sender and in total; the sender reads how many of
@@ -27,6 +28,8 @@ MAX_CHARACTERS = 1_500
 """Characters that a recipient gets from one sender in a step; the rest is cut. The shortest observation has 1 900."""
 MAX_RECEIVED_CHARACTERS = 6_000
 """Characters that a recipient gets in a step, in equal parts from all that write to it."""
+EVERYONE = "everyone"
+"""Recipient of an adviser's message that is for all agents of the side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +47,15 @@ class Post:
 class Mailbox:
     """The boxes of all agents, and the listeners of each channel."""
 
-    def __init__(self, reach: Mapping[Seat, Sequence[Seat]], channels: Iterable[str] = ()) -> None:
-        """Set the seats that each seat may write to, and the channels that every seat may write to."""
-        self._reach = dict(reach)
+    def __init__(
+        self,
+        reach: Mapping[Seat, Sequence[Seat]],
+        channels: Iterable[str] = (),
+        advisers: Mapping[Seat, str] | None = None,
+    ) -> None:
+        """Set who may write to which seats, the channels that all may write to, and the roles of advisers."""
+        self._advisers = dict(advisers or {})
+        self._reach = {**reach, **dict.fromkeys(self._advisers, tuple(reach))}
         self._channels = {channel.casefold(): channel for channel in channels}
         self._listeners: dict[tuple[str, str], list[Seat]] = defaultdict(list)
 
@@ -67,7 +76,7 @@ class Mailbox:
         said: Counter[Seat] = Counter()
         taken: list[Message] = []
         for message in messages:
-            sender = Seat(message.side, message.agent)
+            sender = _sender(message)
             said[sender] += 1
             if said[sender] > MAX_MESSAGES:
                 continue
@@ -80,13 +89,15 @@ class Mailbox:
         for sender, number in said.items():
             if number > MAX_MESSAGES:
                 returned[sender].append(_too_many(number))
-        received = {seat: tuple(_fitting(box)) for seat, box in boxes.items()}
+        received = {seat: tuple(self._fitting(seat, box)) for seat, box in boxes.items()}
         return Post(taken, received, {seat: tuple(rejections) for seat, rejections in returned.items()})
 
     def _recipients(self, sender: Seat, name: str) -> list[Seat] | None:
         wanted = name.casefold()
         if wanted in self._channels:
             return [seat for seat in self._listeners[sender.side, wanted] if seat != sender]
+        if sender in self._advisers and wanted == EVERYONE:
+            return list(self._reach[sender])
         return [seat for seat in self._reach[sender] if seat.agent.casefold() == wanted] or None
 
     def _return(self, sender: Seat, message: Message) -> Rejection:
@@ -98,6 +109,22 @@ class Mailbox:
             text=message.recipient,
             start=0,
         )
+
+    def _fitting(self, seat: Seat, box: Sequence[Message]) -> Iterator[Received]:
+        """Yield the messages for one recipient, cut to each sender's part of what it gets in a step."""
+        senders = {message.agent for message in box}
+        left = dict.fromkeys(senders, min(MAX_CHARACTERS, MAX_RECEIVED_CHARACTERS // len(senders)))
+        for message in box:
+            room = left[message.agent]
+            if room:
+                text = message.text if len(message.text) <= room else message.text[: room - 1] + "…"
+                left[message.agent] -= len(text)
+                recipient = message.recipient if message.recipient.casefold() != EVERYONE else seat.agent
+                yield Received(sender=self._signature(message), recipient=recipient, text=text)
+
+    def _signature(self, message: Message) -> str:
+        """Return the sender's name, of an adviser with the role: no agent's name has brackets."""
+        return f"{message.agent} ({self._advisers[_sender(message)]})" if message.human else message.agent
 
 
 def newest(messages: Sequence[Received]) -> tuple[Received, ...]:
@@ -117,13 +144,5 @@ def _too_many(number: int) -> Rejection:
     return Rejection(reason="too_many_messages", message=f"{what}: write at most {MAX_MESSAGES}.", text="", start=0)
 
 
-def _fitting(box: Sequence[Message]) -> Iterator[Received]:
-    """Yield the messages for one recipient, cut to each sender's part of what it gets in a step."""
-    senders = {message.agent for message in box}
-    left = dict.fromkeys(senders, min(MAX_CHARACTERS, MAX_RECEIVED_CHARACTERS // len(senders)))
-    for message in box:
-        room = left[message.agent]
-        if room:
-            text = message.text if len(message.text) <= room else message.text[: room - 1] + "…"
-            left[message.agent] -= len(text)
-            yield Received(sender=message.agent, recipient=message.recipient, text=text)
+def _sender(message: Message) -> Seat:
+    return Seat(message.side, message.agent)

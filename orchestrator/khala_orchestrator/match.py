@@ -28,9 +28,10 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.pacing import Pacing
     from khala_orchestrator.roster import Seat
+    from khala_orchestrator.schedule import Decision
     from khala_orchestrator.side import Side
     from khala_orchestrator.turn import AgentPool, Answers, Question
-    from khala_protocol.messages import Briefing, Message, Report, Result
+    from khala_protocol.messages import Advice, Briefing, Message, Report, Result
 
 Phase = Literal["observe", "act", "game"]
 
@@ -137,13 +138,16 @@ class Match:
         self.schedule.decide(answers.by_seat, loop)
         with watch.phase("act"):
             due = self.schedule.due(loop)
-            played = [side.act(at, [one for one in due if one.seat.side == side.name]) for side in self.sides]
+            played = [side.act(at, *_of(side, due, answers.advice)) for side in self.sides]
             for message in (message for one in played for message in one.post.taken):
                 await self.match_observer.message(message)
         with watch.phase("game"):
             results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
         timings = watch.timings(answers, lag_s)
-        reports = [s.report(at, p, r, timings) for s, p, r in zip(self.sides, played, results, strict=True)]
+        reports = [
+            side.report(at, does, result, timings, answers.incidents)
+            for side, does, result in zip(self.sides, played, results, strict=True)
+        ]
         return StepOutcome(self._whole(at, reports, results), [result.snapshot for result in results], answers.lost)
 
     async def _begin(self, episode: int) -> None:
@@ -171,6 +175,11 @@ class Match:
         dropped = [side.dropped(at, pending, loop) for side in self.sides]
         pairs = zip(reports, dropped, strict=True)
         return [report.model_copy(update={"agents": (*report.agents, *more)}) for report, more in pairs]
+
+
+def _of(side: Side, due: Sequence[Decision], advice: Sequence[Advice]) -> tuple[Sequence[Decision], Sequence[Advice]]:
+    """Return the decisions and the advice that are of one side."""
+    return [one for one in due if one.seat.side == side.name], [one for one in advice if one.side == side.name]
 
 
 class Stopwatch:

@@ -18,7 +18,7 @@ from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
-from khala_protocol.messages import Observation, Reply, Report
+from khala_protocol.messages import Advice, Message, Observation, Reply, Report
 from khala_protocol.recording.difference import Difference
 
 if TYPE_CHECKING:
@@ -119,7 +119,8 @@ class RecordedTurn:
         self._compare(step, observations)
         if self.differences:
             raise EndOfRecording
-        return Answers(dict(self._settled_by(step, observations) if wait else self._taken_in(step)))
+        answers = dict(self._settled_by(step, observations) if wait else self._taken_in(step))
+        return Answers(answers, advice=[_advice(message) for message in step.of(Message) if message.human])
 
     def _settled_by(self, step: RecordedStep, observations: Iterable[Observation]) -> Iterator[tuple[Seat, Answer]]:
         """Yield the answers to these observations, which the host waited for."""
@@ -162,6 +163,12 @@ class RecordedTurn:
 
     def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:
         self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
+
+
+def _advice(message: Message) -> Advice:
+    return Advice.model_construct(
+        run=message.run, agent=message.agent, side=message.side, recipient=message.recipient, text=message.text
+    )
 
 
 class EndOfRecording(Exception):

@@ -8,7 +8,7 @@ is lost but the open step. Above it: `khala_orchestrator.host`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from khala_orchestrator.replay import EndOfRecording, RecordedTurn, recorded_config
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from khala_orchestrator.turn import AgentPool, Answers, Question
     from khala_protocol.messages import Result
     from khala_protocol.recording import Recorded, Recording
+
+
+RESUMED = "the host or the game was lost, and the match was resumed here"
 
 
 class ResumeError(RecordingError):
@@ -118,6 +121,8 @@ class ResumedTurn:
                 self._recorded = None
                 await self._go_live()
                 questions = [*self._open.values(), *questions]
+                answers = await self._live.ask(questions, wait=wait)
+                return replace(answers, incidents=[RESUMED, *answers.incidents])
         return await self._live.ask(questions, wait=wait)
 
     async def _again(self, recorded: RecordedTurn, questions: list[Question], *, wait: bool) -> Answers:

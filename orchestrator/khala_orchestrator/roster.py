@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+MAX_INSTANCES = 16
+"""Processes of one agent that are taken note of: each costs the host a question, and nobody needs two."""
+MAX_STRANGERS = 100
+"""Agents without a seat that are named in the log, each once."""
 NEWS_S = 1.0
 """Time after our link is back within which all agents that are still there have been reported."""
 
@@ -56,6 +60,7 @@ class Roster:
         self._bus = bus
         self._run = run
         self._instances: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
+        self._strangers: set[Seat] = set()
         self._cut = False
         self._doubtful: dict[Seat, set[str]] = {seat: set() for seat in self.seats}
         """Instances that were there when our link went down, and of which nothing was heard since."""
@@ -126,10 +131,12 @@ class Roster:
         seat = Seat(address.side, address.agent)
         instances = self._instances.get(seat)
         if instances is None:
-            log.warning("agent %s is not in this match", seat)
+            self._name_stranger(seat)
         elif token.alive:
             self._be_sure_soon()
             self._doubtful[seat].discard(address.instance)
+            if len(instances) == MAX_INSTANCES:
+                return
             instances.add(address.instance)
             if len(instances) > 1:
                 log.warning("%d processes are agent %s: the first reply of a step counts", len(instances), seat)
@@ -139,6 +146,12 @@ class Roster:
             self._gone(seat)
         else:
             self._remove(seat, {address.instance})
+
+    def _name_stranger(self, seat: Seat) -> None:
+        """Say once that an agent has no seat; its name may be a slip."""
+        if seat not in self._strangers and len(self._strangers) < MAX_STRANGERS:
+            self._strangers.add(seat)
+            log.warning("agent %s is not in this match", seat)
 
     def _remove(self, seat: Seat, left: set[str]) -> None:
         if self._instances[seat] & left:

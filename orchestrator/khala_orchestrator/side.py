@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.mailbox import Post
     from khala_orchestrator.schedule import Decision, StepId
-    from khala_protocol.messages import Fate, Timings, Trigger
+    from khala_protocol.messages import Advice, Fate, Timings, Trigger
     from khala_protocol.speech import Speech
 
 
@@ -69,7 +69,8 @@ class Side:
         task = self.task
         reach = {self.seat(a.name): [self.seat(other.name) for other in task.correspondents(a)] for a in task.agents}
         self.observer, self.actor = Observer(task), Actor(task)
-        self.mailbox = Mailbox(reach, task.channels if task.communication else ())
+        advisers = {self.seat(adviser.name): adviser.role for adviser in task.advisers}
+        self.mailbox = Mailbox(reach, task.channels if task.communication else (), advisers)
 
     @property
     def name(self) -> str:
@@ -135,8 +136,8 @@ class Side:
 
     # --- acting -------------------------------------------------------------------------------------
 
-    def act(self, at: StepId, decisions: Sequence[Decision]) -> Played:
-        """Return what comes of the decisions that take effect now."""
+    def act(self, at: StepId, decisions: Sequence[Decision], advice: Sequence[Advice] = ()) -> Played:
+        """Return what comes of the decisions that take effect now, and of what advisers wrote meanwhile."""
         heard = {decision.seat.agent: self._speech(decision) for decision in decisions}
         speeches = {agent: speech for agent, speech in heard.items() if speech is not None}
         joint = self.actor.joint(self._now, speeches, self._seen)
@@ -153,10 +154,23 @@ class Side:
             for agent, speech in speeches.items()
             for said in speech.messages
         ]
+        messages += [self._advised(at, one) for one in advice]
         for agent, speech in speeches.items():
             for listen in speech.listens:
                 self.mailbox.listen(self.seat(agent), listen.channel)
         return Played(decisions, joint, self.mailbox.deliver(messages))
+
+    def _advised(self, at: StepId, advice: Advice) -> Message:
+        return Message(
+            run=self.run,
+            agent=advice.agent,
+            side=self.name,
+            episode=at.episode,
+            step=at.step,
+            recipient=advice.recipient,
+            text=advice.text,
+            human=True,
+        )
 
     def _speech(self, decision: Decision) -> Speech | None:
         """Return what an agent says: the only place where a reply is parsed. None if it failed, and nothing stands in.
@@ -177,7 +191,9 @@ class Side:
 
     # --- reporting ----------------------------------------------------------------------------------
 
-    def report(self, at: StepId, played: Played, result: StepResult, timings: Timings) -> Report:
+    def report(
+        self, at: StepId, played: Played, result: StepResult, timings: Timings, incidents: Sequence[str] = ()
+    ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
         heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
         for agent, feedback in heard.items():
@@ -190,9 +206,11 @@ class Side:
             game_loop=result.snapshot.game_loop,
             agents=tuple(self._agent(at, one, played, heard[one.seat.agent]) for one in played.decisions),
             messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in played.post.taken),
+            advisers=tuple(m.agent for m in played.post.taken if m.human),
             functions=result.played.functions,
             env_steps=result.env_steps,
             score=result.snapshot.score.total,
+            incidents=tuple(incidents),
             timings=timings,
         )
 

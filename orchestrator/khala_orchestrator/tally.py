@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from khala_orchestrator.roster import Seat
     from khala_protocol.messages import Ending, Outcome
 
+MAX_INCIDENTS = 100
+"""Incidents that a result lists; the reports have all of them."""
+
 
 class Tally:
     """The running account of one episode."""
@@ -33,6 +36,8 @@ class Tally:
         self._fallbacks: dict[str, Counter[str]] = defaultdict(Counter)
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
+        self._incidents: list[str] = []
+        self._advisers: Counter[str] = Counter()
         self._lag_s = 0.0
         self._accepted = 0
         self._steps = self._env_steps = 0
@@ -55,6 +60,8 @@ class Tally:
             if agent.latency_s is not None:
                 self._latencies_s.append(agent.latency_s)
                 self._ages_loops.append(agent.age_loops)
+        self._incidents += [f"step {report.step}: {incident}" for incident in report.incidents]
+        self._advisers.update(report.advisers)
         self._lag_s = report.timings.lag_s
         self._note(after)
 
@@ -93,6 +100,8 @@ class Tally:
             rejections=dict(self._rejections),
             fates={name: dict(count) for name, count in self._fates.items()},
             fallbacks={name: dict(count) for name, count in self._fallbacks.items()},
+            incidents=tuple(self._incidents[:MAX_INCIDENTS]),
+            advisers=dict(self._advisers),
             age_p50_loops=_quantile(self._ages_loops, 0.5),
             age_p95_loops=_quantile(self._ages_loops, 0.95),
             lag_s=self._lag_s,

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.text import Text
 
-from khala_orchestrator.console import STATUS, card, clock, table, visible_message
+from khala_orchestrator.console import STATUS, card, clock, side, speaker, table, two_sides, visible_message
+from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
 from khala_protocol.recording import Recording, read
@@ -35,6 +36,7 @@ class StepSelection:
     """Which part of a recording is shown."""
 
     agent: str | None = None
+    """Its name, or that and the name of its side: `red/Captain`."""
     first: int = 0
     last: int | None = None
 
@@ -54,10 +56,15 @@ class StepSelection:
         end = last if dash else first
         return cls(agent, int(first or 0), int(end) if end else None)
 
-    def holds(self, step: int, agent: str | None = None) -> bool:
+    @property
+    def side(self) -> str | None:
+        """The side of its agent; None for any."""
+        return self.agent.partition("/")[0] if self.agent and "/" in self.agent else None
+
+    def holds(self, step: int, seat: Seat | None = None) -> bool:
         """Return whether a step belongs to it, and an agent, if one is given."""
         in_time = step >= self.first and (self.last is None or step <= self.last)
-        return in_time and (agent is None or self.agent in {None, agent})
+        return in_time and (seat is None or self.agent in {None, seat.agent, str(seat)})
 
 
 def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> Iterator[RenderableType]:
@@ -71,23 +78,26 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
     Raises:
         RecordingError: the file is not a recording.
     """
+    named = False
     for recorded in read(path):
         match recorded.message and visible_message(recorded.message):
             case Run() as run:
+                named = two_sides(run)
                 yield card(run)
             case Result() as result:
-                yield table(result)
-            case Observation() as seen if whole and selection.holds(seen.step, seen.agent):
-                yield _words(f"step {seen.step}, {seen.agent} sees", seen.text, "cyan")
+                yield table(result, named=named)
+            case Observation() as seen if whole and selection.holds(seen.step, _seat(seen)):
+                title = Text.assemble(f"step {seen.step}, ", _speaker(seen, named=named), " sees")
+                yield _words(title, seen.text, "cyan")
                 yield from (_picture(image) for image in seen.images)
-            case Reply() as reply if whole and selection.holds(reply.step, reply.agent):
-                yield _words(f"step {reply.step}, {reply.agent} says", reply.text, "magenta")
-            case Message() as said if selection.holds(said.step, said.agent):
-                yield Text.assemble(
-                    (f"  {said.agent} → {visible_line(said.recipient)}: ", "magenta"), visible_line(said.text)
-                )
+            case Reply() as reply if whole and selection.holds(reply.step, _seat(reply)):
+                title = Text.assemble(f"step {reply.step}, ", _speaker(reply, named=named), " says")
+                yield _words(title, reply.text, "magenta")
+            case Message() as said if selection.holds(said.step, _seat(said)):
+                words = (f"{' (human)' if said.human else ''} → {visible_line(said.recipient)}: ", "magenta")
+                yield Text.assemble("  ", _speaker(said, named=named), words, visible_line(said.text))
             case Report() as report if selection.holds(report.step):
-                yield from _report(report, selection)
+                yield from _report(report, selection, named=named)
 
 
 def summary(path: Path, selection: StepSelection) -> dict[str, Any]:
@@ -108,23 +118,37 @@ def summary(path: Path, selection: StepSelection) -> dict[str, Any]:
     }
 
 
-def _report(report: Report, selection: StepSelection) -> Iterator[Text]:
-    yield Text(f"step {report.step}  {clock(report.game_loop)}  score {report.score:g}", "bold")
+def _report(report: Report, selection: StepSelection, *, named: bool) -> Iterator[Text]:
+    if selection.side not in {None, report.side}:
+        return
+    whose = Text.assemble(side(report.side), "  ") if named else Text()
+    yield Text.assemble(
+        f"step {report.step}  {clock(report.game_loop)}  ", whose, f"score {report.score:g}", style="bold"
+    )
     for agent in report.agents:
-        if selection.holds(report.step, agent.agent):
-            yield from _agent(agent)
+        if selection.holds(report.step, _seat(agent)):
+            yield from _agent(agent, named=named)
 
 
-def _agent(agent: AgentReport) -> Iterator[Text]:
+def _agent(agent: AgentReport, *, named: bool) -> Iterator[Text]:
     latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
     ignored = f", {agent.ignored} ignored" if agent.ignored else ""
     detail = f" ({visible_line(agent.detail)})" if agent.detail else ""
-    yield Text.assemble(f"  {agent.agent}: ", (agent.status, STATUS[agent.status]), f"{detail}{latency}{ignored}")
+    status = (agent.status, STATUS[agent.status])
+    yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
         yield Text.assemble(
             (f"    {visible_line(fault.text)}", "red"), f"  {fault.reason}: {visible_line(fault.message)}"
         )
+
+
+def _seat(said: AgentReport | Message | Observation | Reply) -> Seat:
+    return Seat(said.side, said.agent)
+
+
+def _speaker(said: AgentReport | Message | Observation | Reply, *, named: bool) -> Text:
+    return speaker(_seat(said), named=named)
 
 
 def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list[Path]:
@@ -144,12 +168,13 @@ def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list
     try:
         directory.mkdir(parents=True, exist_ok=True)
         for seen in recording.of(Observation):
-            if not selection.holds(seen.step, seen.agent):
+            if not selection.holds(seen.step, _seat(seen)):
                 continue
+            agent = str(_seat(seen)) if two_sides(recording.run) else seen.agent
             for image in seen.images:
                 if image.sha256 in pictures:
                     kind = image.media_type.partition("/")[2]
-                    name = f"{seen.episode}-{seen.step:04}-{seen.agent}-{image.name}"
+                    name = f"{seen.episode}-{seen.step:04}-{agent}-{image.name}"
                     saved.append(directory / f"{_NOT_IN_FILE_NAMES.sub('_', name)[:200]}.{kind}")
                     saved[-1].write_bytes(pictures[image.sha256])
     except OSError as error:
@@ -163,6 +188,7 @@ def _picture(image: ImageRef) -> Text:
     return Text.assemble(("  picture ", "bold cyan"), f"{image.name} ({size}): ", (image.title, "dim"))
 
 
-def _words(title: str, text: str, style: str) -> Text:
+def _words(title: Text, text: str, style: str) -> Text:
     body = "\n".join(f"  │ {line}" for line in text.splitlines())
-    return Text.assemble((title, f"bold {style}"), "\n", (body, "dim"))
+    title.style = f"bold {style}"
+    return Text.assemble(title, "\n", (body, "dim"))

@@ -25,11 +25,12 @@ from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from types import TracebackType
 
     from khala_orchestrator.roster import Roster
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.messages import Advice
 
 log = logging.getLogger(__name__)
 
@@ -70,6 +71,10 @@ class Answers:
     wait_s: float = 0.0
     lost: Collection[Seat] = ()
     """Required agents that went away and did not come back within the grace."""
+    incidents: Sequence[str] = ()
+    """What failed while the agents were asked, and was overcome or not; a sentence each."""
+    advice: Sequence[Advice] = ()
+    """What advisers have written since they were last asked."""
 
 
 class Question(NamedTuple):
@@ -99,11 +104,16 @@ class _Question:
     asked_at: float
     until: float | None = None
     waiting: bool = True
-    held: bool = False
-    """Whether its agent is required and away."""
+    held_at: float | None = None
+    """When its agent, which is required, went away."""
     reply: Reply | None = None
     arrived_at: float = 0.0
     fault: str = ""
+
+    @property
+    def held(self) -> bool:
+        """Whether its agent is required and away."""
+        return self.held_at is not None
 
     def wait_until_answered(self, now: float) -> None:
         """Give the agent its time, unless it is away."""
@@ -119,20 +129,32 @@ class Turn:
     """An `AgentPool` over a bus. An asynchronous context manager."""
 
     def __init__(
-        self, bus: Bus, run: str, roster: Roster, *, required: Iterable[Seat] = (), grace_s: float = 0.0
+        self,
+        bus: Bus,
+        run: str,
+        roster: Roster,
+        *,
+        required: Iterable[Seat] = (),
+        grace_s: float = 0.0,
+        advice: Callable[[], Sequence[Advice]] = lambda: (),
     ) -> None:
-        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away."""
+        """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away.
+
+        `advice` returns what advisers have written since it was last called.
+        """
         self._bus = bus
         self._run = run
         self._roster = roster
         self._required = frozenset(required)
         self._grace_s = grace_s
+        self._advice = advice
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inbox: Subscription[Sample] | None = None
         self._pump: asyncio.Task[None] | None = None
         self._ignored: Counter[Seat] = Counter()
         self._open: dict[Seat, _Question] = {}
+        self._incidents: list[str] = []
         self._changed = asyncio.Event()
 
     async def __aenter__(self) -> Self:
@@ -203,7 +225,8 @@ class Turn:
         if asked is None or not asked.waiting or asked.held:
             return
         if seat in self._required:
-            asked.held, asked.until = True, asyncio.get_running_loop().time() + self._grace_s
+            asked.held_at = asyncio.get_running_loop().time()
+            asked.until = asked.held_at + self._grace_s
             log.warning("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
         elif not self._roster.present(seat):
             asked.waiting = False
@@ -214,10 +237,11 @@ class Turn:
         asked = self._open.get(seat)
         if asked is None or asked.reply is not None:
             return
-        if asked.held:
-            asked.held, asked.until = False, None
-            asked.wait_until_answered(asyncio.get_running_loop().time())
-            log.warning("required agent %s is back", seat)
+        if asked.held_at is not None:
+            now = asyncio.get_running_loop().time()
+            self._note(f"required agent {seat} was away for {now - asked.held_at:.1f} s")
+            asked.held_at = asked.until = None
+            asked.wait_until_answered(now)
             self._changed.set()
         await self._publishers[seat].put(asked.payload)
 
@@ -251,7 +275,14 @@ class Turn:
             del self._open[seat]
         answers = {seat: self._answer(seat, asked) for seat, asked in settled.items()}
         lost = [seat for seat, asked in settled.items() if asked.held]
-        return Answers(answers, publish_s, wait_s, lost)
+        for seat in lost:
+            self._note(f"required agent {seat} did not come back within {self._grace_s:g} s")
+        incidents, self._incidents = self._incidents, []
+        return Answers(answers, publish_s, wait_s, lost, incidents, self._advice())
+
+    def _note(self, incident: str) -> None:
+        log.warning("%s", incident)
+        self._incidents.append(incident)
 
     def _answer(self, seat: Seat, asked: _Question) -> Answer:
         ignored = self._ignored.pop(seat, 0)
@@ -302,7 +333,7 @@ class Turn:
             self._ignored[seat] += 1
             return
         asked.reply, asked.arrived_at = reply, asyncio.get_running_loop().time()
-        asked.waiting = asked.held = False
+        asked.waiting, asked.held_at = False, None
         if not any(other.waiting for other in self._open.values()):
             self._changed.set()
 

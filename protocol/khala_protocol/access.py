@@ -6,6 +6,7 @@ subject to them, which is right for a host that is its own router.
     who         reads                                                              writes
     host        everything of the run                                              everything of the run
     agent       run, result; briefing, observation, images of its own              its reply, exchange, alive
+    adviser     run, report, result                                                its advice
     observer    everything of the run                                              nothing
     service     everything of every run, on the unix socket of `khala serve`       the same
 
@@ -22,7 +23,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from khala_protocol.certificates import HOST, OBSERVER, agent_name
+from khala_protocol.certificates import HOST, OBSERVER, adviser_name, agent_name
 from khala_protocol.keys import EVERY_ORDER, ROOT, Topic, check_name
 from khala_protocol.service import MAX_ORDER_BYTES
 
@@ -33,7 +34,7 @@ REPLY_BYTES = 512 * 1024
 """Eight times the longest text of a reply that an agent sends."""
 EXCHANGE_BYTES = 4 * 1024 * 1024
 """A prompt of a million tokens, without pictures."""
-QUESTION_BYTES = 4096
+QUESTION_BYTES = ADVICE_BYTES = 4096
 RATE_HZ = 500.0
 """How often an agent may write under one key. Replies to two steps are at least a turn of some milliseconds apart; what
 comes 2 ms after another is no answer to an observation. A flood of 20 kB frames had 2 300 of them in a second."""
@@ -46,20 +47,23 @@ _HEAR = ["put", "delete", "reply", "liveliness_token"]
 _EVERYTHING = [*_LISTEN, *_HEAR, "declare_queryable"]
 
 
-def router_settings(agents: Iterable[tuple[str, str]], run: str | None = None) -> dict[str, Any]:
-    """Return the settings of Zenoh for a router that these agents may join, for `BusConfig.zenoh`.
+def router_settings(
+    agents: Iterable[tuple[str, str]], run: str | None = None, *, advisers: Iterable[tuple[str, str]] = ()
+) -> dict[str, Any]:
+    """Return the settings of Zenoh for a router that these may join, for `BusConfig.zenoh`.
 
     Args:
         agents: side and name of each.
         run: name of the run; None allows any, for a router that does not know it.
+        advisers: side and name of each.
     """
     root = f"{ROOT}/{check_name(run, 'run') if run else '*'}"
-    names = sorted(set(agents))
-    rules, rates = [*_host(root), *_observer(root)], list(_rates(names))
+    names, advising = sorted(set(agents)), sorted(set(advisers))
+    rules, rates = [*_host(root), *_observer(root)], list(_rates(names, advising))
     subjects, policies = [HOST, OBSERVER], {HOST: ["host"], OBSERVER: ["listen:observer", "hear:observer"]}
-    for side, agent in names:
-        name = agent_name(side, agent)
-        own = _agent(root, name, f"{root}/{side}/{agent}")
+    agents_rules = {agent_name(*who): _agent(root, agent_name(*who), f"{root}/{'/'.join(who)}") for who in names}
+    advisers_rules = {adviser_name(*who): _adviser(root, *who) for who in advising}
+    for name, own in (agents_rules | advisers_rules).items():
         rules += own
         subjects.append(name)
         policies[name] = [rule["id"] for rule in own]
@@ -111,19 +115,30 @@ def _agent(root: str, name: str, own: str) -> list[dict[str, Any]]:
     ]
 
 
+def _adviser(root: str, side: str, adviser: str) -> list[dict[str, Any]]:
+    name, own = adviser_name(side, adviser), f"{root}/{side}/{adviser}/{Topic.ADVICE}"
+    keys = _with_caches(f"{root}/run", f"{root}/report", f"{root}/result")
+    return [
+        _rule(f"listen:{name}", ["ingress"], _LISTEN, keys),
+        _rule(f"hear:{name}", ["egress"], _HEAR, keys),
+        _rule(f"speak:{name}", ["ingress"], ["put", "query"], [own]),
+        _rule(f"audience:{name}", ["egress"], ["declare_subscriber"], [f"{root}/*/*/{Topic.ADVICE}"]),
+    ]
+
+
 def _sizes() -> Iterable[dict[str, Any]]:
-    limits = {Topic.REPLY: REPLY_BYTES, Topic.EXCHANGE: EXCHANGE_BYTES}
+    limits = {Topic.REPLY: REPLY_BYTES, Topic.EXCHANGE: EXCHANGE_BYTES, Topic.ADVICE: ADVICE_BYTES}
     for topic, size in limits.items():
         yield _limit(["put"], [f"{ROOT}/*/*/*/{topic}"], size)
     yield _limit(["put"], [EVERY_ORDER], MAX_ORDER_BYTES)
     yield _limit(["query"], _with_caches(f"{ROOT}/**"), QUESTION_BYTES)
 
 
-def _rates(names: Iterable[tuple[str, str]]) -> Iterable[dict[str, Any]]:
+def _rates(agents: Iterable[tuple[str, str]], advisers: Iterable[tuple[str, str]]) -> Iterable[dict[str, Any]]:
     """One for each key: a link has one clock for all keys of an expression."""
-    for side, agent in names:
-        for topic in _WRITES:
-            yield {"key_expr": f"{ROOT}/*/{side}/{agent}/{topic}", "freq": RATE_HZ}
+    keys = [f"{side}/{agent}/{topic}" for side, agent in agents for topic in _WRITES]
+    keys += [f"{side}/{adviser}/{Topic.ADVICE}" for side, adviser in advisers]
+    return ({"key_expr": f"{ROOT}/*/{key}", "freq": RATE_HZ} for key in keys)
 
 
 def _limit(messages: Sequence[str], keys: Sequence[str], size: int) -> dict[str, Any]:

@@ -1,9 +1,10 @@
-"""Who a process is on the bus: a private authority, and a certificate for each router, host, agent and observer.
+"""Who a process is on the bus: a private authority, and certificates for router, host, agents, advisers, observers.
 
     DIR/ca                      the authority; its `key.pem` stays where it was made
     DIR/router                  for a process that listens: `khala router`, or a host that is its own router
     DIR/host                    for `khala host`
     DIR/agent.blue.Stalkers     for one agent
+    DIR/adviser.blue.Ada        for one adviser, see `khala advise`
     DIR/observer.screen         for a program that reads everything and writes nothing
 
 Each folder but the first is whole: `ca.pem`, `certificate.pem`, `key.pem`. It can be copied to another machine, and
@@ -54,6 +55,11 @@ def agent_name(side: str, agent: str) -> str:
     return f"agent:{check_name(side, 'side')}/{check_name(agent, 'agent')}"
 
 
+def adviser_name(side: str, adviser: str) -> str:
+    """Return the common name of an adviser's certificate."""
+    return f"adviser:{check_name(side, 'side')}/{check_name(adviser, 'adviser')}"
+
+
 def make_authority(directory: Path, hosts: Iterable[str] = (), *, days: int = DEFAULT_DAYS) -> list[Path]:
     """Make an authority, if there is none yet, and new certificates for router and host; return their folders.
 
@@ -76,6 +82,11 @@ def make_authority(directory: Path, hosts: Iterable[str] = (), *, days: int = DE
 def certify_agent(directory: Path, side: str, agent: str, *, days: int = DEFAULT_DAYS) -> Path:
     """Make a certificate for one agent, and return its folder; errors as in `issue`."""
     return issue(directory, agent_name(side, agent), f"agent.{side}.{agent}", days=days)
+
+
+def certify_adviser(directory: Path, side: str, adviser: str, *, days: int = DEFAULT_DAYS) -> Path:
+    """Make a certificate for one adviser, and return its folder; errors as in `issue`."""
+    return issue(directory, adviser_name(side, adviser), f"adviser.{side}.{adviser}", days=days)
 
 
 def certify_observer(directory: Path, name: str, *, days: int = DEFAULT_DAYS) -> Path:

@@ -2,14 +2,16 @@
 
     khala/<run>/<topic>                          topic: run, report, result
     khala/<run>/<side>/<agent>/<topic>           topic: briefing, observation, reply, message, exchange
+    khala/<run>/<side>/<adviser>/advice          what somebody outside the match writes to agents
     khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
     khala/<run>/<side>/<agent>/alive/<instance>  liveliness token; two instances of one agent stay visible as two
     khala/service/matches                        the matches of `khala serve`
     khala/service/order/<id>                     what a client asks of it: to play a match, or to stop one
 
-An agent writes below its own name: reply, exchange, alive. Over TLS the router enforces this, by the rules of
-`khala_protocol.access`; without TLS nothing does. Names of runs, sides, agents and instances must pass `check_name`,
-so that no name can widen a key expression. No run may be called `service`.
+An agent writes below its own name: reply, exchange, alive; an adviser: advice. No agent has an adviser's name. Over TLS
+the router enforces this, by the rules of `khala_protocol.access`; without TLS nothing does. Names of runs, sides,
+agents, advisers and instances must pass `check_name`, so that no name can widen a key expression. No run may be
+called `service`.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ class Topic(StrEnum):
     IMAGE = "image"
     REPLY = "reply"
     MESSAGE = "message"
+    ADVICE = "advice"
     EXCHANGE = "exchange"
     ALIVE = "alive"
 

@@ -26,6 +26,9 @@ MOST = 2**53
 MAX_DETAIL_CHARACTERS = 200
 """Longest reason for a fallback."""
 
+MAX_ADVICE_CHARACTERS = 500
+"""Longest message of an adviser."""
+
 Count = Annotated[int, Field(ge=0, le=MOST)]
 Point = tuple[float, float]
 Alliance = Literal["own", "ally", "enemy", "neutral"]
@@ -600,8 +603,20 @@ class Reply(Wire):
         return {k: v for k, v in data.items() if k != "calls"} if isinstance(data, dict) and "calls" in data else data
 
 
+class Advice(Wire):
+    """Adviser → host: a message to agents from outside the match, by a person or another program."""
+
+    kind: Literal["advice"] = "advice"
+    agent: str
+    """The adviser."""
+    side: str
+    recipient: str
+    """An agent, a channel, or `everyone` for all agents of the side."""
+    text: str = Field(min_length=1, max_length=MAX_ADVICE_CHARACTERS)
+
+
 class Message(Wire):
-    """Host → all: a `MessageTo` of an agent's reply; recipients find it in their next observation."""
+    """Host → all: a `MessageTo` of an agent's reply, or advice; recipients find it in their next observation."""
 
     kind: Literal["message"] = "message"
     agent: str
@@ -612,6 +627,8 @@ class Message(Wire):
     recipient: str
     """An agent or a channel."""
     text: str
+    human: bool = False
+    """Whether it came from an adviser, and not from an agent of the match."""
 
 
 class ChatMessage(Frozen):
@@ -675,6 +692,8 @@ class Run(Wire):
     executor: Literal["raw", "screen"]
     clock: Clock
     agents: tuple[AgentCard, ...]
+    advisers: tuple[str, ...] = ()
+    """Who may write to agents from outside the match; `Result.advisers` says who did."""
     catalogue_sha256: str
     versions: dict[str, str]
     """Of Khala, Python, PySC2, zenoh."""
@@ -729,11 +748,15 @@ class Report(Wire):
     messages: tuple[Received, ...] = ()
     """What the mailbox took in this step, in the order of the agents; the next observations have what it could
     deliver."""
+    advisers: tuple[str, ...] = ()
+    """Those of `messages` that came from outside the match: their senders, in the same order."""
     functions: tuple[str, ...] = ()
     """PySC2 functions or raw commands that were executed."""
     env_steps: int = 0
     """Number of `SC2Env.step` calls of the joint action."""
     score: float = 0.0
+    incidents: tuple[str, ...] = ()
+    """What failed in this step and was overcome, or not: an agent that was away, a match that was resumed."""
     timings: Timings = Timings()
 
 
@@ -778,6 +801,10 @@ class Result(Wire):
     """By agent: how many of its decisions were `fresh`, `stale`, …"""
     fallbacks: dict[str, dict[str, int]] = {}
     """By agent: how often it fell back, by reason."""
+    incidents: tuple[str, ...] = ()
+    """The first incidents of its reports, each with its step."""
+    advisers: dict[str, int] = {}
+    """By adviser: how many messages from outside the match its agents got."""
     age_p50_loops: float | None = None
     """Game loops from an observation to the effect of the decision."""
     age_p95_loops: float | None = None
@@ -789,7 +816,9 @@ class Result(Wire):
 
 
 AnyMessage = Annotated[
-    Run | Briefing | Observation | Reply | Message | ModelCall | Report | Result,
+    Run | Briefing | Observation | Reply | Advice | Message | ModelCall | Report | Result,
     Field(discriminator="kind"),
 ]
-MESSAGE_TYPES: tuple[type[Wire], ...] = (Run, Briefing, Observation, Reply, Message, ModelCall, Report, Result)
+MESSAGE_TYPES: tuple[type[Wire], ...] = (
+    Run, Briefing, Observation, Reply, Advice, Message, ModelCall, Report, Result,
+)  # fmt: skip

@@ -95,9 +95,9 @@ def test_a_task_has_exactly_one_map(maps: str) -> None:
         ("task: Win.", "max_actions: 999999999999\ntask: Win.", 3, "less than or equal to 1000"),
         (
             "task: Win.",
-            "clock: {rule: budget}\ntask: Win.",
+            "clock: {rule: warp}\ntask: Win.",
             3,
-            "the clock rule 'budget' is not there yet, only 'frozen'",
+            "'warp' is none of 'frozen', 'budget', 'token' or 'realtime'",
         ),
         ("role: You lead.", "rolle: You lead.", 5, "is required and not given (and 1 more)"),
     ],

@@ -52,6 +52,11 @@ BAD = [
     ("run 2s3z --model nope", "there is no model file 'nope'"),
     ("run 2s3z --model openai", "no key: set the environment variable OPENAI_API_KEY"),
     ("run 2s3z --policy nope:decide", "there is no module 'nope'"),
+    ("run 2s3z --red openai", "the task has no side red: its only side is blue"),
+    ("run duel_3m --side-model green=openai", "the task has no side green: its sides are blue and red"),
+    ("run duel_3m --side-model openai", "--side-model: 'openai' names no side and its model: write red=openai"),
+    ("run duel_3m --red nope/gpt", "there is no model file 'nope'"),
+    ("run duel_3m --blue skilled --red nope:decide", "there is no module 'nope'"),
     ("run 2s3z --game nowhere", "there is no StarCraft II in nowhere"),
     ("run 2s3z --game starcraft2", "there is no StarCraft II in nowhere (SC2PATH)"),
     ("run 2s3z --out file/below", "cannot be made: Not a directory; --out names another place"),
@@ -139,6 +144,20 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -
     assert "step 3" not in replayed.stdout
 
 
+@pytest.mark.game
+def test_each_side_of_a_duel_plays_with_its_own_model_and_has_its_own_result(tmp_path: Path) -> None:
+    sides = ("--blue", "scripted/skilled", "--red", "silent")
+    done = khala("run", "duel_3m", *sides, "--max-steps", "25", "--latency", "0", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    blue, red = json.loads(done.stdout)["results"]
+    assert [(result["side"], result["outcome"]) for result in (blue, red)] == [("blue", "win"), ("red", "loss")]
+    assert blue["usage"]["Captain"]["requests"] == blue["steps"]
+    assert red["usage"]["Captain"]["requests"] == 0
+    assert "blue: win, enemy defeated" in done.stderr
+    assert "red: loss, defeated" in done.stderr
+    assert done.stderr.count("step 0, ") == 1
+
+
 class Refusing(BaseHTTPRequestHandler):
     """A model endpoint that accepts no key."""
 
@@ -165,26 +184,39 @@ def test_a_key_that_the_endpoint_refuses_ends_the_match_before_it_begins(tmp_pat
     assert KEY not in done.stderr
 
 
-POLICY = """
-import os, signal
+DEADLY = """
+import os, pathlib, signal
 
 def decide(briefing, observation):
-    if observation.agent == "Stalkers" and observation.step == 2:
+    killed = pathlib.Path("killed")
+    if observation.agent == "Stalkers" and observation.step == 2 and (not killed.exists() or {always}):
+        killed.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return ""
 """
+PLAYED = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
 
 
 @pytest.mark.game
-def test_a_process_killed_in_a_step_costs_its_agent_and_not_the_game(tmp_path: Path) -> None:
-    (tmp_path / "deadly.py").write_text(POLICY)
-    command = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
-    done = khala(*command, cwd=tmp_path)
+def test_a_process_that_is_killed_is_started_again_and_no_step_is_lost(tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(DEADLY.format(always=False))
+    done = khala(*PLAYED, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["results"][0]["statuses"] == {"Stalkers": {"ok": 2, "gone": 3}, "Zealots": {"ok": 5}}
-    reports = Recording.open(tmp_path / told["recording"]).of(Report)
-    assert max(report.timings.wait_s for report in reports) < 5  # far from the 20 s of the longest wait
+    (result,) = json.loads(done.stdout)["results"]
+    assert result["statuses"] == {"Stalkers": {"ok": 5}, "Zealots": {"ok": 5}}
+    assert [text.partition(" was away for ")[0] for text in result["incidents"]] == [
+        "step 2: required agent blue/Stalkers"
+    ]
+
+
+@pytest.mark.game
+@pytest.mark.slow
+def test_a_process_that_dies_again_and_again_ends_the_match(tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(DEADLY.format(always=True))
+    done = khala(*PLAYED, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "agents-0" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.game

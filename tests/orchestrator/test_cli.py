@@ -205,6 +205,7 @@ def test_a_router_with_tls_lets_the_agents_of_its_tasks_in_and_nobody_else() -> 
     assert rules["default_permission"] == "deny"
     assert [subject["id"] for subject in rules["subjects"]] == [
         "host", "observer", "agent:blue/CombatGroupSmac", "agent:blue/Stalkers", "agent:blue/Zealots",
+        "adviser:blue/Adviser",
     ]  # fmt: skip
 
 

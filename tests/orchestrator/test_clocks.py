@@ -179,6 +179,7 @@ async def test_a_match_without_a_required_agent_ends_and_is_not_valid(
     assert now_s() == 7
     assert (result.outcome, result.cause, result.steps, result.valid) == ("aborted", "agents gone", 2, False)
     assert result.invalid_because == "required agents went away: blue/Stalkers"
+    assert result.incidents == ("step 1: required agent blue/Stalkers did not come back within 7 s",)
     assert Recording.open(path).results == tuple(results)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from rich.console import Console
 
-from khala_orchestrator.console import Progress, card, clock, stderr_console, table
+from khala_orchestrator.console import Progress, card, clock, rule, stderr_console, table
 from khala_protocol.messages import AgentReport, Casualties, Clock, Rejection, Report, Result, Usage
 
 if TYPE_CHECKING:
@@ -112,6 +112,39 @@ def test_pictures_and_requests_of_unknown_size_are_named_beside_the_tokens(print
         "tokens    5,000 in (about 1,600 of them for 2 pictures), 70 out, 3 request(s), 1 of unknown size, "
         "no price known"
     )
+
+
+@pytest.mark.parametrize(
+    ("fields", "line"),
+    [
+        ({"rule": "frozen", "max_wait_s": 15}, "frozen: 8 loops a step, waits at most 15 s"),
+        ({"rule": "budget", "thinking_loops": 22}, "budget: 8 loops a step, 22 for a decision, waits at most 15 s"),
+        ({"rule": "token"}, "token: 8 loops a step, more for more tokens, waits at most 15 s"),
+        ({"rule": "realtime", "speed": 2}, "realtime: 8 loops a step, 44.8 in a second, waits at most 15 s"),
+    ],
+)
+def test_a_clock_in_a_line(fields: dict[str, Any], line: str) -> None:
+    assert rule(Clock.model_validate(fields)) == line
+
+
+def test_a_result_says_what_became_of_decisions_and_what_went_wrong(printed: Printed) -> None:
+    lines = printed(
+        table(
+            make_result(
+                outcome="aborted", cause="agents gone", valid=False,
+                invalid_because="required agents went away: blue/A",
+                fates={"A": {"fresh": 3}, "B": {"stale": 2, "fresh": 1}}, age_p50_loops=8, age_p95_loops=40, lag_s=1.25,
+                incidents=("step 7: required agent blue/A did not come back within 15 s",),
+            )
+        ),
+        width=100,
+    )  # fmt: skip
+    assert "aborted, agents gone (episode 0)" in lines[0]
+    assert [" ".join(line.strip("│ ").split()) for line in lines[6:9]] == [
+        "decisions 4 fresh, 2 stale; median age 8 loops, 95 % below 40; the game was 1.2 s behind",
+        "incident step 7: required agent blue/A did not come back within 15 s",
+        "not valid required agents went away: blue/A",
+    ]
 
 
 def test_game_time_is_minutes_and_seconds(subtests: pytest.Subtests) -> None:

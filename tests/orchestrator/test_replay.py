@@ -129,7 +129,7 @@ async def test_a_recording_reads_the_modules_that_are_allowed(foreign: Recording
     assert any('"text":"seen' in found.sent for found in differences)
 
 
-def test_a_run_card_of_another_version_is_named(recording: Recording, tmp_path: Path) -> None:
+async def test_a_run_card_of_another_version_is_named(recording: Recording, tmp_path: Path) -> None:
     other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(config={"name": 7}) if isinstance(m, Run) else m)
     with pytest.raises(RecordingError, match=r"b\.mcap: its run card is not one of this version: name: "):
         recorded_config(other)

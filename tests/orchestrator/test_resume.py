@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_orchestrator.host import host
-from khala_orchestrator.resume import ResumeError, unfinished
+from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.messages import Observation, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Iterable
     from pathlib import Path
 
     from khala_bridge.game.game import Sides
@@ -60,14 +60,15 @@ def digest(recording: Recording) -> str:
 
 
 @pytest.mark.parametrize("clock", CLOCKS, ids=lambda clock: clock["rule"])
+@pytest.mark.parametrize("killed", [(0, 3, 6), pytest.param(range(10), marks=pytest.mark.slow)], ids=["some", "all"])
 async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
-    hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any]
+    hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any], killed: Iterable[int]
 ) -> None:
     hall.game.after = EVENTS
     match = config(game=GAME, episodes=2, max_steps=5, step_loops=8, **clock)
     whole = tmp_path / "whole.mcap"
     results = await hall.play(match.model_copy(update={"record": whole}), Stalkers=stalkers)
-    for reports in range(10):
+    for reports in killed:
         past = unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
         assert (past.episode, past.steps) == divmod(reports, 5)
         path = tmp_path / f"resumed-{reports}.mcap"
@@ -86,7 +87,7 @@ async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:
 
 
 def _plain(result: Result) -> dict[str, Any]:
-    return result.model_dump(exclude={"wall_s", "latency_p50_s", "latency_p95_s", "lag_s"})
+    return result.model_dump(exclude={"incidents", "wall_s", "latency_p50_s", "latency_p95_s", "lag_s"})
 
 
 async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
@@ -98,6 +99,8 @@ async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
     heard = await hall.broker.session().subscribe("**/Zealots/*", Delivery.STATE)
     await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
     await heard.close()
+    steps = list(Recording.open(tmp_path / "resumed.mcap").of(Report))
+    assert [report.incidents for report in steps] == [(), (), (RESUMED,), ()]
     topics = [sample.key.rsplit("/", 1)[1] async for sample in heard]
     assert topics == ["briefing", "observation", "reply", "observation", "reply"]
 

@@ -173,8 +173,17 @@ async def test_agents_that_have_no_seat_are_named_and_count_for_nothing(
     assert caplog.messages == [
         "agent p1/Probe is not in this match",
         "agent p2/Zealots is not in this match",
-        "agent p1/Probe is not in this match",
     ]
+
+
+async def test_a_crowd_under_one_name_is_taken_note_of_up_to_a_limit(broker: MemoryBroker, peer: MakePeer) -> None:
+    zealots = peer(ZEALOTS)
+    for number in range(100):
+        await zealots.arrive(str(number))
+    async with called(broker) as (roster, _):
+        await settle()
+        assert roster.present(ZEALOTS)
+        assert len(roster._instances[ZEALOTS]) == 16
 
 
 async def test_agents_of_another_run_are_not_seen(broker: MemoryBroker, caplog: pytest.LogCaptureFixture) -> None:

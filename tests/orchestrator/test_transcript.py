@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_orchestrator.roster import Seat
 from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
@@ -228,10 +229,16 @@ def test_steps_are_one_or_a_range_that_may_be_open(subtests: pytest.Subtests) ->
 
 def test_a_selection_of_an_agent_holds_it_and_what_is_of_no_agent() -> None:
     selection = StepSelection.of("Stalkers", "7")
-    assert selection.holds(7, "Stalkers")
+    assert selection.holds(7, Seat("blue", "Stalkers"))
     assert selection.holds(7)
-    assert not selection.holds(7, "Zealots")
-    assert not selection.holds(8, "Stalkers")
+    assert not selection.holds(7, Seat("blue", "Zealots"))
+    assert not selection.holds(8, Seat("blue", "Stalkers"))
+
+
+def test_an_agent_with_its_side_is_not_the_one_of_the_same_name() -> None:
+    for name, sides in (("Captain", {"blue", "red"}), ("red/Captain", {"red"})):
+        selection = StepSelection.of(name, None)
+        assert {side for side in ("blue", "red") if selection.holds(0, Seat(side, "Captain"))} == sides
 
 
 def test_what_names_no_steps_is_refused(subtests: pytest.Subtests) -> None:

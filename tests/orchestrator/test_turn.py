@@ -544,6 +544,7 @@ async def test_a_required_agent_that_dies_is_waited_for_and_its_successor_loses_
         await again.reply("back")
         answers = await asked
     assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("back", [])
+    assert answers.incidents == ["required agent p1/Zealots was away for 29.0 s"]
 
 
 async def test_a_required_agent_that_does_not_come_back_is_lost(
@@ -558,6 +559,7 @@ async def test_a_required_agent_that_does_not_come_back_is_lost(
         ("Zealots", "Stalkers"), "gone"
     )
     assert answers.lost == [ZEALOTS]
+    assert answers.incidents == ["required agent p1/Zealots did not come back within 30 s"]
 
 
 async def test_one_that_is_back_and_silent_is_late_and_not_lost(

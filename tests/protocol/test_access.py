@@ -17,18 +17,19 @@ from khala_protocol.bus import Delivery, Liveness, Sample
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.testing import take
 from khala_protocol.bus.zenoh import ZenohBus, open_bus
-from khala_protocol.certificates import certify_agent, certify_observer, files_of, make_authority
+from khala_protocol.certificates import certify_adviser, certify_agent, certify_observer, files_of, make_authority
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 Sessions = Callable[[str], Awaitable[ZenohBus]]
 
-A, B, RED = "khala/r/blue/A", "khala/r/blue/B", "khala/r/red/C"
+A, B, RED, ADA = "khala/r/blue/A", "khala/r/blue/B", "khala/r/red/C", "khala/r/blue/Ada"
 TOPICS = [
     "khala/r/run", "khala/r/result", "khala/r/report", "khala/other/run",
     *(f"{who}/{topic}" for who in (A, B, RED)
-      for topic in ("briefing", "observation", "image/0", "reply", "exchange", "message")),
+      for topic in ("briefing", "observation", "image/0", "reply", "exchange", "message", "advice")),
+    f"{ADA}/advice",
 ]  # fmt: skip
 READS = {"khala/r/run", "khala/r/result", f"{A}/briefing", f"{A}/observation", f"{A}/image/0"}
 WRITES = {f"{A}/reply", f"{A}/exchange"}
@@ -42,7 +43,8 @@ async def sessions(tmp_path: Path) -> AsyncIterator[Sessions]:
     for agent in ("A", "Other"):
         certify_agent(tmp_path, "blue", agent)
     certify_observer(tmp_path, "o")
-    rules = router_settings([("blue", "A"), ("blue", "B"), ("red", "C")], "r")
+    certify_adviser(tmp_path, "blue", "Ada")
+    rules = router_settings([("blue", "A"), ("blue", "B"), ("red", "C")], "r", advisers=[("blue", "Ada")])
     listening = BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(tmp_path, "router"), zenoh=rules)
     async with AsyncExitStack() as stack:
 
@@ -70,6 +72,12 @@ async def test_an_observer_reads_the_run_and_writes_nothing(sessions: Sessions) 
     observer, host = await sessions("observer"), await sessions("host")
     assert await heard(host, observer) == OF_THE_RUN
     assert await heard(observer, host) == set()
+
+
+async def test_an_adviser_reads_what_is_for_all_and_writes_its_advice(sessions: Sessions) -> None:
+    adviser, host = await sessions("adviser:blue/Ada"), await sessions("host")
+    assert await heard(host, adviser) == {"khala/r/run", "khala/r/result", "khala/r/report"}
+    assert await heard(adviser, host) == {f"{ADA}/advice"}
 
 
 async def test_an_agent_that_is_in_no_task_reads_and_writes_nothing(sessions: Sessions) -> None:

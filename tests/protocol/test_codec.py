@@ -7,7 +7,7 @@ import types
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import pytest
-from annotated_types import Ge
+from annotated_types import Ge, Gt, Le
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +18,8 @@ from khala_protocol.speech import MAX_REPLY_CHARACTERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from pydantic.fields import FieldInfo
 
 JSON = st.recursive(
     st.none()
@@ -38,20 +40,29 @@ SIMPLE: dict[object, st.SearchStrategy[Any]] = {
 }
 
 
-def values(annotation: Any, *, least: int | None = None) -> st.SearchStrategy[Any]:  # noqa: PLR0911 - one a type
+def numbers(field: FieldInfo) -> dict[object, st.SearchStrategy[Any]]:
+    """Return the strategies for the numbers of a field with limits; none for one without."""
+    limits: dict[type, Any] = {type(one): getattr(one, type(one).__name__.lower(), None) for one in field.metadata}
+    least, most = limits.get(Ge, limits.get(Gt)), limits.get(Le, MOST)
+    if least is None:
+        return {}
+    return {int: st.integers(int(least), int(most)), float: st.floats(least, most, exclude_min=Gt in limits)}
+
+
+def values(  # noqa: PLR0911  # one a type
+    annotation: Any, limited: dict[object, st.SearchStrategy[Any]] | None = None
+) -> st.SearchStrategy[Any]:
     """Return a strategy for all values of a field of this annotation."""
     arguments = get_args(annotation)
     origin = get_origin(annotation)
-    if annotation is int and least is not None:
-        return st.integers(least, MOST)
-    if annotation == float | None and least is not None:
-        return st.none() | st.floats(least, MOST)
+    if limited and annotation in limited:
+        return limited[annotation]
     if annotation in SIMPLE:
         return SIMPLE[annotation]
     if origin is Literal:
         return st.sampled_from(arguments)
     if origin in (Union, types.UnionType):
-        return st.one_of([values(argument) for argument in arguments])
+        return st.one_of([values(argument, limited) for argument in arguments])
     if origin is tuple and arguments[-1] is ...:
         return st.lists(values(arguments[0]), max_size=2).map(tuple)
     if origin is tuple:
@@ -66,8 +77,7 @@ def built(model: type[Frozen]) -> st.SearchStrategy[Any]:
     hints = get_type_hints(model)
     fields = {}
     for name, field in model.model_fields.items():
-        least = next((int(str(limit.ge)) for limit in field.metadata if isinstance(limit, Ge)), None)
-        fields[name] = values(hints[name], least=least)
+        fields[name] = values(hints[name], numbers(field))
     return st.builds(model, **fields)
 
 

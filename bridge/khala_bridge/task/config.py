@@ -235,9 +235,18 @@ class SideConfig(Frozen):
     agents: Annotated[Agents, AfterValidator(_some)] | None = None
     channels: tuple[str, ...] | None = None
     communication: bool | None = None
+    advisers: tuple[AdviserConfig, ...] | None = None
     auto: AutoConfig | None = None
     default_reply: str | None = None
     max_actions: int | None = Field(default=None, ge=1)
+
+
+class AdviserConfig(Frozen):
+    """Somebody outside the match who may write to agents, see [advise](../how-to/advise.md)."""
+
+    name: KeyName
+    role: str = Field(default="adviser", min_length=1, max_length=60, pattern=r"^[^\x00-\x1f()]+$")
+    """What agents read beside the name."""
 
 
 class FaultRules(Frozen):
@@ -283,6 +292,9 @@ class TaskConfig(Frozen):
     """Names for groups of agents that can receive messages."""
     communication: bool = True
     """Whether agents may write to each other."""
+    advisers: tuple[AdviserConfig, ...] = (AdviserConfig(name="Adviser"),)
+    """People or programs who may write to agents in the match; `[]` if nobody may. The recording marks what they
+    write, and the result counts it."""
     executor: Literal["raw", "screen"] = "raw"
     clock: Clock = Clock()
     frames: Frames = Frames()
@@ -318,6 +330,13 @@ class TaskConfig(Frozen):
     def _one_map(self) -> Self:
         if bool(self.map) == (self.own_map is not None):
             raise ValueError("give either map or own_map")
+        return self
+
+    @model_validator(mode="after")
+    def _participants(self) -> Self:
+        for side in self.per_side():
+            names = [agent.name for agent in side.agents] + [adviser.name for adviser in side.advisers]
+            _once(map(str.casefold, names), "agent or adviser")
         return self
 
     @model_validator(mode="after")

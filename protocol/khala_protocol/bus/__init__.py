@@ -11,9 +11,9 @@ nothing of a bus may be touched from another thread, or after a fork.
     │ STATE    │ briefing, observation, image, run,  │ loses old ones, is   │ gets the newest at once, and │
     │          │ result                              │ counts them; never   │ after a lost link the newest │
     │          │                                     │ slows a sender down  │ it missed                    │
-    │ SPEECH   │ reply, message                      │ the sender waits,    │ gets nothing from before     │
+    │ SPEECH   │ reply, advice                       │ the sender waits,    │ gets nothing from before     │
     │          │                                     │ half a second at most│                              │
-    │ LOG      │ exchange, report                    │ loses, silently      │ gets nothing from before     │
+    │ LOG      │ exchange, message, report           │ loses, silently      │ gets nothing from before     │
     └──────────┴─────────────────────────────────────┴──────────────────────┴──────────────────────────────┘
 
 A link is slow if it is full, a process if it stands still. A process that only does not read what arrived never slows

@@ -82,7 +82,11 @@ def command_for(name: str, folder: str = "observer.NAME") -> str:
     role, _, whose = name.partition(":")
     side, _, agent = whose.partition("/")
     observer = folder.removeprefix("observer.")
-    commands = {"agent": f"agent {agent} DIR --side {side}", "observer": f"observer {observer} DIR"}
+    commands = {
+        "agent": f"agent {agent} DIR --side {side}",
+        "adviser": f"adviser {agent} DIR --side {side}",
+        "observer": f"observer {observer} DIR",
+    }
     return f"`khala keys {commands.get(role, 'init DIR')}`"
 
 

@@ -145,11 +145,13 @@ class Recording:
     def __iter__(self) -> Iterator[Recorded]:
         return read(self.path)
 
-    def of(self, kind: type[W], *, agent: str | None = None) -> Iterator[W]:
-        """Yield all messages of one kind, of one agent or of all, in the order of the file."""
+    def of(self, kind: type[W], *, agent: str | None = None, side: str | None = None) -> Iterator[W]:
+        """Yield all messages of one kind, of one agent or side or of all, in the order of the file."""
         for sample in self:
             address = sample.address
             if address is None or KINDS.get(address.topic) is not kind or agent not in (None, address.agent):
+                continue
+            if side not in (None, address.side):
                 continue
             if isinstance(sample.message, kind):
                 yield sample.message
@@ -165,9 +167,9 @@ class Recording:
                 seen.add(digest)
                 yield digest, sample.payload
 
-    def observations(self, agent: str) -> Iterator[Observation]:
-        """Yield the observations of one agent."""
-        return self.of(Observation, agent=agent)
+    def observations(self, agent: str, *, side: str | None = None) -> Iterator[Observation]:
+        """Yield the observations of one agent; `side` says which one, if both sides have one of this name."""
+        return self.of(Observation, agent=agent, side=side)
 
     def replies(self, step: int, episode: int = 0) -> tuple[Reply, ...]:
         """Return all answers to one step, in order of arrival, including late and repeated ones."""

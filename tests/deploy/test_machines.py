@@ -1,6 +1,7 @@
-"""One match on two machines: two network namespaces with a cable between them, and the commands a person would type.
+"""One match on two or three machines: network namespaces with cables, and the commands that a person would type.
 
-On the first machine are the keys, router and host, on the second the agents and their model.
+On the first machine are the keys, router and host, on the second the agents and their model. In a duel, the agents of
+one side are on the second machine, and those of the other on the third.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.netns, pytest.mark.game]
 
 ROUTER = "tls/192.0.2.1:7447"  # addresses of this range belong to nobody (RFC 5737)
-RUN, TASK = "two-hosts", "2s3z_pair"
+RUN, TASK, DUEL = "machines", "2s3z_pair", "duel_3m"
 AGENTS = ("Stalkers", "Zealots")
 READY_S, MATCH_S, END_S = 30.0, 60.0, 15.0
 
@@ -42,7 +43,8 @@ class Command:
         assert self.process.stdout is not None
         async with asyncio.timeout(READY_S):
             line = await self.process.stdout.readline()
-        assert line, self.log.read_text()
+        if not line:
+            await self.ended()
         return json.loads(line)
 
     async def said(self, text: str) -> None:
@@ -83,15 +85,19 @@ class Machine:
 
     async def khala(self, *arguments: str) -> Command:
         """Start a command there."""
+        return await self.python("-m", "khala", *arguments)
+
+    async def python(self, *arguments: str) -> Command:
+        """Start Python there."""
         process = await asyncio.create_subprocess_exec(
-            *("ip", "netns", "exec", self.name, sys.executable, "-m", "khala", *arguments),
+            *("ip", "netns", "exec", self.name, sys.executable, *arguments),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env={name: value for name, value in os.environ.items() if not name.startswith("KHALA_")}
             | {"KHALA_CACHE": str(self.directory / "cache")},
         )
-        command = Command(process, self.directory / f"{self.name}-{len(self.commands)}-{arguments[0]}.log")
+        command = Command(process, self.directory / f"{self.name}-{len(self.commands)}.log")
         self.commands.append(command)
         return command
 
@@ -112,26 +118,29 @@ def _ip(*arguments: str) -> None:
 
 
 @pytest.fixture
-async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine]]:
-    """Yield two machines that reach each other and nothing else."""
+async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine, Machine]]:
+    """Yield three machines that reach each other, through a switch at the first one, and nothing else."""
     if os.geteuid() != 0 or shutil.which("ip") is None:
         pytest.skip("network namespaces need root and iproute2")
-    first, second = (Machine(f"khala-{os.getpid()}-{n}", f"192.0.2.{n}", tmp_path) for n in (1, 2))
+    first, second, third = (Machine(f"khala-{os.getpid()}-{n}", f"192.0.2.{n}", tmp_path) for n in (1, 2, 3))
     async with contextlib.AsyncExitStack() as stack:
-        for machine in (first, second):
+        for machine in (first, second, third):
             try:
                 _ip("netns", "add", machine.name)
             except subprocess.CalledProcessError as error:
                 pytest.skip(f"no network namespaces here: {error.stderr.strip()}")
             stack.callback(_ip, "netns", "delete", machine.name)
             stack.push_async_callback(machine.off)
-        cable = ("type", "veth", "peer", "name", "cable", "netns", second.name)
-        _ip("link", "add", "name", "cable", "netns", first.name, *cable)
-        for machine in (first, second):
+            machine.ip("link", "set", "lo", "up")
+        first.ip("link", "add", "name", "cable", "type", "bridge")
+        for number, machine in enumerate((second, third)):
+            port = f"port-{number}"
+            first.ip("link", "add", "name", port, "type", "veth", "peer", "name", "cable", "netns", machine.name)
+            first.ip("link", "set", port, "master", "cable", "up")
+        for machine in (first, second, third):
             machine.ip("address", "add", f"{machine.address}/24", "dev", "cable")
             machine.ip("link", "set", "cable", "up")
-            machine.ip("link", "set", "lo", "up")
-        yield first, second
+        yield first, second, third
 
 
 async def _router_and_agents(first: Machine, second: Machine, *, latency_s: float) -> Command:
@@ -153,13 +162,13 @@ async def _router_and_agents(first: Machine, second: Machine, *, latency_s: floa
     return agents
 
 
-async def _host(first: Machine, *options: str) -> Command:
+async def _host(first: Machine, *options: str, task: str = TASK) -> Command:
     where = ("--connect", ROUTER, "--tls", str(first.directory / "keys"), "--out", str(first.directory / "runs"))
-    return await first.khala("host", TASK, "--run", RUN, *where, "--json", *options)
+    return await first.khala("host", task, "--run", RUN, *where, "--json", *options)
 
 
-async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, Machine]) -> None:
-    first, second = machines
+async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, Machine, Machine]) -> None:
+    first, second, _ = machines
     agents = await _router_and_agents(first, second, latency_s=0)
     played = await (await _host(first)).result(MATCH_S)
 
@@ -174,8 +183,8 @@ async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, M
 
 
 @pytest.mark.slow
-async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tuple[Machine, Machine]) -> None:
-    first, second = machines
+async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tuple[Machine, Machine, Machine]) -> None:
+    first, second, _ = machines
     agents = await _router_and_agents(first, second, latency_s=0.2)  # so that it happens early in the match
     host = await _host(first, "--max-wait", str(2 * MATCH_S))  # so that no deadline can end the wait
     await host.said("step 0, ")
@@ -187,3 +196,65 @@ async def test_a_match_goes_on_when_the_cable_to_its_agents_is_cut(machines: tup
     }
     agents.process.send_signal(signal.SIGTERM)
     assert {done["ended"] for done in (await agents.result(END_S))["agents"].values()} == {"stopped"}
+
+
+SPY = """
+import asyncio, json, sys
+from collections import Counter
+from pathlib import Path
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.certificates import agent_name
+from khala_protocol.joining import client_config
+from khala_protocol.keys import Topic, agent_key, run_key
+
+async def spy(router, keys, run):
+    bus = await open_bus(client_config([router], tls=Path(keys), names=(agent_name("red", "Captain"),), insecure=False))
+    heard = Counter()
+    topics = (Topic.BRIEFING, Topic.OBSERVATION, Topic.REPLY, Topic.MESSAGE, Topic.EXCHANGE)
+    wanted = [agent_key(run, side, "Captain", topic) for side in ("blue", "red") for topic in topics]
+
+    async def listen(key):
+        async for _ in await bus.subscribe(key, Delivery.LOG):
+            heard[key] += 1
+
+    listening = [asyncio.create_task(listen(key)) for key in (*wanted, run_key(run, Topic.REPORT))]
+    over = await bus.subscribe(run_key(run, Topic.RESULT), Delivery.STATE)
+    print(json.dumps("listening"), flush=True)
+    await anext(over)
+    print(json.dumps(heard))
+    await bus.close()
+
+asyncio.run(spy(*sys.argv[1:]))
+"""
+"""A program with the certificate of red's agent that asks for all that both agents read and write."""
+
+
+@pytest.mark.slow
+async def test_the_sides_of_a_duel_play_from_two_machines_and_read_nothing_of_each_other(
+    machines: tuple[Machine, Machine, Machine],
+) -> None:
+    first, *others = machines
+    keys = str(first.directory / "keys")
+    await (await first.khala("keys", "init", keys, "--host", "192.0.2.1")).ended()
+    router = await first.khala("router", "--listen", ROUTER, "--tls", keys, "--task", DUEL, "--run", RUN, "--json")
+    await router.line()
+    agents = {}
+    for machine, side, player in zip(others, ("blue", "red"), ("skilled", "focus-fire"), strict=True):
+        await (await first.khala("keys", "agent", "Captain", keys, "--side", side)).ended()
+        shutil.copytree(f"{keys}/agent.{side}.Captain", first.directory / side / "own")
+        where = ("--run", RUN, "--side", side, "--connect", ROUTER, "--tls", str(first.directory / side))
+        agents[side] = await machine.khala("agent", "Captain", *where, "--policy", player, "--json")
+        await agents[side].said("waiting for the host")
+    spy = await others[1].python("-c", SPY, ROUTER, str(first.directory / "red"), RUN)
+    assert await spy.line() == "listening"
+
+    results = (await (await _host(first, task=DUEL)).result(MATCH_S))["results"]
+    assert [result["side"] for result in results] == ["blue", "red"]
+    assert {result["outcome"] for result in results} in ({"win", "loss"}, {"draw"})
+    steps = results[0]["steps"]
+    assert [result["statuses"] for result in results] == [{"Captain": {"ok": steps}}] * 2
+    for agent in agents.values():
+        assert (await agent.result(END_S))["agents"]["Captain"]["replies"] == {"ok": steps}
+    own = f"khala/{RUN}/red/Captain"
+    assert await spy.line() == {f"{own}/briefing": 1, f"{own}/observation": steps}

@@ -1,0 +1,212 @@
+"""`khala advise`: read the reports of a running match, and write to its agents.
+
+A line of stdin is a message, for one agent if it begins with `@NAME`; on stdout is a line for each step. The host
+decides what becomes of a message: it takes those of the advisers that the task names, as many as it takes of agents.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TextIO
+
+import typer
+
+from khala import local_bus
+from khala_orchestrator.console import clock, visible_message
+from khala_orchestrator.mailbox import EVERYONE
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.codec import decode_as, encode
+from khala_protocol.errors import ConfigError
+from khala_protocol.joining import client_config
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import MAX_ADVICE_CHARACTERS, Advice, Report, Result, Run
+from khala_protocol.visible import visible_line
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.bus.config import BusConfig
+
+FIND_S = 5.0
+"""How long to wait for the run card, which every running match has published."""
+
+
+@dataclass(frozen=True, slots=True)
+class Adviser:
+    """Who advises in which run."""
+
+    run: str
+    side: str
+    name: str
+    recipient: str = EVERYONE
+    """Of messages that name none."""
+
+    def advice(self, line: str, card: Run) -> Advice:
+        """Return the message that a line holds.
+
+        Raises:
+            ConfigError: it is too long, or for nobody of this side.
+        """
+        recipient, text = self.recipient, line.strip()
+        if text.startswith("@"):
+            recipient, _, text = text[1:].partition(" ")
+        if not text.strip():
+            raise ConfigError("there is no text: write a line, or @NAME and a line")
+        if len(text) > MAX_ADVICE_CHARACTERS:
+            raise ConfigError(f"a message has at most {MAX_ADVICE_CHARACTERS} characters, and this one {len(text)}")
+        agents = [agent.name for agent in card.agents if agent.side == self.side]
+        if recipient.casefold() not in {EVERYONE, *map(str.casefold, agents)}:
+            raise ConfigError(f"there is no agent {recipient!r}: write to {', '.join(agents)} or {EVERYONE}")
+        return Advice(run=self.run, side=self.side, agent=self.name, recipient=recipient, text=text)
+
+
+class Advising:
+    """The part of an adviser in a running match.
+
+    Args:
+        bus: a session on the bus of the match.
+        adviser: who writes.
+        show: is called with the run card, every report of the side and every result.
+        complain: is called with a sentence about each line that is no message.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        adviser: Adviser,
+        *,
+        show: Callable[[Run | Report | Result], None],
+        complain: Callable[[str], None],
+    ) -> None:
+        self._bus, self._adviser = bus, adviser
+        self._show, self._complain = show, complain
+
+    async def play(self, lines: AsyncIterator[str], *, find_s: float = FIND_S) -> None:
+        """Advise until the match is over; the end of the lines ends nothing.
+
+        Raises:
+            ConfigError: there is no such run within `find_s`, or the adviser may not write to its agents.
+        """
+        async with contextlib.AsyncExitStack() as stack:
+            reports = await self._hear(stack, Topic.REPORT, Delivery.LOG)
+            results = await self._hear(stack, Topic.RESULT, Delivery.STATE)
+            card = await self._card(await self._hear(stack, Topic.RUN, Delivery.STATE), find_s)
+            key = agent_key(self._adviser.run, self._adviser.side, self._adviser.name, Topic.ADVICE)
+            publisher = await self._bus.publisher(key, Delivery.SPEECH)
+            stack.push_async_callback(publisher.close)
+            self._show(card)
+            writing = asyncio.create_task(self._write(publisher, lines, card), name="write advice")
+            reading = asyncio.create_task(self._read_reports(reports), name="read reports")
+            try:
+                await self._read_results(results, card)
+            finally:
+                await reports.close()  # what has arrived is still shown
+                writing.cancel()
+                await asyncio.wait({writing, reading})
+
+    async def _hear(self, stack: contextlib.AsyncExitStack, topic: Topic, delivery: Delivery) -> Subscription[Sample]:
+        subscription = await self._bus.subscribe(run_key(self._adviser.run, topic), delivery)
+        stack.push_async_callback(subscription.close)
+        return subscription
+
+    async def _card(self, cards: Subscription[Sample], find_s: float) -> Run:
+        run, name = self._adviser.run, self._adviser.name
+        try:
+            async with asyncio.timeout(find_s):
+                card = decode_as(Run, (await anext(cards)).payload)
+        except TimeoutError:
+            raise ConfigError(f"no match of the name {run!r} was found: is it running, and at this endpoint?") from None
+        if name not in card.advisers:
+            known = ", ".join(card.advisers) or "none"
+            raise ConfigError(f"the task has no adviser {name!r}; it has {known}: see `advisers` in task files")
+        return card
+
+    async def _write(self, publisher: Publisher, lines: AsyncIterator[str], card: Run) -> None:
+        async for line in lines:
+            try:
+                await publisher.put(encode(self._adviser.advice(line, card)))
+            except ConfigError as error:
+                self._complain(str(error))
+
+    async def _read_reports(self, reports: Subscription[Sample]) -> None:
+        async for sample in reports:
+            report = decode_as(Report, sample.payload)
+            if report.side == self._adviser.side:
+                self._show(report)
+
+    async def _read_results(self, results: Subscription[Sample], card: Run) -> None:
+        """Show results until that of the last episode, or of one that was aborted, has come for every side."""
+        sides = {agent.side for agent in card.agents}
+        async for sample in results:
+            result = decode_as(Result, sample.payload)
+            self._show(result)
+            if result.outcome == "aborted" or result.episode >= card.episodes - 1:
+                sides.discard(result.side)
+            if not sides:
+                return
+
+
+async def lines_of(stream: TextIO) -> AsyncIterator[str]:
+    """Yield the lines of a stream as they come; a thread waits for them, and does not keep the process from ending."""
+    loop, lines = asyncio.get_running_loop(), asyncio.Queue[str | None]()
+
+    def read() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits for lines any more
+            for line in stream:
+                loop.call_soon_threadsafe(lines.put_nowait, line)
+            loop.call_soon_threadsafe(lines.put_nowait, None)
+
+    threading.Thread(target=read, name="lines", daemon=True).start()
+    while (line := await lines.get()) is not None:
+        if line.strip():
+            yield line
+
+
+def told(message: Run | Report | Result) -> Iterator[str]:
+    """Yield the lines that tell a person of a message."""
+    message = visible_message(message)
+    match message:
+        case Run():
+            names = ", ".join(agent.name for agent in message.agents)
+            yield f"{message.run}: {message.task}, agents {names}; a line is for all of them, @NAME and a line for one"
+        case Report():
+            agents = ", ".join(f"{agent.agent} {agent.status}" for agent in message.agents) or "nobody decided"
+            yield f"{clock(message.game_loop)}  step {message.step}  score {message.score:g}  {agents}"
+            yield from (f"    {m.sender} → {m.recipient}: {visible_line(m.text)}" for m in message.messages)
+        case Result():
+            yield f"{message.side}: {message.outcome}, {message.cause} (episode {message.episode})"
+
+
+def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, insecure: bool, as_json: bool) -> None:
+    """Advise from stdin, on stdout, until the match is over."""
+
+    def show(message: Run | Report | Result) -> None:
+        for line in [message.model_dump_json()] if as_json else told(message):
+            typer.echo(line)
+
+    async def play() -> None:
+        bus = await open_bus(_config(adviser, connect, tls, insecure=insecure))
+        try:
+            lines = lines_of(sys.stdin)
+            advising = Advising(bus, adviser, show=show, complain=lambda text: typer.echo(text, err=True))
+            await advising.play(lines)
+        finally:
+            await bus.close()
+
+    asyncio.run(play())
+
+
+def _config(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> BusConfig:
+    """Return the configuration for the endpoints given, or for the match that is played on this machine."""
+    if tls is None:
+        return client_config(connect or local_bus.running()[:1], tls=None, insecure=insecure)
+    from khala_protocol.certificates import adviser_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
+
+    return client_config(connect, tls=tls, names=(adviser_name(adviser.side, adviser.name),), insecure=insecure)

@@ -1,0 +1,115 @@
+"""How the agents of a local match decide: with which model or policy, at which address, for how much money.
+
+`khala.local` is above; it starts agents that decide so. In a match of two sides each may have its own.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from khala import environment
+from khala_agents.build import Workshop
+from khala_agents.config import WorkerSpec, load_model
+from khala_agents.scripted.players import PLAYERS
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+SCRIPTED = "scripted"
+"""The model whose endpoint is started along with a match."""
+SILENT = "silent"
+
+
+@dataclass(frozen=True, slots=True)
+class Minds:
+    """How the agents of a side decide; see `khala agent --help`."""
+
+    model: str = SCRIPTED
+    model_name: str | None = None
+    base_url: str | None = None
+    policy: str | None = None
+    budget_usd: float | None = None
+    latency_s: float = 0.0
+    """Latency of the scripted endpoint, if it is started."""
+    fallback: str | None = None
+    """Policy that decides where the model has no reply."""
+
+    def named(self, text: str) -> Minds:
+        """Return minds with the model or the policy of this name; budget, latency and fallback stay.
+
+        Args:
+            text: a model, a model and its name at the endpoint (`scripted/skilled`), or a policy (`my_agent:decide`).
+        """
+        if text == SILENT or text in PLAYERS or ":" in text.partition("/")[0]:
+            return replace(self, policy=text, base_url=None)
+        if text.endswith((".yaml", ".yml")):
+            return replace(self, model=text, model_name=None, base_url=None, policy=None)
+        model, _, name = text.partition("/")
+        return replace(self, model=model, model_name=name or None, base_url=None, policy=None)
+
+    def check(self) -> None:
+        """Check that an agent could decide this way, before anything is started.
+
+        Raises:
+            ConfigError: a model file, a key or a policy is missing or wrong.
+        """
+        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
+        overrides = {"model": self.model_name, "base_url": self.base_url}
+        Workshop(budget_usd=self.budget_usd, overrides=overrides).policy(spec)
+
+    @property
+    def environ(self) -> dict[str, str]:
+        """The environment of the agents: all of ours for a policy, which is code of the user, but no keys of a bus."""
+        ours = {name: value for name, value in os.environ.items() if name != "KHALA_TLS"}
+        return ours if self.policy else environment.with_model(load_model(self.model))
+
+    @property
+    def needs_endpoint(self) -> bool:
+        """Whether the scripted endpoint is needed."""
+        return self.policy is None and self.base_url is None and self.model == SCRIPTED
+
+    def options(self, base_url: str | None) -> list[str]:
+        """Return the options of `khala agent` that say this; `base_url` is the scripted endpoint's."""
+        if self.policy:
+            return ["--policy", self.policy]
+        address = base_url if self.needs_endpoint else self.base_url
+        more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
+        given = [part for option, value in more.items() if value for part in (option, value)]
+        return ["--model", self.model, *given]
+
+
+def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> dict[str, Minds]:
+    """Return the minds of each side; each may spend the same part of the budget.
+
+    Args:
+        sides: names of the sides of the task.
+        common: minds of every side that has none of its own.
+        named: by side, what `Minds.named` takes.
+
+    Raises:
+        ConfigError: there is no such side.
+    """
+    if unknown := [side for side in named if side not in sides]:
+        is_it = f"its sides are {' and '.join(sides)}" if len(sides) > 1 else f"its only side is {sides[0]}"
+        raise ConfigError(f"the task has no side {unknown[0]}: {is_it}")
+    part = None if common.budget_usd is None else common.budget_usd / len(sides)
+    fair = replace(common, budget_usd=part)
+    return {side: fair.named(named[side]) if side in named else fair for side in sides}
+
+
+def named_sides(pairs: Sequence[str]) -> dict[str, str]:
+    """Return by side what `NAME=MODEL` says of it.
+
+    Raises:
+        ConfigError: one is not written so.
+    """
+    split = [pair.partition("=") for pair in pairs]
+    for name, equals, text in split:
+        if not (name and equals and text):
+            raise ConfigError(
+                f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
+            )
+    return {name: text for name, _, text in split}

@@ -1,0 +1,71 @@
+"""Which model or policy each side of a local match has, and what it may spend."""
+
+from __future__ import annotations
+
+import pytest
+
+from khala.cli import _why_not_valid
+from khala.local import _shares_of
+from khala.minds import Minds, minds_of, named_sides
+from khala_protocol.errors import ConfigError
+from khala_protocol.messages import Casualties, Result
+
+COMMON = Minds(model="deepseek", model_name="chat", base_url="http://x/v1", fallback="silent", budget_usd=3.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "model", "name", "policy"),
+    [
+        ("openai", "openai", None, None),
+        ("scripted/focus-fire", "scripted", "focus-fire", None),
+        ("vllm/org/llama:8b", "vllm", "org/llama:8b", None),
+        ("models/mine.yaml", "models/mine.yaml", None, None),
+        ("my_agent:decide", "deepseek", "chat", "my_agent:decide"),
+        ("skilled", "deepseek", "chat", "skilled"),
+        ("silent", "deepseek", "chat", "silent"),
+    ],
+)
+def test_a_side_is_given_a_model_its_name_or_a_policy(text: str, model: str, name: str | None, policy: str) -> None:
+    mind = COMMON.named(text)
+    assert (mind.model, mind.model_name, mind.policy) == (model, name, policy)
+    assert mind.base_url is None  # it is that of --model
+    assert mind.fallback == "silent"
+
+
+def test_a_policy_of_all_is_not_the_one_of_a_side_with_a_model() -> None:
+    minds = minds_of(["blue", "red"], Minds(policy="skilled"), {"red": "openai"})
+    assert (minds["blue"].policy, minds["red"].policy) == ("skilled", None)
+    assert minds["red"].options(None) == ["--model", "openai"]
+
+
+def test_both_sides_may_spend_the_same() -> None:
+    minds = minds_of(["blue", "red"], COMMON, {"red": "openai"})
+    assert [mind.budget_usd for mind in minds.values()] == [1.5, 1.5]
+    shares = list(_shares_of("red", ["A", "B", "C"], [], 1.5, sides=2))
+    assert [(share.process, share.names, share.left_usd) for share in shares] == [
+        ("agents-red-0", ["A", "C"], 0.75),
+        ("agents-red-1", ["B"], 0.75),
+    ]
+    assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
+
+
+def test_a_side_and_its_model_stand_around_an_equals_sign() -> None:
+    assert named_sides(["red=openai", "green=a=b"]) == {"red": "openai", "green": "a=b"}
+    for wrong in ("red", "=openai", "red="):
+        with pytest.raises(ConfigError, match="write red=openai"):
+            named_sides([wrong])
+
+
+def result(side: str, invalid_because: str = "") -> Result:
+    return Result(
+        run="r", side=side, episode=0, outcome="draw", cause="time limit", valid=not invalid_because,
+        invalid_because=invalid_because, steps=1, env_steps=1, game_loop=1, game_s=0.1, wall_s=0.1,
+        killed=Casualties(), lost=Casualties(), kd=None,
+    )  # fmt: skip
+
+
+def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
+    assert list(_why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
+    assert list(_why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
+    assert list(_why_not_valid([result("blue", "x")])) == ["x"]
+    assert list(_why_not_valid([result("blue"), result("red")])) == []
