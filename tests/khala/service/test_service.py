@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import pytest
 
-from khala.local import Minds
 from khala.matches import new
+from khala.minds import Minds
 from khala.service import client
 from khala.service.book import Limits
 from khala.service.client import NoService, Refused
