@@ -1,4 +1,4 @@
-"""How long a match takes from its order to its first observation, with and without a worker that waits, and many at once.
+"""How long a match takes from its order to its first observation, cold and warm, and how fast several are at once.
 
 python -m bench serve [--orders 5] [--matches 4]
 """

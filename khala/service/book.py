@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 KEPT = 100
 """Matches that are over and still listed."""
 USUAL_MB = 700
-"""Memory of a match before one has shown what it takes: host, game, endpoint and two processes of agents."""
+"""Memory of a match that has not shown that it takes more: host, game, endpoint and two processes of agents."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class Book:
         waiting, running = self.of("queued"), self.of("running")
         if not waiting or len(running) >= self.limits.matches:
             return None
-        if running and used_mb + (self._largest_mb or USUAL_MB) > self.limits.memory_mb:
+        if running and used_mb + max(self._largest_mb, USUAL_MB) > self.limits.memory_mb:
             return None
         busy = Counter(entry.card.owner for entry in running)
         return min(waiting, key=lambda entry: busy[entry.card.owner])

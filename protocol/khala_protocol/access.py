@@ -24,7 +24,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from khala_protocol.certificates import HOST, OBSERVER, adviser_name, agent_name
-from khala_protocol.keys import ROOT, Topic, check_name
+from khala_protocol.keys import EVERY_ORDER, ROOT, Topic, check_name
+from khala_protocol.service import MAX_ORDER_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -129,6 +130,7 @@ def _sizes() -> Iterable[dict[str, Any]]:
     limits = {Topic.REPLY: REPLY_BYTES, Topic.EXCHANGE: EXCHANGE_BYTES, Topic.ADVICE: ADVICE_BYTES}
     for topic, size in limits.items():
         yield _limit(["put"], [f"{ROOT}/*/*/*/{topic}"], size)
+    yield _limit(["put"], [EVERY_ORDER], MAX_ORDER_BYTES)
     yield _limit(["query"], _with_caches(f"{ROOT}/**"), QUESTION_BYTES)
 
 

@@ -32,7 +32,7 @@ FILE = re.compile(r"`([\w*<>-][\w.*<>/-]*\.(?:py|md|yaml|toml|json|tsv))`")
 MODULE = re.compile(r"(?<![\w./<>*-])\w[\w/]*\.py\b")
 
 # What looks like ours and is not: keys of the bus, files that a reader or a command writes, files of the game.
-KEY = re.compile(r"khala/(?:<run>|first|first2|duel)(?:/|$)")
+KEY = re.compile(r"khala/(?:<run>|first|first2|duel)(?:/|$)|khala/service/(?:order/|matches$)")
 FOREIGN = {
     "kite.yaml": "a reader of the tutorial writes it",
     "my_model.yaml": "a reader writes it",

@@ -1,0 +1,284 @@
+"""The service on a bus in memory, with players that only pretend: orders, turns, lost workers, limits, the end."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import pytest
+
+from khala.matches import new
+from khala.minds import Minds
+from khala.service import client
+from khala.service.book import Limits
+from khala.service.client import NoService, Refused
+from khala.service.daemon import STARTS, Service
+from khala.service.pool import Ending
+from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
+from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.codec import encode
+from khala_protocol.errors import ConfigError
+from khala_protocol.keys import Topic, run_key
+from khala_protocol.messages import AgentReport, Report, Usage
+from khala_protocol.service import MAX_ORDER_BYTES, MatchCard, Stop, Submit
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+    from khala.service.worker import Job
+    from khala_protocol.bus import Bus
+    from khala_protocol.messages import Wire
+
+CLOCK = "jumps"
+
+
+class Pretender:
+    """A player that plays until it is told how the match ended."""
+
+    pid = 1
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._ending: asyncio.Future[Ending] = asyncio.get_running_loop().create_future()
+        self.job: Job | None = None
+
+    async def play(self, job: Job) -> Ending:
+        self.job = job
+        self._stage.playing[job.config.run] = self
+        self._stage.begun.append(job.config.run)
+        return await self._ending
+
+    def end(self, state: str, words: str = "") -> None:
+        if not self._ending.done():
+            self._ending.set_result(Ending(state, words))
+
+    def stop(self) -> None:
+        self.end("stopped")
+
+    async def close(self) -> None:
+        pass
+
+
+@dataclass
+class Stage:
+    """A service, a bus, and who plays on it."""
+
+    out: Path
+    limits: Limits = field(default_factory=Limits)
+    broker: MemoryBroker = field(default_factory=MemoryBroker)
+    playing: dict[str, Pretender] = field(default_factory=dict)
+    begun: list[str] = field(default_factory=list)
+    used_mb: int = 0
+    stop: asyncio.Event = field(default_factory=asyncio.Event)
+    drain_s: float = 5.0
+    _service: asyncio.Task[None] | None = None
+
+    async def __aenter__(self) -> Self:
+        async def take() -> Pretender:
+            return Pretender(self)
+
+        service = Service(
+            self.broker.session(), BusConfig(), take, self.out, self.limits, self.drain_s,
+            used_mb=lambda: self.used_mb, measure=lambda _: self.used_mb // 2,
+        )  # fmt: skip
+        self._service = asyncio.create_task(service.run(self.stop))
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.stop.set()
+        await self.ended()
+
+    async def ended(self) -> None:
+        assert self._service is not None
+        await self._service
+
+    @property
+    def bus(self) -> Bus:
+        return self.broker.session()
+
+    async def submit(self, run: str, owner: str = "", **changes: Any) -> MatchCard:
+        return await client.submit(self.bus, order(run, owner, **changes))
+
+    async def card(self, run: str) -> MatchCard:
+        await asyncio.sleep(1)
+        return client.find(await client.listed(self.bus), run)
+
+    async def report(self, run: str, step: int) -> None:
+        usage = Usage(requests=1, cost_usd=0.25)
+        agent = AgentReport(agent="Stalkers", side="blue", status="ok", usage=usage)
+        publisher = await self.bus.publisher(run_key(run, Topic.REPORT), Delivery.LOG)
+        await publisher.put(encode(Report(run=run, episode=0, step=step, game_loop=1, agents=(agent,))))
+
+
+def order(run: str, owner: str = "", match: dict[str, Any] | None = None, **minds: Any) -> Submit:
+    config = new("2s3z_pair", run, Path("nowhere"), seed=1, episodes=1, assemble_s=60.0)
+    plain = config.model_dump(mode="json", exclude={"record", "run"})
+    return Submit(
+        run=run, number=client.new_number(), owner=owner, match=plain | (match or {}), minds=asdict(Minds()) | minds
+    )
+
+
+@pytest.fixture
+async def stage(tmp_path: Path) -> AsyncIterator[Stage]:
+    async with Stage(tmp_path, Limits(matches=2)) as stage:
+        yield stage
+
+
+async def test_a_match_is_taken_played_and_listed_with_its_steps_and_its_cost(stage: Stage) -> None:
+    assert (await stage.submit("first", "ann")).state in {"queued", "running"}
+    await stage.report("first", 4)
+    running = await stage.card("first")
+    assert (running.state, running.step, running.cost_usd, running.owner) == ("running", 5, 0.25, "ann")
+    stage.playing["first"].end("done")
+    assert (await stage.card("first")).state == "done"
+
+
+async def test_the_same_order_twice_is_one_match(stage: Stage) -> None:
+    wanted = order("first")
+    await client.submit(stage.bus, wanted)
+    stage.playing["first"].end("done")
+    assert (await client.submit(stage.bus, wanted)).number == wanted.number
+    assert len((await client.listed(stage.bus)).matches) == len(stage.begun) == 1
+
+
+async def test_owners_take_turns(stage: Stage) -> None:
+    for run, owner in (("a1", "ann"), ("a2", "ann"), ("a3", "ann"), ("b1", "bob")):
+        await stage.submit(run, owner)
+        await asyncio.sleep(0.1)
+    stage.playing["a1"].end("done")
+    await asyncio.sleep(0.1)
+    assert stage.begun == ["a1", "a2", "b1"]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "because"),
+    [
+        ({"base_url": "http://elsewhere"}, "--base-url is for a service that was started with --trust"),
+        ({"policy": "os:system"}, "--policy MODULE:NAME is for a service that was started with --trust"),
+        ({"fallback": "os:system"}, "--fallback MODULE:NAME is for a service"),
+        ({"model": "/etc/model.yaml"}, "a model file is for a service"),
+        ({"model": "no-such"}, "there is no model file 'no-such'"),
+        ({"colour": "red"}, "there is no option 'colour'"),
+        ({"match": {"episodes": 0}}, "episodes: "),
+    ],
+    ids=str,
+)
+async def test_what_cannot_or_may_not_be_played_is_refused_in_a_sentence(
+    stage: Stage, wanted: dict[str, Any], because: str
+) -> None:
+    with pytest.raises(Refused, match=because):
+        await stage.submit("first", **wanted)
+    assert stage.begun == []
+
+
+async def test_a_name_that_is_in_use_and_a_full_queue_are_refused(tmp_path: Path) -> None:
+    async with Stage(tmp_path, Limits(matches=1, queued=1)) as stage:
+        await stage.submit("first")
+        with pytest.raises(Refused, match="a match called first is running already: give another --run"):
+            await stage.submit("first")
+        await stage.submit("second")
+        with pytest.raises(Refused, match="1 matches are waiting already"):
+            await stage.submit("third")
+
+
+async def test_bytes_that_are_no_order_change_nothing(stage: Stage) -> None:
+    for payload in (b"", b"{}", b"x" * (MAX_ORDER_BYTES + 1), encode(Stop(run="first", number="other"))):
+        publisher = await stage.bus.publisher("khala/service/order/mine", Delivery.SPEECH)
+        await publisher.put(payload)
+    assert (await client.listed(stage.bus)).matches == ()
+
+
+async def test_a_match_is_stopped_while_it_waits_and_while_it_plays(stage: Stage) -> None:
+    for run in ("first", "second", "third"):
+        await stage.submit(run)
+    await stage.report("first", 4)
+    waiting = await client.stop(stage.bus, Stop(run="third", number=client.new_number()))
+    assert (waiting.state, waiting.reason) == ("stopped", "stopped by an order")
+    card = await client.stop(stage.bus, Stop(run="first", number=client.new_number()))
+    assert card.state == "stopped"
+    assert card.reason.startswith("stopped by an order; `khala run --resume ")
+    with pytest.raises(ConfigError, match="the service has no match 'fourth'; its newest are first, second, third"):
+        await client.stop(stage.bus, Stop(run="fourth", number=client.new_number()))
+
+
+async def test_the_match_of_a_lost_worker_goes_on_in_another_and_touches_no_other(stage: Stage) -> None:
+    await stage.submit("first")
+    await stage.submit("second")
+    await stage.report("first", 4)
+    await asyncio.sleep(1)
+    lost, other = stage.playing["first"], stage.playing["second"]
+    lost.end("lost", "its worker ended with SIGKILL")
+    await asyncio.sleep(1)
+    assert stage.playing["first"].job is not None
+    assert stage.playing["first"].job.resume
+    assert (await stage.card("first")).starts == 2
+    assert stage.playing["second"] is other
+
+
+async def test_a_match_that_loses_every_worker_has_failed(stage: Stage) -> None:
+    await stage.submit("first")
+    for _ in range(STARTS):
+        await asyncio.sleep(0.1)
+        stage.playing.pop("first").end("lost", "its worker ended with SIGSEGV")
+    card = await stage.card("first")
+    assert (card.state, card.reason) == ("failed", "its worker ended with SIGSEGV, 3 times")
+
+
+async def test_a_match_waits_for_memory_and_the_largest_ends_when_it_is_used_up(tmp_path: Path) -> None:
+    async with Stage(tmp_path, Limits(matches=2, memory_mb=1000)) as stage:
+        stage.used_mb = 600
+        await stage.submit("first")
+        await stage.submit("second")
+        await asyncio.sleep(5)
+        assert stage.begun == ["first"]
+        stage.used_mb = 1200
+        await asyncio.sleep(5)
+        card = await stage.card("first")
+        assert card.state == "failed"
+        assert card.reason.startswith("it had 600 MB when all had 1200 of 1000 MB (--memory-gb)")
+
+
+async def test_at_the_end_the_running_match_may_finish_and_the_waiting_one_does_not_begin(tmp_path: Path) -> None:
+    async with Stage(tmp_path, Limits(matches=1)) as stage:
+        await stage.submit("first")
+        await stage.submit("second")
+        seen = asyncio.create_task(client.watch(stage.bus, "first", lambda _: None))
+        stage.stop.set()
+        await asyncio.sleep(1)
+        waiting = await stage.card("second")
+        assert (waiting.state, waiting.reason) == ("stopped", "the service ended before its turn came")
+        with pytest.raises(Refused, match="the service is ending, and takes no more matches"):
+            await stage.submit("third")
+        stage.playing["first"].end("done")
+        assert (await seen).state == "done"
+        await stage.ended()
+
+
+async def test_a_match_that_does_not_end_is_stopped_when_the_time_for_it_is_over(tmp_path: Path) -> None:
+    async with Stage(tmp_path, drain_s=30) as stage:
+        await stage.submit("first")
+        seen = asyncio.create_task(client.watch(stage.bus, "first", lambda _: None))
+        began_s = asyncio.get_running_loop().time()
+        stage.stop.set()
+        await stage.ended()
+        assert 30 <= asyncio.get_running_loop().time() - began_s < 40
+        assert (await seen).reason == "the service ended"
+
+
+async def test_who_watches_sees_the_reports_until_the_match_is_over(stage: Stage) -> None:
+    await stage.submit("first")
+    seen: list[Wire] = []
+    watching = asyncio.create_task(client.watch(stage.bus, "first", seen.append))
+    await asyncio.sleep(0.1)
+    await stage.report("first", 0)
+    stage.playing["first"].end("done")
+    assert (await watching).state == "done"
+    assert [type(message) for message in seen] == [Report]
+
+
+async def test_without_a_service_the_client_says_so() -> None:
+    with pytest.raises(NoService, match="no service answers here within 15 s: `khala serve` starts one"):
+        await client.listed(MemoryBroker().session())
