@@ -119,9 +119,9 @@ def _asked(step: int, agent: AgentReport) -> int:
 
 
 def _past_s(recording: Recording, speed: float) -> Iterator[float]:
-    """Yield how much later each step began than the wall clock says, compared with the most punctual one."""
+    """Yield how late each step began, beside the lag, compared with the most punctual one."""
     began = [
-        (sample.log_time_ns / 1e9 - _took_s(sample.message), sample.message.game_loop)
+        (sample.log_time_ns / 1e9 - _took_s(sample.message) - sample.message.timings.lag_s, sample.message.game_loop)
         for sample in recording
         if isinstance(sample.message, Report)
     ]
