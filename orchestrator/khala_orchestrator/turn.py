@@ -171,6 +171,7 @@ class Turn:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._inbox is not None and self._pump is not None
+        self._open.clear()  # agents leave now, and nobody waits for them
         await self._inbox.close()
         await asyncio.wait([self._pump])
         for publisher in (*self._publishers.values(), *self._frames.values()):
