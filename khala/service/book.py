@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 KEPT = 100
 """Matches that are over and still listed."""
+MAX_NAME = 64
+"""Of the name of a match that is refused, perhaps for its name."""
 USUAL_MB = 700
 """Memory of a match that has not shown that it takes more: host, game, endpoint and two processes of agents."""
 
@@ -98,7 +100,7 @@ class Book:
 
     def refuse(self, order: Submit, reason: str) -> Entry:
         """Keep in mind why a match was not taken, for the one who asks."""
-        card = MatchCard(run=order.run, number=order.number, owner=order.owner, task="", state="refused")
+        card = MatchCard(run=order.run[:MAX_NAME], number=order.number, owner=order.owner, task="", state="refused")
         return self._put(Entry(card.but(reason=reason[:MAX_WORDS])))
 
     def next(self, used_mb: int) -> Entry | None:

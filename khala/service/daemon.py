@@ -145,6 +145,9 @@ class Service:
             log.info("match taken: %s for %s", entry.card.task, order.owner or "nobody", extra={"run": order.run})
         except KhalaError as error:
             self.book.refuse(order, str(error))
+        except Exception as error:  # an order comes from somewhere else: it must not end the service
+            log.exception("an order that cannot be read", extra={"run": order.run[:64]})
+            self.book.refuse(order, f"the service could not read it: {type(error).__name__}")
 
     def _stop(self, entry: Entry, because: str) -> None:
         if entry.card.state == "queued":
@@ -218,7 +221,10 @@ class Service:
                 case Result():
                     self.book.result(message)
             for listener in self.listeners:
-                listener.hear(message)
+                try:
+                    listener.hear(message)
+                except Exception:  # what is counted of matches must not end them
+                    log.exception("a message could not be counted", extra={"run": message.run})
 
     async def _list(self, list_: Publisher) -> None:
         """Publish the list, some times a second, if it is another one."""

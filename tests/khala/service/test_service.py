@@ -174,6 +174,27 @@ async def test_what_cannot_or_may_not_be_played_is_refused_in_a_sentence(
     assert stage.begun == []
 
 
+async def test_a_name_that_cannot_be_one_is_refused_and_not_listed_at_length(stage: Stage) -> None:
+    wanted = order("first").model_copy(update={"run": "x/" * 10_000})
+    with pytest.raises(Refused, match="cannot stand in a key"):
+        await client.submit(stage.bus, wanted)
+    assert len((await client.listed(stage.bus)).matches[0].run) == 64
+
+
+async def test_an_order_that_breaks_the_reader_is_refused_and_the_service_goes_on(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as broken:
+        broken.setattr("khala.service.daemon.match_of", _breaks)
+        with pytest.raises(Refused, match="the service could not read it: RecursionError"):
+            await stage.submit("first")
+    assert (await stage.submit("second")).state in {"queued", "running"}
+
+
+def _breaks(*_: object, **__: object) -> None:
+    raise RecursionError
+
+
 async def test_a_name_that_is_in_use_and_a_full_queue_are_refused(tmp_path: Path) -> None:
     async with Stage(tmp_path, Limits(matches=1, queued=1)) as stage:
         await stage.submit("first")
