@@ -13,6 +13,7 @@ from pathlib import Path
 MEASUREMENTS = (
     "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "act",
     "recognition", "macro", "image", "http_client", "recording", "orphans", "strangers",
+    "faults", "resume", "soak",
 )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 from rich.table import Table
@@ -185,7 +185,7 @@ class Relay:
         """Where to connect."""
         return f"tcp/127.0.0.1:{self._port}"
 
-    async def __aenter__(self) -> Relay:
+    async def __aenter__(self) -> Self:
         await self.mend()
         return self
 

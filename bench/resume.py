@@ -260,7 +260,7 @@ async def measure(kills: int, seed: int) -> tuple[list[Kill], list[str], int]:
     with tempfile.TemporaryDirectory() as directory, Processes(Path(directory)) as processes:
         ready = Path(directory) / "llm.json"
         processes.start("llm", "llm", "--port", "0", "--ready-file", str(ready))
-        while not ready.exists():
+        while not ready.exists():  # noqa: ASYNC110  # another process writes it
             await asyncio.sleep(0.1)
         model = json.loads(ready.read_text())["base_url"]
         whole: dict[tuple[str, int], Whole] = {}
@@ -310,7 +310,9 @@ def main() -> None:
     for line in failed:
         print(line, file=sys.stderr)
     unequal = sum(not one.equal for one in found)
-    print(f"{len(found)} resumed, {len(failed)} matches failed, {unequal} not equal, {orphans} orphans", file=sys.stderr)
+    print(
+        f"{len(found)} resumed, {len(failed)} matches failed, {unequal} not equal, {orphans} orphans", file=sys.stderr
+    )
     if arguments.json:
         print(json.dumps({"kills": [asdict(one) for one in found], "failed": failed, "orphans": orphans}))
     raise SystemExit(1 if failed or unequal or orphans else 0)
