@@ -70,7 +70,7 @@ TOO_LATE_S = 0.15
 MOST_LATE = 0.05
 ANSWER_S = 1.0
 """After the restart of a router all have answered within this time."""
-RECOVERY_S = 45.0
+RECOVERY_S = 90.0
 """A match that has not gone on after so long is lost."""
 ENDPOINT = {"500": 0.06, "429": 0.05, "stall": 0.02, "reset": 0.05, "half": 0.03, "garbage": 0.05, "nonsense": 0.04}
 SABOTAGE = 0.6

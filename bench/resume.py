@@ -273,7 +273,7 @@ async def measure(kills: int, seed: int) -> tuple[list[Kill], list[str], int]:
             try:
                 path, seen = await play(processes, model, case, moments)
             except (RuntimeError, TimeoutError) as error:
-                failed.append(f"{case.name}, killed at {moments}: {error or 'nothing happened for too long'}")
+                failed.append(f"{case.name}, killed at {moments}: {str(error) or 'nothing happened for too long'}")
                 continue
             found += await _judged(seen, Whole.of(path), whole[case.clock, case.memory], case, path)
             print(f"{case.name}: {found[-1]}", file=sys.stderr)
