@@ -21,6 +21,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import resource
 import signal
 import statistics
@@ -75,6 +76,10 @@ RECOVERY_S = 90.0
 ENDPOINT = {"500": 0.06, "429": 0.05, "stall": 0.02, "reset": 0.05, "half": 0.03, "garbage": 0.05, "nonsense": 0.04}
 SABOTAGE = 0.6
 """Part of the observations to which the saboteur answers, too."""
+
+
+MARK = re.compile(r"(\w+) (\d+) (\d+) (?:policy|model|late|duplicate|malformed|for another agent)")
+"""See `mark`."""
 
 
 # --- agents -----------------------------------------------------------------------------------------
@@ -425,7 +430,10 @@ def judge(recording: Recording, faults: Sequence[Fault], max_wait_s: float, verd
         verdict.steps += 1
         verdict.statuses.update(agent.status for agent in report.agents)
         for message in report.messages:
-            agent, episode, step, _ = message.text.split(" ")
+            found = MARK.fullmatch(message.text)
+            if found is None:  # words of the model
+                continue
+            agent, episode, step = found.groups()
             executed[agent, episode, step] += 1
             verdict.foreign += agent != message.sender
             verdict.late += (int(episode), int(step)) != (report.episode, report.step)
