@@ -21,6 +21,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import resource
 import signal
 import statistics
@@ -30,7 +31,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 from rich.table import Table
@@ -70,11 +71,15 @@ TOO_LATE_S = 0.15
 MOST_LATE = 0.05
 ANSWER_S = 1.0
 """After the restart of a router all have answered within this time."""
-RECOVERY_S = 45.0
+RECOVERY_S = 90.0
 """A match that has not gone on after so long is lost."""
 ENDPOINT = {"500": 0.06, "429": 0.05, "stall": 0.02, "reset": 0.05, "half": 0.03, "garbage": 0.05, "nonsense": 0.04}
 SABOTAGE = 0.6
 """Part of the observations to which the saboteur answers, too."""
+
+
+MARK = re.compile(r"(\w+) (\d+) (\d+) (?:policy|model|late|duplicate|malformed|for another agent)")
+"""See `mark`."""
 
 
 # --- agents -----------------------------------------------------------------------------------------
@@ -185,7 +190,7 @@ class Relay:
         """Where to connect."""
         return f"tcp/127.0.0.1:{self._port}"
 
-    async def __aenter__(self) -> Relay:
+    async def __aenter__(self) -> Self:
         await self.mend()
         return self
 
@@ -425,7 +430,10 @@ def judge(recording: Recording, faults: Sequence[Fault], max_wait_s: float, verd
         verdict.steps += 1
         verdict.statuses.update(agent.status for agent in report.agents)
         for message in report.messages:
-            agent, episode, step, _ = message.text.split(" ")
+            found = MARK.fullmatch(message.text)
+            if found is None:  # words of the model
+                continue
+            agent, episode, step = found.groups()
             executed[agent, episode, step] += 1
             verdict.foreign += agent != message.sender
             verdict.late += (int(episode), int(step)) != (report.episode, report.step)

@@ -13,12 +13,12 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from bench.orphans import processes_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
     from types import TracebackType
 
 END_S = 10.0

@@ -260,7 +260,7 @@ async def measure(kills: int, seed: int) -> tuple[list[Kill], list[str], int]:
     with tempfile.TemporaryDirectory() as directory, Processes(Path(directory)) as processes:
         ready = Path(directory) / "llm.json"
         processes.start("llm", "llm", "--port", "0", "--ready-file", str(ready))
-        while not ready.exists():
+        while not ready.exists():  # noqa: ASYNC110  # another process writes it
             await asyncio.sleep(0.1)
         model = json.loads(ready.read_text())["base_url"]
         whole: dict[tuple[str, int], Whole] = {}
@@ -273,7 +273,7 @@ async def measure(kills: int, seed: int) -> tuple[list[Kill], list[str], int]:
             try:
                 path, seen = await play(processes, model, case, moments)
             except (RuntimeError, TimeoutError) as error:
-                failed.append(f"{case.name}, killed at {moments}: {error or 'nothing happened for too long'}")
+                failed.append(f"{case.name}, killed at {moments}: {str(error) or 'nothing happened for too long'}")
                 continue
             found += await _judged(seen, Whole.of(path), whole[case.clock, case.memory], case, path)
             print(f"{case.name}: {found[-1]}", file=sys.stderr)
