@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+ASK_AGAIN_S = 1.0
+"""How often an agent that is away is asked again."""
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -252,13 +255,22 @@ class Turn:
         """Wait until no open question is waited for."""
         while waiting := [asked for asked in self._open.values() if asked.waiting]:
             self._check_pump()
-            until = min((asked.until for asked in waiting if asked.until is not None), default=None)
+            moments = [asked.until for asked in waiting if asked.until is not None]
+            if any(asked.held for asked in waiting):
+                moments.append(asyncio.get_running_loop().time() + ASK_AGAIN_S)
             self._changed.clear()
             try:
-                async with asyncio.timeout_at(until):
+                async with asyncio.timeout_at(min(moments, default=None)):
                     await self._changed.wait()
             except TimeoutError:
                 self._close_overdue()
+                await self._ask_again()
+
+    async def _ask_again(self) -> None:
+        """Ask those that seem to be away: news of a token may be lost, and an agent that answers is there."""
+        for seat, asked in self._open.items():
+            if asked.held and asked.waiting:
+                await self._publishers[seat].put(asked.payload)
 
     def _close_overdue(self) -> None:
         now = asyncio.get_running_loop().time()

@@ -589,6 +589,19 @@ async def test_one_whose_link_is_back_is_asked_again(broker: MemoryBroker, peer:
         assert (await asked).by_seat[ZEALOTS].text == "once more"
 
 
+async def test_one_whose_return_was_not_reported_is_found_by_its_answer(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS) as (turn, (zealots,)):
+        await zealots.leave()  # its token, and not its link
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        seen = [await zealots.observed() for _ in range(3)]
+        assert asyncio.get_running_loop().time() == pytest.approx(2)
+        await zealots.reply("here all the time")
+        assert (await asked).by_seat[ZEALOTS].text == "here all the time"
+    assert seen == [seen[0]] * 3
+
+
 async def test_while_our_own_link_is_down_the_clock_stands_still(
     broker: MemoryBroker, peer: MakePeer, observe: Observe
 ) -> None:
