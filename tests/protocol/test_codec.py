@@ -7,7 +7,7 @@ import types
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import pytest
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MinLen
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -77,14 +77,14 @@ def built(model: type[Frozen]) -> st.SearchStrategy[Any]:
     hints = get_type_hints(model)
     fields = {}
     for name, field in model.model_fields.items():
-        fields[name] = values(hints[name], numbers(field))
+        shortest = next((limit.min_length for limit in field.metadata if isinstance(limit, MinLen)), 0)
+        texts = {str: st.text(min_size=shortest, max_size=20)} if shortest else {}
+        fields[name] = values(hints[name], numbers(field) | texts)
     return st.builds(model, **fields)
 
 
 A_MESSAGE = Message(run="r", agent="A", side="p1", episode=0, step=0, recipient="B", text="hi")
-MESSAGE_BYTES = (
-    b'{"v":1,"run":"r","kind":"message","agent":"A","side":"p1","episode":0,"step":0,"recipient":"B","text":"hi"}'
-)
+MESSAGE_BYTES = b'{"v":1,"run":"r","kind":"message","agent":"A","side":"p1","episode":0,"step":0,"recipient":"B","text":"hi","human":false}'
 
 
 @pytest.mark.parametrize("model", MESSAGE_TYPES, ids=lambda model: model.__name__)
