@@ -338,7 +338,7 @@ class Turn:
         except PeerError as error:
             log.warning("agent %s sent no valid reply: %s", seat, error)
             self._ignored[seat] += 1
-            if asked is not None and asked.reply is None:
+            if asked is not None and asked.reply is None and not asked.held:  # one that is away did not send it
                 asked.fault, asked.waiting = str(error), False
                 self._changed.set()
             return

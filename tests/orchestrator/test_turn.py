@@ -589,6 +589,22 @@ async def test_one_whose_link_is_back_is_asked_again(broker: MemoryBroker, peer:
         assert (await asked).by_seat[ZEALOTS].text == "once more"
 
 
+async def test_garbage_under_the_name_of_one_that_is_away_ends_no_wait(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS) as (turn, (zealots,)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        await zealots.observed()
+        await zealots.leave()
+        await asyncio.sleep(1)
+        await zealots.put(Topic.REPLY, b"garbage")
+        await asyncio.sleep(1)
+        assert not asked.done()
+        await zealots.reply("not of mine")
+        answers = await asked
+    assert (answers.by_seat[ZEALOTS].text, answers.by_seat[ZEALOTS].ignored, answers.lost) == ("not of mine", 1, [])
+
+
 async def test_one_whose_return_was_not_reported_is_found_by_its_answer(
     broker: MemoryBroker, peer: MakePeer, observe: Observe
 ) -> None:
