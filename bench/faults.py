@@ -24,6 +24,7 @@ import random
 import re
 import resource
 import signal
+import socket
 import statistics
 import sys
 import tempfile
@@ -42,6 +43,7 @@ from khala_agents.config import WorkerSpec
 from khala_agents.policy import Policy
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.scripted.faults import Faults
+from khala_orchestrator.config import task_files
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -548,16 +550,26 @@ def full_disk(processes: Processes, rule: str) -> bool:
     """Return whether a host whose disk is full does what the task says, by a limit on the size of its files."""
     out = processes.directory / f"full-{rule}"
     task = processes.directory / f"{rule}.yaml"
-    task.write_text(f"extends: {TASK}\nname: full\nfaults: {{recording_lost: {rule}}}\nmax_steps: 20\n")
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    shipped = next(path for path in task_files() if path.stem == TASK)
+    task.write_text(f"extends: {shipped}\nname: full\nfaults: {{recording_lost: {rule}}}\nmax_steps: 20\n")
+    port = free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
     host = processes.start("full", "host", str(task), "--run", "full", "--listen", endpoint, "--out", str(out))
     resource.prlimit(host.pid, resource.RLIMIT_FSIZE, (30_000, 30_000))
+    _until_listens(port)
     agent = processes.start("full-agent", "agent", *AGENTS, "--run", "full", "--connect", endpoint,
                             "--policy", "bench.faults:decide")  # fmt: skip
     code = host.wait(RECOVERY_S)
     processes.end(agent)
     said = "recording" in processes.last_words("full")
     return said and (code == 0 if rule == "go_on" else code not in {0, 3})
+
+
+def _until_listens(port: int) -> None:
+    for _ in range(300):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+            return
+        time.sleep(0.1)
 
 
 def table(verdict: Verdict) -> Table:
