@@ -44,6 +44,7 @@ async def test_strangers_and_dishonest_agents_get_nowhere() -> None:
             assert_repelled(await attack_here(match, name, seconds=0.5))
 
 
+@pytest.mark.slow
 async def test_the_attacks_would_succeed_without_access_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench.strangers.router_settings", lambda *_: {})
     async with siege() as match:

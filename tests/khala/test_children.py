@@ -130,6 +130,7 @@ def decide(briefing, observation):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.game
 def test_an_agent_that_dies_in_a_match_is_started_again_and_plays_on(tmp_path: Path) -> None:
     (tmp_path / "mortal.py").write_text(BACK)

@@ -146,6 +146,7 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(tmp_path: Path) -
     assert "step 3" not in replayed.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.game
 def test_each_side_of_a_duel_plays_with_its_own_model_and_has_its_own_result(tmp_path: Path) -> None:
     sides = ("--blue", "scripted/skilled", "--red", "silent")
