@@ -84,7 +84,10 @@ def built(model: type[Frozen]) -> st.SearchStrategy[Any]:
 
 
 A_MESSAGE = Message(run="r", agent="A", side="p1", episode=0, step=0, recipient="B", text="hi")
-MESSAGE_BYTES = b'{"v":1,"run":"r","kind":"message","agent":"A","side":"p1","episode":0,"step":0,"recipient":"B","text":"hi","human":false}'
+MESSAGE_BYTES = (
+    b'{"v":1,"run":"r","kind":"message","agent":"A","side":"p1","episode":0,"step":0,"recipient":"B",'
+    b'"text":"hi","human":false}'
+)
 
 
 @pytest.mark.parametrize("model", MESSAGE_TYPES, ids=lambda model: model.__name__)
