@@ -46,6 +46,9 @@ class FakeGame:
 
     def reset(self) -> tuple[Snapshot, ...]:
         self._note("reset")
+        if self.hangs:
+            self._killed.wait()
+            raise GameError("the game died")
         self._loop = 0
         return (self._snapshot([], loop=0),)
 
@@ -112,6 +115,15 @@ async def test_a_game_that_has_played_is_given_less_time_to_answer(
         with pytest.raises(GameHangs, match=r"within 0.2 s"):
             await game.act([RawExecutor().plan([], snapshot([]), 8)])
     assert caplog.messages == ["the game has not answered for 0.1 s"]
+
+
+async def test_a_game_that_has_begun_once_is_given_less_time_to_begin_again(snapshot: Callable[..., Snapshot]) -> None:
+    fake = FakeGame(snapshot)
+    async with GameThread(lambda: fake, patience=Patience(least_s=0.2, times_slowest=0)) as game:
+        await game.reset()
+        fake.hangs = True
+        with pytest.raises(GameHangs, match=r"within 0.2 s"):
+            await game.reset()
 
 
 async def test_a_game_that_hangs_is_killed_and_named(snapshot: Callable[..., Snapshot]) -> None:

@@ -122,7 +122,7 @@ class Patience:
     """How long a game may take to answer before it is taken to hang; what it has shown so far decides."""
 
     unknown_s: float = 120.0
-    """To load a map, and to play for the first time; the longest limit at all."""
+    """To load a map and to play for the first time; the longest limit at all."""
     least_s: float = 10.0
     times_slowest: float = 20.0
     """Times the slowest step so far; steps grow with the armies, 3.5-fold in the first 177 on Simple64."""
@@ -156,6 +156,7 @@ class GameThread:
         self._start = start
         self._patience = patience or Patience()
         self._slowest_s: float | None = None
+        self._slowest_reset_s: float | None = None
         self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")
         self._game: Game | None = None
 
@@ -185,7 +186,11 @@ class GameThread:
 
     async def reset(self) -> tuple[Snapshot, ...]:
         """Begin an episode; return a snapshot for each player."""
-        return await self._run(self._playing.reset, self._patience.unknown_s)
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        snapshots = await self._run(self._playing.reset, self._patience.limit_s(self._slowest_reset_s))
+        self._slowest_reset_s = max(self._slowest_reset_s or 0.0, loop.time() - began_s)
+        return snapshots
 
     async def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Play one plan of each player to its end, or to the end of the episode."""
