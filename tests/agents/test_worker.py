@@ -147,7 +147,7 @@ async def test_the_last_briefing_serves_if_the_new_one_does_not_come(
     await host.say(observation(episode=1))
     (reply,) = await host.replies(1)
     assert (reply.episode, reply.status) == (1, "ok")
-    assert 0.2 < reply.latency_s < 0.3
+    assert 0.2 < reply.latency_s < 2.0  # the wait for a briefing is 0.2 s
 
 
 async def test_a_step_is_decided_once_and_its_reply_sent_again_if_it_is_asked_again(
@@ -349,7 +349,7 @@ async def test_a_policy_that_fails_becomes_a_fallback_and_the_worker_lives_on(
         (0, "fallback", detail, ""),
         (1, "fallback", detail, ""),
     ]
-    assert host.of(Reply)[1].latency_s < 0.1
+    assert host.of(Reply)[1].latency_s < 1.0
 
 
 async def test_a_failure_of_a_policy_is_logged_once_with_its_type_and_place(

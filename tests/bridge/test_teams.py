@@ -259,7 +259,7 @@ def test_forms_of_forms_are_forms() -> None:
     assert forms_of("Stalker") == ()
 
 
-def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
+def test_two_hundred_units_are_kept_in_order_in_a_few_milliseconds() -> None:
     agents = [agent("B", team("Builder", "Probe"), admits="builder"), agent("C", team("Z", "Zealot", "Stalker"))]
     names = ["Probe"] * 70 + ["Zealot"] * 60 + ["Stalker"] * 50 + ["Nexus"] * 20
     own = _read(raw_pb2.Unit(tag=n, unit_type=NUMBERS[name], build_progress=1) for n, name in enumerate(names, 1))
@@ -269,4 +269,4 @@ def test_two_hundred_units_are_kept_in_order_in_a_millisecond() -> None:
         roster.update(own, player)
         took_s.append(time.perf_counter() - began)
     assert len(roster.teams("C")[0].tags) == 110
-    assert min(took_s) < 0.001
+    assert min(took_s) < 0.005  # 0.5 ms on an idle machine

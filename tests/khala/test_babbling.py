@@ -8,6 +8,8 @@ from bench.hostile import LONGEST_S, MOST_GROWTH, Scene, frames, is_forged, repl
 
 pytestmark = pytest.mark.game
 
+SLOW_MACHINE = 4
+"""How much longer than in the bench something may take: tests run beside others, and under coverage."""
 BABBLE = {
     "unknown calls": "<Atack_Unitt(0x1)>" * 3_600,
     "calls over the limit": "<No_Operation()>" * 3_000,
@@ -31,7 +33,7 @@ def scene() -> Scene:
 @pytest.mark.parametrize("name", BABBLE)
 def test_a_babbling_reply_lengthens_no_prompt_beyond_twice_and_costs_little(scene: Scene, name: str) -> None:
     took_s, lines = scene.play("Stalkers", BABBLE[name])
-    assert min(took_s, scene.play("Stalkers", BABBLE[name])[0]) < LONGEST_S
+    assert min(took_s, scene.play("Stalkers", BABBLE[name])[0]) < SLOW_MACHINE * LONGEST_S
     assert scene.growth(lines) <= MOST_GROWTH
     assert not any(map(is_forged, lines.values()))
 
@@ -43,5 +45,5 @@ def test_mutated_replies_and_frames_break_nothing(scene: Scene) -> None:
 
 @pytest.mark.slow
 def test_many_mutated_replies_and_frames_break_nothing() -> None:
-    assert replies(scenes(), 5_000, seed=4).is_good
-    assert frames(5_000, seed=4).is_good
+    assert replies(scenes(), 5_000, seed=4).is_good(SLOW_MACHINE * LONGEST_S)
+    assert frames(5_000, seed=4).is_good(SLOW_MACHINE * LONGEST_S)

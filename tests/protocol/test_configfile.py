@@ -114,7 +114,7 @@ def test_a_text_that_unfolds_to_millions_of_values_is_refused_at_once(kind: str)
     began = time.process_time()
     with pytest.raises(ConfigError, match=r"m\.yaml:\d+: there are more than 5000 values here"):
         loads(f"a: &a {{x: 1}}\n{BOMBS[kind]}\n", Match, source="m.yaml")
-    assert time.process_time() - began < 0.25
+    assert time.process_time() - began < 1.0  # 0.05 s on an idle machine; to unfold it would take minutes
 
 
 class Named(BaseModel):

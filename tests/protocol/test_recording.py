@@ -343,7 +343,7 @@ def test_a_file_that_unpacks_to_far_more_than_its_size_is_read_within_limits(kin
     size = hostile(path, *BOMBS[kind]()).stat().st_size
     began = time.process_time()
     assert not Recording.open(path).complete
-    assert time.process_time() - began < 0.5
+    assert time.process_time() - began < 2.0  # to unpack it would take a minute
     tracemalloc.start()
     assert len(list(Recording.open(path).by_step())) == 0
     _, peak = tracemalloc.get_traced_memory()
