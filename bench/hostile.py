@@ -14,6 +14,7 @@ that looks like a heading, or leaves memory behind.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import multiprocessing
 import random
@@ -156,8 +157,8 @@ class Scene:
         self.words += [agent.name for agent in task.agents]
 
     def play(self, agent: str, text: str) -> tuple[float, dict[str, list[str]]]:
-        """Return the CPU time of reading and acting, and the lines about it in the next observations, by agent."""
-        began = time.thread_time()
+        """Return the time of reading and acting, and the lines about it in the next observations, by agent."""
+        began = time.perf_counter()
         speech = parse(text)
         joint = self.actor.joint(self.observation, {agent: speech})
         seat = Seat(self.task.side, agent)
@@ -165,7 +166,7 @@ class Scene:
             self.mailbox.listen(seat, listen.channel)
         post = self.mailbox.deliver(self._message(agent, said.recipient, said.text) for said in speech.messages)
         rejections = shortened((*joint.rejections[agent], *post.rejections.get(seat, ())))
-        took_s = time.thread_time() - began
+        took_s = time.perf_counter() - began
         lines = {}
         for name in {agent, *(seat.agent for seat in post.received)}:
             own = Feedback(joint.accepted[agent], rejections) if name == agent else Feedback()
@@ -252,7 +253,7 @@ def replies(stage: list[Scene], count: int, seed: int) -> Verdict:
         except Exception:  # noqa: BLE001  # every one is a find
             verdict.exceptions[_where(text)] += 1
             continue
-        if took_s > LONGEST_S:  # another process may have held the caches
+        if took_s > LONGEST_S:  # another process may have had the processor
             took_s = min(took_s, *(scene.play(agent, text)[0] for _ in range(2)))
         growth = scene.growth(lines)
         verdict.forged += any(map(is_forged, lines.values()))
@@ -274,26 +275,27 @@ def frames(count: int, seed: int) -> Verdict:
     for _ in _counted(verdict, count):
         kind = chance.choice(list(known))
         payload = _broken(chance, chance.choice(known[kind]))
-        began = time.thread_time()
         try:
-            _take(kind, payload)
+            took_s = _take(kind, payload)
+            if took_s > LONGEST_S:  # another process may have had the processor
+                took_s = min(took_s, *(_take(kind, payload) for _ in range(2)))
         except Exception:  # noqa: BLE001  # every one is a find
             verdict.exceptions[_where(repr(payload[:200]))] += 1
-        took_s = time.thread_time() - began
+            continue
         if took_s > verdict.slowest_s:
             verdict.slowest_s, verdict.slowest = took_s, f"{kind.__name__} of {len(payload)} bytes"
     return verdict
 
 
-def _take(kind: type[Any], payload: bytes) -> None:
-    try:
+def _take(kind: type[Any], payload: bytes) -> float:
+    began = time.perf_counter()
+    with contextlib.suppress(PeerError):
         decode(payload)
         message = decode_as(kind, payload)
-    except PeerError:
-        return
-    encode(message)
-    if isinstance(message, Reply):
-        encode(message.but(usage=sum([message.usage] * 3, Usage())))
+        encode(message)
+        if isinstance(message, Reply):
+            encode(message.but(usage=sum([message.usage] * 3, Usage())))
+    return time.perf_counter() - began
 
 
 def _broken(chance: random.Random, payload: bytes) -> bytes:

@@ -24,12 +24,12 @@ import yaml
 from pydantic import ValidationError
 
 from khala_simulator.maps.scenario import Scenario, names_of
+from khala_simulator.tables.loader import LOADER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 JOINED = ("units", "triggers", "estimates")
 EXTENDS, VARIANTS = "extends", "variants"
 TEXT = "tag:yaml.org,2002:str"

@@ -13,6 +13,8 @@ from typing import Any, Final, Literal
 
 import yaml
 
+from khala_simulator.tables.loader import LOADER
+
 
 @dataclass(frozen=True, slots=True)
 class Constant:
@@ -89,7 +91,7 @@ class Mechanics:
 def entries() -> tuple[Constant, ...]:
     """Return all constants of the data file, in its order; some are choices of a rule and have no number."""
     text = (resources.files("khala_simulator.data") / "mechanics.yaml").read_text(encoding="utf-8")
-    raw: dict[str, dict[str, Any]] = yaml.safe_load(text)
+    raw: dict[str, dict[str, Any]] = yaml.load(text, Loader=LOADER)  # noqa: S506  # a safe one
     return tuple(Constant(name=name, **fields) for name, fields in raw.items())
 
 
