@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,10 +14,14 @@ from khala import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model
 from khala_agents.scripted.players import PLAYERS
+from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
+from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from khala_protocol.recording import Recording
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -113,3 +118,18 @@ def named_sides(pairs: Sequence[str]) -> dict[str, str]:
                 f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
             )
     return {name: text for name, _, text in split}
+
+
+def spent_usd(recording: Recording) -> dict[Seat, float]:
+    """Return what each agent has paid for its model in a recorded match.
+
+    A call whose answer came too late is in no report, and one that the recording left out is in no exchange: the larger
+    of the two sums counts.
+    """
+    calls, reports = defaultdict[Seat, float](float), defaultdict[Seat, float](float)
+    for call in recording.of(ModelCall):
+        calls[Seat(call.side, call.agent)] += call.usage.cost_usd or 0.0
+    for report in recording.of(Report):
+        for agent in report.agents:
+            reports[Seat(agent.side, agent.agent)] += agent.usage.cost_usd or 0.0
+    return {seat: max(calls[seat], reports[seat]) for seat in {**calls, **reports}}

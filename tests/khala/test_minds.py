@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 
 from khala.cli import _why_not_valid
-from khala.local import _shares_of
-from khala.minds import Minds, minds_of, named_sides
+from khala.local import _shares_of, _taken_off
+from khala.minds import Minds, minds_of, named_sides, spent_usd
+from khala_orchestrator.roster import Seat
+from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
-from khala_protocol.messages import Casualties, Result
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage
+from khala_protocol.recording import Recorder, Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 COMMON = Minds(model="deepseek", model_name="chat", base_url="http://x/v1", fallback="silent", budget_usd=3.0)
 
@@ -47,6 +56,42 @@ def test_both_sides_may_spend_the_same() -> None:
         ("agents-red-1", ["B"], 0.75),
     ]
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
+
+
+def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(tmp_path: Path) -> None:
+    def call(agent: str, usd: float | None) -> ModelCall:
+        return ModelCall(
+            run="r", agent=agent, side="blue", episode=0, step=0, attempt=1, model="m", endpoint="e", prompt=(),
+            completion=None, status="timeout", started_s=0, latency_s=0, usage=Usage(cost_usd=usd),
+        )  # fmt: skip
+
+    agents = tuple(
+        AgentReport(agent=name, side="blue", status="ok", usage=Usage(cost_usd=usd))
+        for name, usd in {"Late": 0.25, "LeftOut": 0.5, "Free": None}.items()
+    )
+    report = Report(run="r", side="blue", episode=0, step=0, game_loop=0, score=0, agents=agents)
+    with Recorder(tmp_path / "r.mcap") as recorder:
+        for one in (call("Late", 0.25), call("Late", 0.125), call("LeftOut", None)):
+            recorder.write(agent_key("r", "blue", one.agent, Topic.EXCHANGE), encode(one))
+        recorder.write(run_key("r", Topic.REPORT), encode(report))
+    assert spent_usd(Recording.open(tmp_path / "r.mcap")) == {
+        Seat("blue", "Late"): 0.375,
+        Seat("blue", "LeftOut"): 0.5,
+        Seat("blue", "Free"): 0.0,
+    }
+
+
+def test_a_resumed_match_may_spend_what_is_left_and_says_how_much_that_is() -> None:
+    spent = {Seat("blue", "A"): 0.75, Seat("blue", "C"): 0.25, Seat("blue", "B"): 0.25, Seat("red", "B"): 1.5}
+    shares = [share for side in ("blue", "red") for share in _shares_of(side, ["A", "B", "C"], [], 2.0, sides=2)]
+    assert _taken_off(shares, spent) == (
+        "2.7500 USD were spent before, 1.7500 of the budget are left; nothing for A, C, B, "
+        "so each of their steps is a fallback"
+    )
+    assert [share.arguments[-1] for share in shares] == ["0.0", "0.75", "1.0", "0.0"]
+    (free,) = _shares_of("blue", ["A"], [], None, sides=1)
+    assert "--budget-usd does" in _taken_off([free], spent)
+    assert "--budget-usd" not in free.arguments
 
 
 def test_a_side_and_its_model_stand_around_an_equals_sign() -> None:
