@@ -45,6 +45,7 @@ from khala.options import (
     Rule,
     RunName,
     Seed,
+    SideModel,
     Speed,
     StepLoops,
     Task,
@@ -113,10 +114,7 @@ def run(
     fallback: Fallback = None,
     blue: Mind = None,
     red: Mind = None,
-    side_model: Annotated[
-        list[str] | None,
-        typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
-    ] = None,
+    side_model: SideModel = None,
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     game: Game = "simulator",
@@ -151,7 +149,7 @@ def run(
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
-    named = named_sides(side_model or ()) | {side: text for side, text in (("blue", blue), ("red", red)) if text}
+    named = named_sides(side_model or (), blue=blue, red=red)
     minds = minds_of([side.side for side in config.task.per_side()], common, named)
     _until_interrupted(
         config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
@@ -216,7 +214,7 @@ def advise(
         list[str] | None,
         typer.Option(
             help="Endpoint of the router.",
-            show_default="the newest `khala run` of this machine, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
+            show_default="where this machine plays it, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
         ),
     ] = None,
     tls: Tls = None,

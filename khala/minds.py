@@ -105,8 +105,8 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     return {side: fair.named(named[side]) if side in named else fair for side in sides}
 
 
-def named_sides(pairs: Sequence[str]) -> dict[str, str]:
-    """Return by side what `NAME=MODEL` says of it.
+def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
+    """Return by side what `NAME=MODEL` says of it, and what `others` say of sides that they name.
 
     Raises:
         ConfigError: one is not written so.
@@ -117,7 +117,7 @@ def named_sides(pairs: Sequence[str]) -> dict[str, str]:
             raise ConfigError(
                 f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
             )
-    return {name: text for name, _, text in split}
+    return {name: text for name, _, text in split} | {name: text for name, text in others.items() if text}
 
 
 def spent_usd(recording: Recording) -> dict[Seat, float]:
