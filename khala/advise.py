@@ -220,10 +220,8 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
 def _places(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> list[BusConfig]:
     """Return where the match may be: at the endpoints given, or at one of those of this machine, the newest first."""
     if tls is None:
-        near = [] if connect else local_bus.running()
-        return [
-            client_config(place, tls=None, insecure=insecure) for place in ([[one] for one in near] or [list(connect)])
-        ]
+        near = [] if connect else [[endpoint] for endpoint in local_bus.running()]
+        return [client_config(place, tls=None, insecure=insecure) for place in near or [list(connect)]]
     from khala_protocol.certificates import adviser_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
 
     return [client_config(connect, tls=tls, names=(adviser_name(adviser.side, adviser.name),), insecure=insecure)]

@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 import khala_agents.cli
 import khala_orchestrator.cli
@@ -271,6 +272,7 @@ def front_door(
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.basicConfig(level=logging.INFO if verbose else logging.WARNING, handlers=[handler])
     logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
+    logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
 
 
 for command, epilog in (
@@ -327,7 +329,7 @@ def _until_interrupted(
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
     if reasons := list(_why_not_valid(results)):
-        screen.print(f"[bold red]not valid:[/] {escape('; '.join(reasons))}", soft_wrap=True)
+        screen.print(Text.assemble(("not valid:", "bold red"), f" {'; '.join(reasons)}"), soft_wrap=True)
         raise typer.Exit(NOT_VALID)
 
 

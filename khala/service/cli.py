@@ -42,7 +42,7 @@ from khala.options import (
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_orchestrator.console import Progress, stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, NoRouter
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.service import MatchCard, Stop, Submit
 from khala_protocol.signals import stop_on_signal
@@ -237,7 +237,7 @@ def submit(
     from khala.service import client  # noqa: PLC0415
 
     if (task is None) == (resume is None):
-        raise ConfigError("give a task, or the name of a match with --resume: one of them")
+        raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume")
     config = None if task is None else new(
         task, run, Path(), seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
@@ -312,12 +312,16 @@ def _ask(
     names: tuple[str, ...],
     ask: "Callable[[Bus], Coroutine[Any, Any, T]]",
 ) -> T:
+    from khala.service.client import NoService  # noqa: PLC0415
     from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415  # loads the native library
 
     config = client_config(connect or (), tls=tls, names=names, insecure=insecure)
 
     async def asked() -> T:
-        bus = await open_bus(config)
+        try:
+            bus = await open_bus(config)
+        except NoRouter as error:
+            raise NoService(f"{error.found}: `khala serve` starts a service, --connect says where one is") from None
         try:
             return await ask(bus)
         finally:

@@ -36,6 +36,10 @@ def khala(*arguments: str, cwd: Path, **environ: str) -> subprocess.CompletedPro
 BAD = [
     ("run nosuch", "there is no task 'nosuch'"),
     ("run 2s3zz", "did you mean 2s3z"),
+    ("run", "give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume"),
+    ("run --resume missing", "there is no missing, and no runs/missing: give a run, its directory, or a .mcap file"),
+    ("submit", "give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume"),
+    pytest.param("matches --connect tcp/127.0.0.1:{closed}", "`khala serve` starts a service", marks=pytest.mark.slow),
     (
         "run bad.yaml",
         "bad.yaml:3 (agents.0.teams.0.unit_types.0): there is no unit type 'Stlaker', did you mean 'Stalker'?",

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
+import typer
 
-from khala.cli import _why_not_valid
+from khala.cli import _until_interrupted, _why_not_valid
 from khala.local import _shares_of, _taken_off
 from khala.minds import Minds, minds_of, named_sides, spent_usd
+from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Seat
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
@@ -107,6 +109,17 @@ def result(side: str, invalid_because: str = "") -> Result:
         invalid_because=invalid_because, steps=1, env_steps=1, game_loop=1, game_s=0.1, wall_s=0.1,
         killed=Casualties(), lost=Casualties(), kd=None,
     )  # fmt: skip
+
+
+def test_a_match_that_is_not_valid_says_so_without_markup(capsys: pytest.CaptureFixture[str]) -> None:
+    async def play() -> list[Result]:
+        return [result("blue", "the [red] side left")]
+
+    match = MatchConfig(task=load_task("2s3z"), run="r")
+    with pytest.raises(typer.Exit) as ended:
+        _until_interrupted(match, as_json=False, play=lambda _: play())
+    assert ended.value.exit_code == 3
+    assert capsys.readouterr().err.endswith("\nnot valid: the [red] side left\n")
 
 
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
