@@ -22,6 +22,7 @@ import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
+from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.options import (
@@ -64,11 +65,6 @@ from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
-
-SIGNALLED = 128
-"""Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
-NOT_VALID = 3
-"""Exit code after a match with an episode that says nothing about its agents."""
 
 app = typer.Typer(
     name="khala",
@@ -249,7 +245,7 @@ def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
         for finding in findings:
             table.add_row(marks[finding.state], finding.name, finding.found, f"[dim]{escape(finding.advice)}[/]")
         Console().print(table)
-    raise typer.Exit(1 if wrong else 0)
+    raise typer.Exit(FAILED if wrong else DONE)
 
 
 def version(value: bool) -> None:  # typer calls it with the flag

@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from khala.exit_codes import DONE, FAILED, NOT_VALID
 from khala.options import (
     Assemble,
     BaseUrl,
@@ -284,7 +285,13 @@ def watch(
     with Progress(stderr_console()) as progress:
         card = _ask(connect, tls, insecure, ("host", "observer"), lambda bus: client.watch(bus, run, progress))
     _end(card, as_json=as_json)
-    raise typer.Exit(card.state in ENDINGS_THAT_FAIL)
+    raise typer.Exit(_exit_code(card))
+
+
+def _exit_code(card: MatchCard) -> int:
+    if card.state in ENDINGS_THAT_FAIL:
+        return FAILED
+    return NOT_VALID if card.reason else DONE  # a match that is done has a reason only if it is not valid
 
 
 def stop(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -11,12 +12,16 @@ import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
 from khala.cli import main
+from khala.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
+from khala.service.cli import _exit_code
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
+from khala_protocol.service import MatchCard
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 
@@ -91,6 +96,20 @@ BAD = [
     ("replay missing.mcap --steps soon", "'soon' names no steps"),
     ("sc2 install file/below", "file"),
 ]
+
+
+def test_the_table_of_exit_codes_has_all_of_them() -> None:
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "faults.md"
+    rows = re.findall(r"^\| ([\d, ]+) \|", page.read_text(), re.MULTILINE)
+    codes = [int(code) for row in rows for code in row.split(", ")]
+    assert codes == [DONE, FAILED, WRONG_USAGE, NOT_VALID, *AFTER_SIGNAL]
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "code"), [("done", "", 0), ("done", "not valid: x", 3), ("failed", "x", 1), ("stopped", "", 1)]
+)
+def test_who_watches_a_match_ends_as_it_did(state: Any, reason: str, code: int) -> None:
+    assert _exit_code(MatchCard(run="r", number="1", task="t", state=state, reason=reason)) == code
 
 
 @pytest.fixture(scope="module")
