@@ -21,7 +21,7 @@ from khala_orchestrator.mailbox import EVERYONE
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, NoRouter
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import MAX_ADVICE_CHARACTERS, Advice, Report, Result, Run
@@ -200,7 +200,11 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
             typer.echo(line)
 
     async def advise_at(config: BusConfig, find_s: float) -> None:
-        bus = await open_bus(config)
+        try:
+            bus = await open_bus(config)
+        except NoRouter as error:
+            what = "this machine plays no match of yours" if not connect else "the match is elsewhere, or over"
+            raise NoMatch(f"{what}: {error.found}; --connect says where it is") from None
         try:
             advising = Advising(bus, adviser, show=show, complain=lambda text: typer.echo(text, err=True))
             await advising.play(lines_of(sys.stdin), find_s=find_s)

@@ -83,6 +83,9 @@ BAD = [
     ),
     ("keys agent Stalkers nowhere", "nowhere: holds no authority: make one with `khala keys init DIR`"),
     ("advise r --tls nowhere", "make it with `khala keys adviser Adviser DIR --side blue`"),
+    pytest.param(
+        "advise r --connect tcp/127.0.0.1:{closed}", "the match is elsewhere, or over", marks=pytest.mark.slow
+    ),
     ("advise r --name a/b", "name 'a/b' cannot stand in a key"),
     ("keys show nowhere", "nowhere: holds no certificates"),
     ("router --listen tcp/127.0.0.1:{taken}", "another process uses it"),
