@@ -33,9 +33,10 @@ from zenoh.handlers import Callback
 from bench.bus import open_raw
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
+from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.announce import Announcer
-from khala_orchestrator.cards import briefing
-from khala_orchestrator.config import load_task
+from khala_orchestrator.cards import briefing, run_card
+from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.record import Listener, RecordingBus
 from khala_orchestrator.roster import Roster, Seat
 from khala_orchestrator.turn import Question, Turn
@@ -157,7 +158,7 @@ def reads(*keys: str) -> Callable[[Stranger], Tried]:
     def attack(me: Stranger) -> Tried:
         """Read what is for others."""
         got: list[str] = []
-        allowed: tuple[str, ...] = (f"{OWN}/", f"{ROOT}/run", f"{ROOT}/result")
+        allowed: tuple[str, ...] = (f"{OWN}/", f"{ROOT}/result")
 
         def take(sample: zenoh.Sample) -> None:
             if not str(sample.key_expr).startswith(allowed):
@@ -277,7 +278,7 @@ ATTACKS: dict[str, Callable[[Stranger], Tried]] = {
     "agent: reads briefings of others": reads(f"{VICTIM}/briefing", f"{ROOT}/*/*/briefing"),
     "agent: reads pictures of others": reads(f"{VICTIM}/image/*", f"{ROOT}/*/*/image/*"),
     "agent: reads replies and messages of others": reads(f"{VICTIM}/reply", f"{VICTIM}/message"),
-    "agent: reads reports": reads(f"{ROOT}/report"),
+    "agent: reads reports and the run card": reads(f"{ROOT}/report", f"{ROOT}/run"),
     "agent: reads the other side": reads(f"{ROOT}/{RED}/**"),
     "agent: reads everything": reads("**", "khala/**", f"{ROOT}/**", f"{ROOT}/*/*/*"),
     "agent: reads the router's own state": reads("@/**"),
@@ -418,6 +419,7 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         running = stack.enter_context(_tasks())
         for name, session in zip(players, agents, strict=True):
             running(run_worker(session, RUN, BLUE, name, FunctionPolicy(_decide)))
+        await announcer.run(run_card(MatchConfig(task=task, run=RUN), GameIdentity("", "", "", "")))
         for name in players:
             await announcer.brief(briefing(task, task.agents[0].model_copy(update={"name": name}), RUN, 0))
         await roster.assemble(seats, 20)

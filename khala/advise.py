@@ -21,7 +21,7 @@ from khala_orchestrator.mailbox import EVERYONE
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, NoRouter
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import MAX_ADVICE_CHARACTERS, Advice, Report, Result, Run
@@ -36,6 +36,14 @@ if TYPE_CHECKING:
 
 FIND_S = 5.0
 """How long to wait for the run card, which every running match has published."""
+
+
+FIND_NEAR_S = 1.0
+"""The same where another match of this machine may be the right one."""
+
+
+class NoMatch(ConfigError):
+    """There is no such match on a bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +130,7 @@ class Advising:
             async with asyncio.timeout(find_s):
                 card = decode_as(Run, (await anext(cards)).payload)
         except TimeoutError:
-            raise ConfigError(f"no match of the name {run!r} was found: is it running, and at this endpoint?") from None
+            raise NoMatch(f"no match of the name {run!r} was found: is it running, and at this endpoint?") from None
         if name not in card.advisers:
             known = ", ".join(card.advisers) or "none"
             raise ConfigError(f"the task has no adviser {name!r}; it has {known}: see `advisers` in task files")
@@ -191,22 +199,33 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
         for line in [message.model_dump_json()] if as_json else told(message):
             typer.echo(line)
 
-    async def play() -> None:
-        bus = await open_bus(_config(adviser, connect, tls, insecure=insecure))
+    async def advise_at(config: BusConfig, find_s: float) -> None:
         try:
-            lines = lines_of(sys.stdin)
+            bus = await open_bus(config)
+        except NoRouter as error:
+            what = "this machine plays no match of yours" if not connect else "the match is elsewhere, or over"
+            raise NoMatch(f"{what}: {error.found}; --connect says where it is") from None
+        try:
             advising = Advising(bus, adviser, show=show, complain=lambda text: typer.echo(text, err=True))
-            await advising.play(lines)
+            await advising.play(lines_of(sys.stdin), find_s=find_s)
         finally:
             await bus.close()
+
+    async def play() -> None:
+        *others, last = _places(adviser, connect, tls, insecure=insecure)
+        for config in others:
+            with contextlib.suppress(NoMatch):
+                return await advise_at(config, FIND_NEAR_S)
+        return await advise_at(last, FIND_S)
 
     asyncio.run(play())
 
 
-def _config(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> BusConfig:
-    """Return the configuration for the endpoints given, or for the match that is played on this machine."""
+def _places(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> list[BusConfig]:
+    """Return where the match may be: at the endpoints given, or at one of those of this machine, the newest first."""
     if tls is None:
-        return client_config(connect or local_bus.running()[:1], tls=None, insecure=insecure)
+        near = [] if connect else [[endpoint] for endpoint in local_bus.running()]
+        return [client_config(place, tls=None, insecure=insecure) for place in near or [list(connect)]]
     from khala_protocol.certificates import adviser_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
 
-    return client_config(connect, tls=tls, names=(adviser_name(adviser.side, adviser.name),), insecure=insecure)
+    return [client_config(connect, tls=tls, names=(adviser_name(adviser.side, adviser.name),), insecure=insecure)]

@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 import khala_agents.cli
 import khala_orchestrator.cli
@@ -21,6 +22,7 @@ import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
+from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.options import (
@@ -45,6 +47,7 @@ from khala.options import (
     Rule,
     RunName,
     Seed,
+    SideModel,
     Speed,
     StepLoops,
     Task,
@@ -62,11 +65,6 @@ from khala_protocol.keys import check_name
 from khala_protocol.messages import Result, Wire
 from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
-
-SIGNALLED = 128
-"""Added to a signal's number it is the exit code, as shells expect it: 130 after Ctrl-C, 143 after SIGTERM."""
-NOT_VALID = 3
-"""Exit code after a match with an episode that says nothing about its agents."""
 
 app = typer.Typer(
     name="khala",
@@ -113,10 +111,7 @@ def run(
     fallback: Fallback = None,
     blue: Mind = None,
     red: Mind = None,
-    side_model: Annotated[
-        list[str] | None,
-        typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
-    ] = None,
+    side_model: SideModel = None,
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     game: Game = "simulator",
@@ -151,7 +146,7 @@ def run(
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
-    named = named_sides(side_model or ()) | {side: text for side, text in (("blue", blue), ("red", red)) if text}
+    named = named_sides(side_model or (), blue=blue, red=red)
     minds = minds_of([side.side for side in config.task.per_side()], common, named)
     _until_interrupted(
         config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
@@ -216,7 +211,7 @@ def advise(
         list[str] | None,
         typer.Option(
             help="Endpoint of the router.",
-            show_default="the newest `khala run` of this machine, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
+            show_default="where this machine plays it, or tcp/127.0.0.1:7447; with --tls tls/127.0.0.1:7447",
         ),
     ] = None,
     tls: Tls = None,
@@ -250,7 +245,7 @@ def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
         for finding in findings:
             table.add_row(marks[finding.state], finding.name, finding.found, f"[dim]{escape(finding.advice)}[/]")
         Console().print(table)
-    raise typer.Exit(1 if wrong else 0)
+    raise typer.Exit(FAILED if wrong else DONE)
 
 
 def version(value: bool) -> None:  # typer calls it with the flag
@@ -273,6 +268,7 @@ def front_door(
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.basicConfig(level=logging.INFO if verbose else logging.WARNING, handlers=[handler])
     logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
+    logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
 
 
 for command, epilog in (
@@ -329,7 +325,7 @@ def _until_interrupted(
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
     if reasons := list(_why_not_valid(results)):
-        screen.print(f"[bold red]not valid:[/] {escape('; '.join(reasons))}", soft_wrap=True)
+        screen.print(Text.assemble(("not valid:", "bold red"), f" {'; '.join(reasons)}"), soft_wrap=True)
         raise typer.Exit(NOT_VALID)
 
 

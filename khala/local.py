@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -16,6 +17,8 @@ from khala import games
 from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
+from khala.minds import spent_usd
+from khala_orchestrator.roster import Seat
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
@@ -32,6 +35,8 @@ if TYPE_CHECKING:
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
     from khala_protocol.messages import Result, Wire
+
+log = logging.getLogger(__name__)
 
 MAX_PROCESSES = 4
 """Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB. Agents
@@ -83,7 +88,8 @@ async def play(
         bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
         children = await stack.enter_async_context(Children(directory, supplies.spawn))
-        started = await _start_agents(children, config, minds, bus)
+        spent = spent_usd(past.recording) if past else {}
+        started = await _start_agents(children, config, minds, bus, spent)
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
@@ -143,20 +149,35 @@ class _Share:
 
 
 async def _start_agents(
-    children: Children, config: MatchConfig, minds: Mapping[str, Minds], bus: ZenohBus
+    children: Children, config: MatchConfig, minds: Mapping[str, Minds], bus: ZenohBus, spent: Mapping[Seat, float]
 ) -> list[_Share]:
     scripted = [mind.latency_s for mind in minds.values() if mind.needs_endpoint]
     base_url = await start_endpoint(children, scripted[0]) if scripted else None
     joined = ["--run", config.run, "--connect", bus.endpoints[0]]
     sides = config.task.per_side()
-    started = []
+    started: list[_Share] = []
     for task in sides:
         names, mind = [agent.name for agent in task.agents], minds[task.side]
         options = [*joined, *mind.options(base_url)]
-        for share in _shares_of(task.side, names, options, mind.budget_usd, sides=len(sides)):
-            await children.start(share.process, *share.arguments, environ=mind.environ)
-            started.append(share)
+        started += _shares_of(task.side, names, options, mind.budget_usd, sides=len(sides))
+    if any(spent.values()):
+        log.warning("%s", _taken_off(started, spent))
+    for share in started:
+        await children.start(share.process, *share.arguments, environ=minds[share.side].environ)
     return started
+
+
+def _taken_off(started: Sequence[_Share], spent: Mapping[Seat, float]) -> str:
+    """Take off what the agents had spent before the match was resumed, and return a sentence that says so."""
+    before, poor = f"{sum(spent.values()):.4f} USD were spent before", []
+    for share in started:
+        if share.left_usd is None:
+            return f"{before}, and nothing limits what is spent from here: --budget-usd does"
+        share.left_usd -= sum(spent.get(Seat(share.side, name), 0.0) for name in share.names)
+        if share.left_usd <= 0:
+            poor += share.names
+    left = f"{before}, {sum(max(share.left_usd or 0.0, 0.0) for share in started):.4f} of the budget are left"
+    return f"{left}; nothing for {', '.join(poor)}, so each of their steps is a fallback" if poor else left
 
 
 def _shares_of(

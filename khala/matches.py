@@ -32,7 +32,7 @@ def new_or_resumed(
         RecordingError: there is nothing to go on with.
     """
     if (task is None) == (resume is None):
-        raise ConfigError("give a task, or a recording with --resume: one of them")
+        raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume")
     if resume is None:
         assert task is not None
         return new(task, run, out, **given), None
@@ -50,9 +50,18 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
 
 def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
     """Return the match of a recording, or of the newest one in the directory of a run, and what was played of it."""
-    past = unfinished(Recording.open(newest_recording(path)))
+    past = unfinished(Recording.open(newest_recording(_run_at(path, out))))
     changes = {"record": free_recording(out / past.config.run), "assemble_s": assemble_s}
     return past.config.model_copy(update=changes), past
+
+
+def _run_at(path: Path, out: Path) -> Path:
+    """Return the path of a recording or of a run, which may also be named as it is below `out`."""
+    if path.exists():
+        return path
+    if (out / path).is_dir():
+        return out / path
+    raise ConfigError(f"there is no {path}, and no {out / path}: give a run, its directory, or a .mcap file")
 
 
 def newest_recording(path: Path) -> Path:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,10 +14,14 @@ from khala import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model
 from khala_agents.scripted.players import PLAYERS
+from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
+from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from khala_protocol.recording import Recording
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -100,8 +105,8 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     return {side: fair.named(named[side]) if side in named else fair for side in sides}
 
 
-def named_sides(pairs: Sequence[str]) -> dict[str, str]:
-    """Return by side what `NAME=MODEL` says of it.
+def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
+    """Return by side what `NAME=MODEL` says of it, and what `others` say of sides that they name.
 
     Raises:
         ConfigError: one is not written so.
@@ -112,4 +117,19 @@ def named_sides(pairs: Sequence[str]) -> dict[str, str]:
             raise ConfigError(
                 f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
             )
-    return {name: text for name, _, text in split}
+    return {name: text for name, _, text in split} | {name: text for name, text in others.items() if text}
+
+
+def spent_usd(recording: Recording) -> dict[Seat, float]:
+    """Return what each agent has paid for its model in a recorded match.
+
+    A call whose answer came too late is in no report, and one that the recording left out is in no exchange: the larger
+    of the two sums counts.
+    """
+    calls, reports = defaultdict[Seat, float](float), defaultdict[Seat, float](float)
+    for call in recording.of(ModelCall):
+        calls[Seat(call.side, call.agent)] += call.usage.cost_usd or 0.0
+    for report in recording.of(Report):
+        for agent in report.agents:
+            reports[Seat(agent.side, agent.agent)] += agent.usage.cost_usd or 0.0
+    return {seat: max(calls[seat], reports[seat]) for seat in {**calls, **reports}}

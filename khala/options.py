@@ -86,6 +86,10 @@ Mind = Annotated[
         metavar="MODEL",
     ),
 ]
+SideModel = Annotated[
+    list[str] | None,
+    typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
+]
 BudgetUsd = Annotated[
     float | None,
     typer.Option(min=0, help="Limit of all agents together in US dollars; two sides may spend half of it each."),

@@ -19,6 +19,11 @@ class Briefings:
         self._newest: Briefing | None = None
         self._changed = asyncio.Condition()
 
+    @property
+    def newest(self) -> Briefing | None:
+        """The newest one; None before the first."""
+        return self._newest
+
     async def put(self, briefing: Briefing) -> bool:
         """Store a briefing; return False if it says nothing new."""
         if briefing == self._newest:

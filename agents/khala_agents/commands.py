@@ -24,11 +24,9 @@ from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
-from khala_protocol.codec import decode_as
-from khala_protocol.errors import BusError, ConfigError, PeerError
+from khala_protocol.errors import BusError, ConfigError
 from khala_protocol.joining import client_config
-from khala_protocol.keys import Topic, check_name, run_key
-from khala_protocol.messages import Run
+from khala_protocol.keys import Topic, agent_key, check_name
 from khala_protocol.signals import stop_on_signal
 
 if TYPE_CHECKING:
@@ -168,6 +166,7 @@ async def _play(
     where = ", ".join(links[0].config.connect_to)
     async with AsyncExitStack() as stack:
         buses = [await _opened(link, stack) for link in links]
+        of = {name: bus for bus, link in zip(buses, links, strict=True) for name in link.names}
         _say(f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {where}")
         _settle_memory()
         async with asyncio.TaskGroup() as group:
@@ -175,7 +174,7 @@ async def _play(
                 group.create_task(run_workers(bus, run, side, {n: policies[n] for n in link.names}, stop=stop))
                 for bus, link in zip(buses, links, strict=True)
             ]
-            waiting = group.create_task(_say_if_nobody_comes(buses[0], run, side, list(policies), where))
+            waiting = group.create_task(_say_if_nobody_comes(of, run, side, where))
             await asyncio.wait(playing)
             waiting.cancel()
     return {name: tally for task in playing for name, tally in task.result().items()}
@@ -187,28 +186,35 @@ async def _opened(link: Link, stack: AsyncExitStack) -> Bus:
     return bus
 
 
-async def _say_if_nobody_comes(bus: Bus, run: str, side: str, names: Sequence[str], where: str) -> None:
-    """Say who waits in vain, and for what: a misspelt name is not an error that anybody else could see."""
-    cards = await bus.subscribe(run_key(run, Topic.RUN), Delivery.STATE, depth=1)
-    try:
-        async with asyncio.timeout(PATIENCE_S):
-            card = decode_as(Run, (await anext(cards)).payload)
-    except TimeoutError:
+async def _say_if_nobody_comes(buses: Mapping[str, Bus], run: str, side: str, where: str) -> None:
+    """Say who waits in vain, and for what: a misspelt name is not an error that anybody else could see.
+
+    Args:
+        buses: by name of the agent.
+        run: name of the run.
+        side: side of the agents.
+        where: endpoints of the bus.
+    """
+    vain: list[str] = []
+
+    async def wait(name: str, bus: Bus) -> None:
+        briefings = await bus.subscribe(agent_key(run, side, name, Topic.BRIEFING), Delivery.STATE, depth=1)
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await anext(briefings)
+        except TimeoutError:
+            vain.append(name)
+        except (BusError, StopAsyncIteration):
+            pass  # the workers say so
+        finally:
+            await briefings.close()
+
+    await asyncio.gather(*(wait(name, bus) for name, bus in buses.items()))
+    if vain:
         _say(
-            f"{', '.join(names)} on side {side}: no host of run {run} has come to {where} within {PATIENCE_S:g} s, "
-            "and they wait on; is the name of the run right?"
+            f"{', '.join(vain)} on side {side}: no host that knows them in run {run} has come to {where} within "
+            f"{PATIENCE_S:g} s, and they wait on; are the names right? `khala tasks` lists those of agents"
         )
-    except (PeerError, BusError, StopAsyncIteration):
-        return  # the workers say so
-    else:
-        there = [agent.name for agent in card.agents if agent.side == side]
-        if unknown := [name for name in names if name not in there]:
-            _say(
-                f"run {run} at {where} has no {' and no '.join(unknown)} on side {side}, and will ask them nothing: "
-                f"its agents are {', '.join(f'{one.side}/{one.name}' for one in card.agents)}"
-            )
-    finally:
-        await cards.close()
 
 
 async def _check(policies: Iterable[Policy]) -> None:

@@ -32,7 +32,6 @@ class Links:
     briefings: Subscription[Sample]
     observations: Subscription[Sample]
     images: Subscription[Sample]
-    runs: Subscription[Sample]
     results: Subscription[Sample]
     replies: Publisher
     exchanges: Publisher
@@ -59,7 +58,6 @@ async def join(stack: AsyncExitStack, bus: Bus, run: str, side: str, agent: str)
         images=await hear(images_of(run, side, agent), depth=IMAGES),
         briefings=await hear(agent_key(run, side, agent, Topic.BRIEFING)),
         observations=await hear(agent_key(run, side, agent, Topic.OBSERVATION)),
-        runs=await hear(run_key(run, Topic.RUN)),
         results=await hear(run_key(run, Topic.RESULT)),
         replies=await say(Topic.REPLY, Delivery.SPEECH),
         exchanges=await say(Topic.EXCHANGE, Delivery.LOG),

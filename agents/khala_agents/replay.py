@@ -16,7 +16,7 @@ from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import RecordingError
-from khala_protocol.keys import Topic, agent_key, image_key, run_key
+from khala_protocol.keys import Topic, agent_key, image_key
 from khala_protocol.messages import Briefing, ModelCall, Observation, Reply
 from khala_protocol.recording.difference import Difference
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from khala_agents.policy import Policy
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
-    from khala_protocol.messages import AgentCard, Run
+    from khala_protocol.messages import AgentCard
     from khala_protocol.recording import Recording
 
 PATIENCE_S = 30.0
@@ -59,7 +59,7 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
         policy = policies[card.name]
     broker = MemoryBroker()
     bus = broker.session()
-    stage = await _Stage.set(bus, run, card.side, card.name)
+    stage = await _Stage.set(bus, run.run, card.side, card.name)
     stop = asyncio.Event()
     worker = asyncio.create_task(run_worker(broker.session(), run.run, card.side, card.name, policy, stop=stop))
     try:
@@ -121,15 +121,13 @@ class _Stage:
         self._replies = replies
 
     @classmethod
-    async def set(cls, bus: Bus, run: Run, side: str, agent: str) -> _Stage:
+    async def set(cls, bus: Bus, run: str, side: str, agent: str) -> _Stage:
         def key(topic: Topic) -> str:
-            return agent_key(run.run, side, agent, topic)
+            return agent_key(run, side, agent, topic)
 
         def frame(place: int) -> Awaitable[Publisher]:
-            return bus.publisher(image_key(run.run, side, agent, place), Delivery.STATE)
+            return bus.publisher(image_key(run, side, agent, place), Delivery.STATE)
 
-        card = await bus.publisher(run_key(run.run, Topic.RUN), Delivery.STATE)
-        await card.put(encode(run))
         return cls(
             await bus.publisher(key(Topic.BRIEFING), Delivery.STATE),
             await bus.publisher(key(Topic.OBSERVATION), Delivery.STATE),

@@ -28,7 +28,7 @@ from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, BusError, PeerError
-from khala_protocol.messages import Briefing, Observation, Reply, Result, Run, Usage, Wire
+from khala_protocol.messages import Briefing, Observation, Reply, Result, Usage, Wire
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Mapping
@@ -118,7 +118,6 @@ class Worker:
         self._ledger = UsageLedger(name)
         self._briefings = Briefings()
         self._pictures = PictureStore()
-        self._card: Run | None = None
         self._last_result: int | None = None
         self._newest: Observation | None = None
         self._began_again = False
@@ -143,7 +142,6 @@ class Worker:
             tasks = [
                 group.create_task(self._hear_images(links), name=f"images {self._name}"),
                 group.create_task(self._hear_briefings(links, group), name=f"briefings {self._name}"),
-                group.create_task(self._hear_run(links)),
                 group.create_task(self._hear_results(links)),
                 group.create_task(self._hear_observations(links, group), name=f"observations {self._name}"),
                 group.create_task(self._ledger.publish(links.exchanges)),
@@ -161,21 +159,18 @@ class Worker:
 
     async def _hear_briefings(self, links: Links, group: asyncio.TaskGroup) -> None:
         async for briefing in self._read(Briefing, links.briefings):
+            newest = self._briefings.newest
+            if newest is not None and briefing.episode <= newest.episode:  # another host, with steps from 0 perhaps
+                self._began_again, self._last_result = True, None
             if await self._briefings.put(briefing):
                 _cancel(self._preparing)
                 preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
                 self._preparing = group.create_task(preparing, name=f"prepare {self._name}")
+            self._end_if_over()
 
     async def _hear_images(self, links: Links) -> None:
         async for sample in links.images:
             await self._pictures.put(sample.payload)
-
-    async def _hear_run(self, links: Links) -> None:
-        async for card in self._read(Run, links.runs):
-            if self._card is not None:  # the host began again under the same name: its steps may count from 0 again
-                self._began_again, self._last_result = True, None
-            self._card = card
-            self._end_if_over()
 
     async def _hear_results(self, links: Links) -> None:
         async for result in self._read(Result, links.results):
@@ -272,7 +267,8 @@ class Worker:
     # --- ending -------------------------------------------------------------------------------------
 
     def _end_if_over(self) -> None:
-        if self._card is not None and self._last_result is not None and self._last_result >= self._card.episodes - 1:
+        briefing = self._briefings.newest
+        if briefing is not None and self._last_result is not None and self._last_result >= briefing.episodes - 1:
             self._end("result")
 
     def _end(self, why: Ending) -> None:

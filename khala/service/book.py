@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from khala_protocol.service import MAX_WORDS, OPEN, MatchCard, Matches
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from khala.minds import Minds
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report, Result
@@ -46,7 +48,10 @@ class Entry:
     card: MatchCard
     config: MatchConfig | None = None
     """None for one that was refused."""
-    minds: Minds | None = None
+    minds: Mapping[str, Minds] = field(default_factory=dict)
+    """By side."""
+    resume: bool = False
+    """Whether it goes on with a recording, however often a worker began."""
     results: dict[tuple[int, str], str] = field(default_factory=dict)
     """Outcomes, by episode and side."""
     stop_because: str = ""
@@ -85,7 +90,7 @@ class Book:
             return f"a match called {run} is {entry.card.state} already: give another --run"
         return ""
 
-    def add(self, order: Submit, config: MatchConfig, minds: Minds) -> Entry:
+    def add(self, order: Submit, config: MatchConfig, minds: Mapping[str, Minds]) -> Entry:
         """Take a match."""
         card = MatchCard(
             run=order.run,
@@ -96,7 +101,7 @@ class Book:
             episodes=config.episodes,
             recording=str(config.record.parent) if config.record else "",
         )
-        return self._put(Entry(card, config, minds))
+        return self._put(Entry(card, config, minds, order.resume))
 
     def refuse(self, order: Submit, reason: str) -> Entry:
         """Keep in mind why a match was not taken, for the one who asks."""

@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from khala.exit_codes import DONE, FAILED, NOT_VALID
 from khala.options import (
     Assemble,
     BaseUrl,
@@ -25,6 +26,7 @@ from khala.options import (
     Latency,
     MaxSteps,
     MaxWait,
+    Mind,
     Model,
     ModelName,
     Out,
@@ -32,13 +34,16 @@ from khala.options import (
     Rule,
     RunName,
     Seed,
+    SideModel,
     Speed,
     StepLoops,
+    Task,
     ThinkingLoops,
 )
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_orchestrator.console import Progress, stderr_console, stdout_console
 from khala_protocol.bus.config import BusConfig
+from khala_protocol.errors import ConfigError, NoRouter
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.service import MatchCard, Stop, Submit
 from khala_protocol.signals import stop_on_signal
@@ -65,7 +70,9 @@ SUBMIT_EPILOG = """
 Examples:\n
     khala submit 2s3z_pair\n
     khala submit 2s3z_pair --model deepseek --episodes 5 --connect tls/10.0.0.5:7447 --tls keys\n
-    khala submit my_task.yaml --run first && khala watch first
+    khala submit my_task.yaml --run first && khala watch first\n
+    khala submit simple64_duel --blue openai --red anthropic\n
+    khala submit --resume first
 """
 
 Connect = Annotated[
@@ -188,8 +195,12 @@ def _listeners(
 
 
 def submit(
-    task: Annotated[str, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")],
+    task: Task = None,
     *,
+    resume: Annotated[
+        str | None,
+        typer.Option(help="Instead of a task: go on with a match that the service has a recording of.", metavar="RUN"),
+    ] = None,
     connect: Connect = None,
     tls: Tls = None,
     insecure: Insecure = False,
@@ -198,6 +209,9 @@ def submit(
     base_url: BaseUrl = None,
     policy: PolicyName = None,
     fallback: Fallback = None,
+    blue: Mind = None,
+    red: Mind = None,
+    side_model: SideModel = None,
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     seed: Seed = 1,
@@ -220,20 +234,24 @@ def submit(
     Options are those of `khala run`; keys, policies and model files are those of the service's machine.
     """
     from khala.matches import new  # noqa: PLC0415
-    from khala.minds import Minds  # noqa: PLC0415  # as above
+    from khala.minds import Minds, named_sides  # noqa: PLC0415
     from khala.service import client  # noqa: PLC0415
 
-    config = new(
+    if (task is None) == (resume is None):
+        raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume")
+    config = None if task is None else new(
         task, run, Path(), seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images,
     )  # fmt: skip
     order = Submit(
-        run=config.run,
+        run=config.run if config else str(resume),
         number=client.new_number(),
         owner=client.owner(),
-        match=config.model_dump(mode="json", exclude={"record", "run"}),
+        match=config.model_dump(mode="json", exclude={"record", "run"}) if config else {},
         minds=asdict(Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)),
+        sides=named_sides(side_model or (), blue=blue, red=red),
+        resume=resume is not None,
     )
     card = _ask(connect, tls, insecure, ("host",), lambda bus: client.submit(bus, order))
     typer.echo(json.dumps(card.model_dump(mode="json")) if as_json else card.run)
@@ -267,13 +285,19 @@ def watch(
     with Progress(stderr_console()) as progress:
         card = _ask(connect, tls, insecure, ("host", "observer"), lambda bus: client.watch(bus, run, progress))
     _end(card, as_json=as_json)
-    raise typer.Exit(card.state in ENDINGS_THAT_FAIL)
+    raise typer.Exit(_exit_code(card))
+
+
+def _exit_code(card: MatchCard) -> int:
+    if card.state in ENDINGS_THAT_FAIL:
+        return FAILED
+    return NOT_VALID if card.reason else DONE  # a match that is done has a reason only if it is not valid
 
 
 def stop(
     run: Name, *, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False
 ) -> None:
-    """Stop a match of a service; its recording stays, and `khala run --resume` goes on with it."""
+    """Stop a match of a service; its recording stays, and `khala submit --resume` goes on with it."""
     from khala.service import client  # noqa: PLC0415
 
     order = Stop(run=run, number=client.new_number())
@@ -295,12 +319,16 @@ def _ask(
     names: tuple[str, ...],
     ask: "Callable[[Bus], Coroutine[Any, Any, T]]",
 ) -> T:
+    from khala.service.client import NoService  # noqa: PLC0415
     from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415  # loads the native library
 
     config = client_config(connect or (), tls=tls, names=names, insecure=insecure)
 
     async def asked() -> T:
-        bus = await open_bus(config)
+        try:
+            bus = await open_bus(config)
+        except NoRouter as error:
+            raise NoService(f"{error.found}: `khala serve` starts a service, --connect says where one is") from None
         try:
             return await ask(bus)
         finally:

@@ -187,8 +187,8 @@ class Service:
         self._close(entry, *_outcome(entry, ending))
 
     async def _once(self, entry: Entry) -> Ending:
-        assert entry.config is not None and entry.minds is not None
-        resume = entry.card.starts > 1 and entry.card.step + len(entry.card.outcomes) > 0
+        assert entry.config is not None
+        resume = entry.resume or (entry.card.starts > 1 and entry.card.step + len(entry.card.outcomes) > 0)
         record = free_recording(self.out / entry.card.run)
         config = entry.config.model_copy(update={"record": record})
         player = await self.take()
@@ -196,7 +196,7 @@ class Service:
         try:
             if entry.stop_because:
                 return Ending("stopped")
-            return await player.play(Job(config=config, minds=entry.minds, bus=self.joins, resume=resume))
+            return await player.play(Job(config=config, minds=dict(entry.minds), bus=self.joins, resume=resume))
         finally:
             del self._players[entry.card.number]
             await player.close()
@@ -266,7 +266,7 @@ class Service:
 
 def _outcome(entry: Entry, ending: Ending) -> tuple[MatchState, str]:
     """Return what became of a match."""
-    how = f"; `khala run --resume {entry.card.recording}` goes on" if entry.card.step else ""
+    how = f"; `khala submit --resume {entry.card.run}` goes on" if entry.card.step else ""
     state = "stopped" if entry.stop_because and ending.state != "done" else ending.state
     match state:
         case "done":

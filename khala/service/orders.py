@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from khala.matches import free_recording
-from khala.minds import Minds
+from khala.matches import free_recording, resumed
+from khala.minds import Minds, minds_of
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.replay import modules_of
@@ -26,28 +26,47 @@ if TYPE_CHECKING:
     from khala_protocol.service import Submit
 
 _MINDS = TypeAdapter(Minds)
+ASSEMBLE_S = 60.0
+"""How long a match that is gone on with waits for its agents."""
 
 
-def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, Minds]:
-    """Return the match that an order describes, recorded below `out`.
+def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, dict[str, Minds]]:
+    """Return the match that an order describes, recorded below `out`, and how the agents of each side decide.
 
     Raises:
         KhalaError: it cannot be played, or needs more trust than there is; the text says why.
     """
     check_name(order.run, "run")
     try:
-        config = MatchConfig.model_validate({**order.match, "run": order.run, "record": None})
-        minds = _MINDS.validate_python(order.minds)
+        config = _resumed(order.run, out) if order.resume else _new(order)
+        common = _MINDS.validate_python(order.minds)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         raise ConfigError(f"{'.'.join(map(str, first['loc']))}: {words_of(first)}", source="match") from None
     if unknown := sorted(order.minds.keys() - {field.name for field in dataclasses.fields(Minds)}):
         raise ConfigError(f"there is no option {unknown[0]!r}; is the service of the same version?", source="match")
-    if not trusts and (asked := _needs_trust(config, minds)):
+    minds = minds_of([side.side for side in config.task.per_side()], common, order.sides)
+    asked = "" if trusts else next(filter(None, (_needs_trust(config, mind) for mind in minds.values())), "")
+    if asked:
         raise ConfigError(f"{asked} is for a service that was started with --trust: this machine would run or call it")
     Observer(config.task)
-    minds.check()
+    for mind in minds.values():
+        mind.check()
     return config.model_copy(update={"record": free_recording(out / order.run)}), minds
+
+
+def _new(order: Submit) -> MatchConfig:
+    return MatchConfig.model_validate({**order.match, "run": order.run, "record": None})
+
+
+def _resumed(run: str, out: Path) -> MatchConfig:
+    """Return the match of the newest recording of a run."""
+    if not (out / run).is_dir():
+        raise ConfigError(f"the service has no run {run!r} to go on with: it looks for its recording in {out / run}")
+    config, _ = resumed(out / run, out, assemble_s=ASSEMBLE_S)
+    if config.run != run:
+        raise ConfigError(f"the recording in {out / run} is of the run {config.run!r}: give its directory that name")
+    return config
 
 
 def _needs_trust(config: MatchConfig, minds: Minds) -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from khala import environment, games
 from khala.local import Supplies, play
 from khala.matches import resumed
-from khala.minds import Minds, minds_of
+from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala.service import logs
 from khala.service.spare import Spares
 from khala_bridge.game.pysc2_game import Launched
@@ -46,7 +46,8 @@ class Job(Frozen):
     """One match for a worker."""
 
     config: MatchConfig
-    minds: Minds = Minds()
+    minds: dict[str, Minds]
+    """By side."""
     bus: BusConfig
     resume: bool = False
     """Whether to go on with the newest recording of its directory."""
@@ -100,8 +101,7 @@ async def _play(job: Job, game: str, stock: Spares, launched: Launched) -> dict[
     config, past = job.match()
     logs.here["run"] = config.run
     supplies = Supplies(bus=job.bus, spawn=stock, launched=launched)
-    minds = minds_of([side.side for side in config.task.per_side()], job.minds, {})
-    results = await play(config, minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
+    results = await play(config, job.minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
     invalid = dict.fromkeys(result.invalid_because for result in results if not result.valid)
     return {"done": "; ".join(invalid)}
 

@@ -32,6 +32,7 @@ class Announcer:
         self._advisers = tuple(advisers)
         self._topics: dict[Topic, Publisher] = {}
         self._briefings: dict[Seat, Publisher] = {}
+        self._newest: dict[Seat, Briefing] = {}
         self._messages: dict[Seat, Publisher] = {}
 
     async def __aenter__(self) -> Self:
@@ -56,8 +57,11 @@ class Announcer:
         await self._topics[Topic.RUN].put(encode(card))
 
     async def brief(self, briefing: Briefing) -> None:
-        """Publish the briefing of one agent."""
-        await self._briefings[Seat(briefing.side, briefing.agent)].put(encode(briefing))
+        """Publish the briefing of one agent, unless it is the one that holds."""
+        seat = Seat(briefing.side, briefing.agent)
+        if self._newest.get(seat) != briefing:
+            self._newest[seat] = briefing
+            await self._briefings[seat].put(encode(briefing))
 
     async def message(self, message: Message) -> None:
         """Publish a message to an agent or to a channel, under the name of the sender."""

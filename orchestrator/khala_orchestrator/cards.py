@@ -1,4 +1,4 @@
-"""What is published before the first step: a briefing for each agent, and the run card for everyone."""
+"""What is published before the first step: a briefing for each agent, and the run card for everyone else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
 
 
-def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Briefing:
+def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episodes: int = 1) -> Briefing:
     """Return everything that one agent has to know, except its observations."""
     others = task.correspondents(agent)
     return Briefing(
@@ -25,6 +25,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int) -> Br
         agent=agent.name,
         side=task.side,
         episode=episode,
+        episodes=episodes,
         role=agent.role,
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),

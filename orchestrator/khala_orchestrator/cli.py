@@ -179,6 +179,8 @@ def replay(
     recording = Recording.open(file)
     if not recording.complete:
         stderr_console().print(Text(_damage(recording)), style="yellow", soft_wrap=True)
+    for key, words in recording.left_out.items():
+        stderr_console().print(Text(f"left out of {key}: {words}"), style="yellow", soft_wrap=True)
     if new is not None:
         whole = recover(file, new)
         data = {"recording": str(new), "samples": whole.samples, "complete": recording.complete}
@@ -193,7 +195,9 @@ def replay(
         _paces(recording, as_json=as_json)
         return
     if as_json:
-        typer.echo(json.dumps(summary(file, selection) | {"complete": recording.complete}))
+        typer.echo(
+            json.dumps(summary(file, selection) | {"complete": recording.complete, "left_out": recording.left_out})
+        )
         return
     console = stdout_console()
     for part in transcript(file, selection, whole=text):

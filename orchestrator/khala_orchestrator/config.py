@@ -78,8 +78,8 @@ def load_task(name: str) -> TaskConfig:
 def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     """Return the task with fields replaced. None changes nothing.
 
-    `rule`, `max_wait_s` and other fields of `Clock` are those of its clock, `images` are the images of all agents, see
-    `images_for`.
+    `rule`, `max_wait_s` and other fields of `Clock` are those of its clock, `images` are the images of all agents, of
+    every side, see `images_for`.
 
     Raises:
         ConfigError: a value does not fit.
@@ -92,7 +92,7 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     try:
         if "images" in given:
             asked = given.pop("images")
-            for agent in fields["agents"]:
+            for agent in (agent for side in (fields, *fields["sides"]) for agent in side["agents"] or ()):
                 agent["images"] = images_for(asked, agent["kind"])
         return TaskConfig.model_validate(fields | given)
     except ValidationError as error:

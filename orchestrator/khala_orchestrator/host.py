@@ -79,10 +79,12 @@ async def host(
         await announcer.run(card)
         flush()  # a host that is killed before its first report can be resumed, too
         watch(card)
-        await roster.assemble(required, config.assemble_s)
-        gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms
         observer = _PublishingObserver(announcer, watch, flush)
         match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock))
+        for briefing in match.briefings(past.episode if past else 0):  # by which agents know that the host is there
+            await announcer.brief(briefing)
+        await roster.assemble(required, config.assemble_s)
+        gc.freeze()  # imports stay for good: scanning them again and again stops a step for 40 ms
         if past is None:
             return [result async for result in match.play()]
         return [*past.results, *[result async for result in _resumed(match, past, observer)]]

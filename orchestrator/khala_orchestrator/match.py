@@ -107,6 +107,12 @@ class Match:
             if any(result.outcome == "aborted" for result in results):
                 return
 
+    def briefings(self, episode: int) -> Iterator[Briefing]:
+        """Yield what each agent has to know in an episode."""
+        for task in (side.task for side in self.sides):
+            for agent in task.agents:
+                yield briefing(task, agent, self.config.run, episode, self.config.episodes)
+
     async def _episode(self, episode: int) -> Sequence[Result]:
         began = time.perf_counter()
         await self._begin(episode)
@@ -154,8 +160,8 @@ class Match:
         self.schedule.begin()
         for side in self.sides:
             side.begin()
-            for agent in side.task.agents:
-                await self.match_observer.brief(briefing(side.task, agent, self.config.run, episode))
+        for one in self.briefings(episode):
+            await self.match_observer.brief(one)
 
     def _questions(self, at: StepId, seats: Sequence[Seat], watch: Stopwatch) -> Iterator[Question]:
         """Yield a question per seat, made on demand: the first agent thinks while others' observations are made."""

@@ -13,6 +13,7 @@ import contextlib
 import logging
 from typing import TYPE_CHECKING, Protocol, Self
 
+from khala_orchestrator.allowance import Allowance
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Bus, Delivery, Liveness, Publisher, Sample, Subscription, Token
 from khala_protocol.errors import RecordingError, WrongKey
@@ -35,6 +36,9 @@ class Sink(Protocol):
 
     def flush(self) -> None:
         """Keep what was written from being lost."""
+
+    def note_left_out(self, key: str, words: str) -> None:
+        """Keep how much of a key is not written; the last words count."""
 
 
 class OwnedSink(Sink, Protocol):
@@ -81,6 +85,10 @@ class BestEffort:
             with self._giving_up():
                 self._recorder.flush()
 
+    def note_left_out(self, key: str, words: str) -> None:
+        """Keep how much of a key is not written."""
+        self._recorder.note_left_out(key, words)
+
     @contextlib.contextmanager
     def _giving_up(self) -> Iterator[None]:
         try:
@@ -95,22 +103,25 @@ class RecordingBus:
     """A `Bus` that records every sample it publishes or hands out.
 
     Samples under keys of agents that are not in the match are handed out and not recorded: a recording has room for
-    65 535 keys, and anybody who may write can make up more.
+    65 535 keys, and anybody who may write can make up more. What an agent sends beyond its `Allowance` is neither: the
+    host does not act on what is not in the file. The metadata of the recording say how much was left out.
     """
 
     def __init__(self, bus: Bus, recorder: Sink, seats: Iterable[Seat]) -> None:
         self._bus = bus
         self._recorder = recorder
         self._seats = frozenset(seats)
+        self._allowance = Allowance(reports=len({seat.side for seat in self._seats}) or 1)
 
     async def publisher(self, key: str, delivery: Delivery) -> Publisher:
         """Declare a publisher whose samples are recorded before they are sent."""
-        return _RecordingPublisher(await self._bus.publisher(key, delivery), self._recorder)
+        ends_step = self._allowance.report if key.endswith(f"/{Topic.REPORT}") else None
+        return _RecordingPublisher(await self._bus.publisher(key, delivery), self._recorder, ends_step)
 
     async def subscribe(self, key_expr: str, delivery: Delivery, *, depth: int = 1024) -> Subscription[Sample]:
         """Declare a subscription whose samples are recorded when they are taken."""
         subscription = await self._bus.subscribe(key_expr, delivery, depth=depth)
-        return _RecordingSubscription(subscription, self._recorder, self._is_known)
+        return _RecordingSubscription(subscription, self._recorder, self._is_known, self._has_room)
 
     async def announce(self, key: str) -> Token:
         """Declare a liveliness token; tokens are not recorded, reports say who was there."""
@@ -126,6 +137,12 @@ class RecordingBus:
         except WrongKey:
             return False
         return address.agent is None or address.side is None or Seat(address.side, address.agent) in self._seats
+
+    def _has_room(self, sample: Sample) -> bool:
+        room = self._allowance.takes(sample.key, len(sample.payload))
+        if not room:
+            self._recorder.note_left_out(sample.key, self._allowance.left_out(sample.key))
+        return room
 
     async def close(self) -> None:
         """Close the bus below; the owner of the recorder closes it."""
@@ -155,9 +172,10 @@ class Listener:
 
 
 class _RecordingPublisher:
-    def __init__(self, publisher: Publisher, recorder: Sink) -> None:
+    def __init__(self, publisher: Publisher, recorder: Sink, ends_step: Callable[[], None] | None) -> None:
         self._publisher = publisher
         self._recorder = recorder
+        self._ends_step = ends_step
 
     @property
     def key(self) -> str:
@@ -165,6 +183,8 @@ class _RecordingPublisher:
 
     async def put(self, payload: bytes) -> None:
         self._recorder.write(self._publisher.key, payload)
+        if self._ends_step:
+            self._ends_step()
         await self._publisher.put(payload)
 
     async def close(self) -> None:
@@ -172,10 +192,17 @@ class _RecordingPublisher:
 
 
 class _RecordingSubscription:
-    def __init__(self, subscription: Subscription[Sample], recorder: Sink, is_known: Callable[[str], bool]) -> None:
+    def __init__(
+        self,
+        subscription: Subscription[Sample],
+        recorder: Sink,
+        is_known: Callable[[str], bool],
+        has_room: Callable[[Sample], bool],
+    ) -> None:
         self._subscription = subscription
         self._recorder = recorder
         self._is_known = is_known
+        self._has_room = has_room
 
     @property
     def dropped(self) -> int:
@@ -189,10 +216,13 @@ class _RecordingSubscription:
         return self
 
     async def __anext__(self) -> Sample:
-        sample = await self._subscription.__anext__()
-        if self._is_known(sample.key):
-            self._recorder.write(sample.key, sample.payload)
-        return sample
+        async for sample in self._subscription:
+            if not self._is_known(sample.key):
+                return sample
+            if self._has_room(sample):
+                self._recorder.write(sample.key, sample.payload)
+                return sample
+        raise StopAsyncIteration
 
     async def close(self) -> None:
         await self._subscription.close()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from khala_orchestrator.replay import EndOfRecording, RecordedTurn, recorded_config
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import RecordingError
-from khala_protocol.messages import Report
+from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Iterator
@@ -59,16 +59,21 @@ class Unfinished:
         return len(self.config.task.per_side())
 
     def kept(self) -> Iterator[Recorded]:
-        """Yield the recorded samples up to the last complete step, in the order of the file."""
+        """Yield the recorded samples up to the last complete step, in the order of the file.
+
+        What models were asked in the open step is kept, too: it was paid, and an agent that stayed asks no second time.
+        """
         last = self.episode, self.steps - 1
         left = self.sides * (1 if self.steps else 0)
+        is_open = False
         for sample in self.recording:
             message = sample.message
             if isinstance(message, Report) and (message.episode, message.step) == last:
                 left -= 1
             elif left == 0 and _is_of_the_episode(sample, self.episode):
-                return
-            yield sample
+                is_open = True
+            if not is_open or isinstance(message, ModelCall):
+                yield sample
 
 
 def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfinished:

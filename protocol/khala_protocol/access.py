@@ -5,7 +5,7 @@ subject to them, which is right for a host that is its own router.
 
     who         reads                                                              writes
     host        everything of the run                                              everything of the run
-    agent       run, result; briefing, observation, images of its own              its reply, exchange, alive
+    agent       result; briefing, observation, images of its own                   its reply, exchange, alive
     adviser     run, report, result                                                its advice
     observer    everything of the run                                              nothing
     service     everything of every run, on the unix socket of `khala serve`       the same
@@ -14,7 +14,8 @@ The service `khala serve` knows no run before it is asked for one: its router ha
 certificate may order matches, and the observer's may list and watch them; its workers come over a unix socket, in a
 directory of their own.
 
-A report is not for agents: it has the accepted calls of all of them. Messages reach an agent in its observations.
+Report and run card are not for agents: one has the accepted calls of all of them, the other the task of both sides.
+Messages reach an agent in its observations.
 A rule covers a key only if it includes it, and `**` does not include a part that begins with `@`, such as those under
 which Zenoh keeps what late joiners ask for; so each key stands here with and without them.
 """
@@ -102,7 +103,7 @@ def _observer(root: str) -> list[dict[str, Any]]:
 
 
 def _agent(root: str, name: str, own: str) -> list[dict[str, Any]]:
-    reads = [f"{root}/run", f"{root}/result", f"{own}/briefing", f"{own}/observation", f"{own}/image/*"]
+    reads = [f"{root}/result", f"{own}/briefing", f"{own}/observation", f"{own}/image/*"]
     keys = _with_caches(*reads)
     return [
         _rule(f"listen:{name}", ["ingress"], _LISTEN, keys),

@@ -51,6 +51,18 @@ class BusError(KhalaError):
     """The bus could not be opened, or a link of it failed."""
 
 
+class NoRouter(BusError):
+    """Nothing that could be joined is at any of the endpoints.
+
+    Attributes:
+        found: what is there instead, without advice.
+    """
+
+    def __init__(self, found: str) -> None:
+        super().__init__(f"{found}: start one there with `khala router`, or connect elsewhere")
+        self.found = found
+
+
 class BusClosed(BusError):
     """The bus or the subscription was closed during a wait on it."""
 

@@ -536,6 +536,8 @@ class Briefing(Wire):
     agent: str
     side: str
     episode: int = Field(ge=0)
+    episodes: int = Field(default=1, ge=1)
+    """Of the run; after the result of the last one there is nothing to do."""
     role: str
     """The agent's role and task."""
     task: str = ""
@@ -679,7 +681,7 @@ class AgentCard(Frozen):
 
 
 class Run(Wire):
-    """Host → all: the run card, with everything needed to repeat a run or to trust its numbers."""
+    """Host → all but agents: the run card, with everything needed to repeat a run or to trust its numbers."""
 
     kind: Literal["run"] = "run"
     task: str

@@ -39,10 +39,14 @@ class Submit(Wire):
     """Of the order; the same order has the same number."""
     owner: str = Field(default="", max_length=64)
     """Who wants it: matches of different owners take turns."""
-    match: dict[str, Any]
-    """A `khala_orchestrator.config.MatchConfig`."""
+    match: dict[str, Any] = Field(default={})
+    """A `khala_orchestrator.config.MatchConfig`; that of its recording if it is resumed."""
     minds: dict[str, Any] = Field(default={})
-    """A `khala.local.Minds`: how the agents decide."""
+    """A `khala.minds.Minds`: how the agents decide."""
+    sides: dict[str, str] = Field(default={})
+    """By side, the model or policy of agents that decide otherwise, as `khala run --side-model` takes it."""
+    resume: bool = False
+    """Whether to go on with the newest recording that the service has of this run."""
 
 
 class Stop(Wire):

@@ -21,7 +21,6 @@ from khala_protocol.messages import (
     Observation,
     Reply,
     Result,
-    Run,
     TeamSpec,
     Usage,
     View,
@@ -152,28 +151,6 @@ async def host(broker: MemoryBroker) -> AsyncIterator[Host]:
     await made.listen()
     yield made
     await made.close()
-
-
-@pytest.fixture
-def card() -> Callable[..., Run]:
-    def make(**changes: Any) -> Run:
-        fields: dict[str, Any] = {
-            "run": RUN,
-            "task": "2s3z",
-            "map_name": "2s3z",
-            "map_sha256": "0",
-            "seed": 1,
-            "episodes": 1,
-            "game": "none",
-            "executor": "raw",
-            "clock": Clock(),
-            "agents": (),
-            "catalogue_sha256": "0",
-            "versions": {},
-        }
-        return Run.model_validate(fields | changes)
-
-    return make
 
 
 @pytest.fixture

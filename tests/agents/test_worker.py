@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from khala_agents.policy import Context, Said
     from khala_protocol.bus import Delivery
     from khala_protocol.bus.memory import MemoryBroker, MemoryBus
-    from khala_protocol.messages import Briefing, Observation, Result, Run
+    from khala_protocol.messages import Briefing, Observation, Result
 
 CLOCK = "jumps"
 RUN, SIDE, AGENT = "test", "blue", "Stalkers"
@@ -171,13 +171,11 @@ async def test_a_step_is_decided_once_and_its_reply_sent_again_if_it_is_asked_ag
 async def test_a_host_that_begins_anew_is_answered_from_step_0_again(
     host: Any,
     players: Players,
-    card: Callable[..., Run],
     briefing: Callable[..., Briefing],
     observation: Callable[..., Observation],
 ) -> None:
     await players.start(Fixed(ATTACK))
     for seed in (1, 2):
-        await host.say(card(seed=seed))
         await host.say(briefing())
         await host.say(observation(step=0, text=f"seed {seed}"))
         await asyncio.sleep(0.1)
@@ -187,7 +185,6 @@ async def test_a_host_that_begins_anew_is_answered_from_step_0_again(
 async def test_a_host_that_goes_on_gets_the_reply_to_its_open_step_again_without_a_new_decision(
     host: Any,
     players: Players,
-    card: Callable[..., Run],
     briefing: Callable[..., Briefing],
     observation: Callable[..., Observation],
 ) -> None:
@@ -199,7 +196,6 @@ async def test_a_host_that_goes_on_gets_the_reply_to_its_open_step_again_without
 
     await players.start(FunctionPolicy(decide))
     for steps in ((4, 5), (5, 6)):
-        await host.say(card())
         await host.say(briefing())
         for step in steps:
             await host.say(observation(step=step))
@@ -504,10 +500,10 @@ async def test_a_worker_is_alive_from_when_it_listens_until_it_ends(
 
 
 async def test_a_worker_ends_with_the_last_result_of_the_run(
-    host: Any, players: Players, card: Callable[..., Run], result: Callable[..., Result]
+    host: Any, players: Players, briefing: Callable[..., Briefing], result: Callable[..., Result]
 ) -> None:
     task = await players.start(Fixed(ATTACK))
-    await host.say(card(episodes=2))
+    await host.say(briefing(episodes=2))
     await host.say(result(0))
     await asyncio.sleep(1)
     assert not task.done()
@@ -516,10 +512,10 @@ async def test_a_worker_ends_with_the_last_result_of_the_run(
 
 
 async def test_a_worker_that_comes_after_the_end_goes_again(
-    host: Any, players: Players, card: Callable[..., Run], result: Callable[..., Result]
+    host: Any, players: Players, briefing: Callable[..., Briefing], result: Callable[..., Result]
 ) -> None:
     await host.say(result(0))
-    await host.say(card(episodes=1))
+    await host.say(briefing(episodes=1))
     task = await players.start(Fixed(ATTACK))
     assert (await task).ended == "result"
 

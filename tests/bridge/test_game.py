@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
 import os
 import stat
 import threading
@@ -124,6 +126,22 @@ async def test_a_game_that_has_begun_once_is_given_less_time_to_begin_again(snap
         fake.hangs = True
         with pytest.raises(GameHangs, match=r"within 0.2 s"):
             await game.reset()
+
+
+async def test_a_game_that_dies_when_nobody_waits_for_it_any_more_says_nothing(
+    snapshot: Callable[..., Snapshot], caplog: pytest.LogCaptureFixture
+) -> None:
+    """As after Ctrl-C, which a terminal sends to every process of the match."""
+    fake = FakeGame(snapshot, hangs=True)
+    async with GameThread(lambda: fake) as game:
+        step = asyncio.create_task(game.act([RawExecutor().plan([], snapshot([]), 8)]))
+        await asyncio.sleep(0)  # the step is in its thread's queue
+        step.cancel()
+        await asyncio.wait([step])
+        fake.kill()
+    del step
+    gc.collect()
+    assert caplog.messages == []
 
 
 async def test_a_game_that_hangs_is_killed_and_named(snapshot: Callable[..., Snapshot]) -> None:

@@ -23,6 +23,7 @@ REPRESENTATIVES = (
     "stranger: certificate of another authority",
     "stranger: plain TCP",
     "agent: reads prompts of others",
+    "agent: reads reports and the run card",
     "agent: writes junk under replies of others",
     "agent: writes as host",
     "agent: holds tokens of others",

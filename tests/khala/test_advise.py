@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import os
 import subprocess
 import sys
 import tempfile
+from contextlib import AsyncExitStack
 from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import games
-from khala.advise import Adviser, Advising, told
+from khala import games, local_bus
+from khala.advise import Adviser, Advising, run_advise, told
 from khala.hosting import game_of
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
@@ -24,11 +26,13 @@ from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
+from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
-from khala_protocol.keys import Topic, agent_key
-from khala_protocol.messages import Advice, Message, Report, Result, Run
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import Advice, Casualties, Message, Report, Result, Run
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
@@ -123,6 +127,32 @@ async def test_a_run_that_is_not_there_is_a_sentence() -> None:
     advising = Advising(MemoryBroker().session(), Adviser("none", "blue", "Ada"), show=print, complain=print)
     with pytest.raises(ConfigError, match="no match of the name 'none' was found"):
         await advising.play(nothing(), find_s=0.01)
+
+
+async def test_of_all_matches_on_this_machine_the_one_of_the_name_is_found(
+    short: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another one is newer: of `khala serve`, for example."""
+    monkeypatch.setattr("tempfile.tempdir", short)
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    card, nothing_lost = run_card(), Casualties(units=0, value=0)
+    card = card.but(agents=card.agents[:2])  # of one side
+    ended = Result(
+        run=RUN, episode=0, outcome="draw", cause="time limit", steps=1, game_loop=8, game_s=0.4, wall_s=0.1,
+        killed=nothing_lost, lost=nothing_lost, kd=None,
+    )  # fmt: skip
+    async with AsyncExitStack() as stack:
+        for played in (True, False):
+            listen = stack.enter_context(local_bus.local_endpoint())
+            bus = await open_bus(BusConfig(mode="router", listen=(listen,)))
+            stack.push_async_callback(bus.close)
+            for topic, message in ((Topic.RUN, card), (Topic.RESULT, ended)) if played else ():
+                await (await bus.publisher(run_key(RUN, topic), Delivery.STATE)).put(encode(message))
+            if not played:
+                os.utime(listen.partition("/")[2], (2**31, 2**31))
+        ada = Adviser(RUN, "blue", "Ada")
+        await asyncio.to_thread(run_advise, ada, connect=(), tls=None, insecure=False, as_json=False)
+    assert "blue: draw, time limit" in capsys.readouterr().out
 
 
 def test_a_persons_lines_say_what_happened_and_hide_no_control_characters() -> None:

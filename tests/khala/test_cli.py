@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -11,12 +12,16 @@ import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
 from khala.cli import main
+from khala.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
+from khala.service.cli import _exit_code
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
+from khala_protocol.service import MatchCard
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 
@@ -36,6 +41,10 @@ def khala(*arguments: str, cwd: Path, **environ: str) -> subprocess.CompletedPro
 BAD = [
     ("run nosuch", "there is no task 'nosuch'"),
     ("run 2s3zz", "did you mean 2s3z"),
+    ("run", "give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume"),
+    ("run --resume missing", "there is no missing, and no runs/missing: give a run, its directory, or a .mcap file"),
+    ("submit", "give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume"),
+    pytest.param("matches --connect tcp/127.0.0.1:{closed}", "`khala serve` starts a service", marks=pytest.mark.slow),
     (
         "run bad.yaml",
         "bad.yaml:3 (agents.0.teams.0.unit_types.0): there is no unit type 'Stlaker', did you mean 'Stalker'?",
@@ -74,6 +83,9 @@ BAD = [
     ),
     ("keys agent Stalkers nowhere", "nowhere: holds no authority: make one with `khala keys init DIR`"),
     ("advise r --tls nowhere", "make it with `khala keys adviser Adviser DIR --side blue`"),
+    pytest.param(
+        "advise r --connect tcp/127.0.0.1:{closed}", "the match is elsewhere, or over", marks=pytest.mark.slow
+    ),
     ("advise r --name a/b", "name 'a/b' cannot stand in a key"),
     ("keys show nowhere", "nowhere: holds no certificates"),
     ("router --listen tcp/127.0.0.1:{taken}", "another process uses it"),
@@ -87,6 +99,20 @@ BAD = [
     ("replay missing.mcap --steps soon", "'soon' names no steps"),
     ("sc2 install file/below", "file"),
 ]
+
+
+def test_the_table_of_exit_codes_has_all_of_them() -> None:
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "faults.md"
+    rows = re.findall(r"^\| ([\d, ]+) \|", page.read_text(), re.MULTILINE)
+    codes = [int(code) for row in rows for code in row.split(", ")]
+    assert codes == [DONE, FAILED, WRONG_USAGE, NOT_VALID, *AFTER_SIGNAL]
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "code"), [("done", "", 0), ("done", "not valid: x", 3), ("failed", "x", 1), ("stopped", "", 1)]
+)
+def test_who_watches_a_match_ends_as_it_did(state: Any, reason: str, code: int) -> None:
+    assert _exit_code(MatchCard(run="r", number="1", task="t", state=state, reason=reason)) == code
 
 
 @pytest.fixture(scope="module")

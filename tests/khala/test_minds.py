@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-import pytest
+from typing import TYPE_CHECKING
 
-from khala.cli import _why_not_valid
-from khala.local import _shares_of
-from khala.minds import Minds, minds_of, named_sides
+import pytest
+import typer
+
+from khala.cli import _until_interrupted, _why_not_valid
+from khala.local import _shares_of, _taken_off
+from khala.minds import Minds, minds_of, named_sides, spent_usd
+from khala_orchestrator.config import MatchConfig, load_task
+from khala_orchestrator.roster import Seat
+from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
-from khala_protocol.messages import Casualties, Result
+from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage
+from khala_protocol.recording import Recorder, Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 COMMON = Minds(model="deepseek", model_name="chat", base_url="http://x/v1", fallback="silent", budget_usd=3.0)
 
@@ -49,6 +60,42 @@ def test_both_sides_may_spend_the_same() -> None:
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
 
 
+def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(tmp_path: Path) -> None:
+    def call(agent: str, usd: float | None) -> ModelCall:
+        return ModelCall(
+            run="r", agent=agent, side="blue", episode=0, step=0, attempt=1, model="m", endpoint="e", prompt=(),
+            completion=None, status="timeout", started_s=0, latency_s=0, usage=Usage(cost_usd=usd),
+        )  # fmt: skip
+
+    agents = tuple(
+        AgentReport(agent=name, side="blue", status="ok", usage=Usage(cost_usd=usd))
+        for name, usd in {"Late": 0.25, "LeftOut": 0.5, "Free": None}.items()
+    )
+    report = Report(run="r", side="blue", episode=0, step=0, game_loop=0, score=0, agents=agents)
+    with Recorder(tmp_path / "r.mcap") as recorder:
+        for one in (call("Late", 0.25), call("Late", 0.125), call("LeftOut", None)):
+            recorder.write(agent_key("r", "blue", one.agent, Topic.EXCHANGE), encode(one))
+        recorder.write(run_key("r", Topic.REPORT), encode(report))
+    assert spent_usd(Recording.open(tmp_path / "r.mcap")) == {
+        Seat("blue", "Late"): 0.375,
+        Seat("blue", "LeftOut"): 0.5,
+        Seat("blue", "Free"): 0.0,
+    }
+
+
+def test_a_resumed_match_may_spend_what_is_left_and_says_how_much_that_is() -> None:
+    spent = {Seat("blue", "A"): 0.75, Seat("blue", "C"): 0.25, Seat("blue", "B"): 0.25, Seat("red", "B"): 1.5}
+    shares = [share for side in ("blue", "red") for share in _shares_of(side, ["A", "B", "C"], [], 2.0, sides=2)]
+    assert _taken_off(shares, spent) == (
+        "2.7500 USD were spent before, 1.7500 of the budget are left; nothing for A, C, B, "
+        "so each of their steps is a fallback"
+    )
+    assert [share.arguments[-1] for share in shares] == ["0.0", "0.75", "1.0", "0.0"]
+    (free,) = _shares_of("blue", ["A"], [], None, sides=1)
+    assert "--budget-usd does" in _taken_off([free], spent)
+    assert "--budget-usd" not in free.arguments
+
+
 def test_a_side_and_its_model_stand_around_an_equals_sign() -> None:
     assert named_sides(["red=openai", "green=a=b"]) == {"red": "openai", "green": "a=b"}
     for wrong in ("red", "=openai", "red="):
@@ -62,6 +109,17 @@ def result(side: str, invalid_because: str = "") -> Result:
         invalid_because=invalid_because, steps=1, env_steps=1, game_loop=1, game_s=0.1, wall_s=0.1,
         killed=Casualties(), lost=Casualties(), kd=None,
     )  # fmt: skip
+
+
+def test_a_match_that_is_not_valid_says_so_without_markup(capsys: pytest.CaptureFixture[str]) -> None:
+    async def play() -> list[Result]:
+        return [result("blue", "the [red] side left")]
+
+    match = MatchConfig(task=load_task("2s3z"), run="r")
+    with pytest.raises(typer.Exit) as ended:
+        _until_interrupted(match, as_json=False, play=lambda _: play())
+    assert ended.value.exit_code == 3
+    assert capsys.readouterr().err.endswith("\nnot valid: the [red] side left\n")
 
 
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:

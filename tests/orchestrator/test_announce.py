@@ -95,6 +95,17 @@ async def test_one_that_joins_late_gets_what_still_holds_and_not_what_was_said(
     assert found == [card(), result(), briefing("Stalkers"), briefing("Zealots", episode=1)]
 
 
+async def test_a_briefing_that_holds_already_is_not_published_again(broker: MemoryBroker, drain: Drain) -> None:
+    samples = await broker.session().subscribe("**", Delivery.STATE)
+    async with Announcer(broker.session(), RUN, SEATS) as announcer:
+        for episode in (0, 0, 1):
+            await announcer.brief(briefing("Stalkers", episode))
+    assert [decode(sample.payload) for sample in await drain(samples)] == [
+        briefing("Stalkers"),
+        briefing("Stalkers", 1),
+    ]
+
+
 async def test_an_agent_without_a_seat_cannot_be_briefed(broker: MemoryBroker) -> None:
     async with Announcer(broker.session(), RUN, SEATS) as announcer:
         with pytest.raises(KeyError):

@@ -33,7 +33,7 @@ def changed(**fields: Any) -> TaskConfig:
 
 def told(agent: str, **fields: Any) -> Briefing:
     task = changed(**fields)
-    return briefing(task, task.agent(agent), "test", 2)
+    return briefing(task, task.agent(agent), "test", 2, 3)
 
 
 def test_an_agent_is_told_who_it_is_and_what_it_may_do() -> None:

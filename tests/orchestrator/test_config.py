@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import ValidationError
 
+from khala_bridge.task.config import TaskConfig
 from khala_bridge.task.maps import known_maps
 from khala_orchestrator.config import MatchConfig, all_tasks, change, load_task, new_run_name, task_files
 from khala_protocol.errors import ConfigError, WrongKey
@@ -116,6 +117,16 @@ def test_what_is_given_takes_the_place_of_what_the_file_says() -> None:
     assert (found.clock.max_wait_s, found.clock.step_loops, found.clock.rule) == (2.5, 4, "frozen")
     assert (found.max_steps, found.side, found.executor) == (9, "red", "screen")
     assert found.agents == task.agents
+
+
+def test_images_are_those_of_the_agents_of_every_side() -> None:
+    fields = load_task("duel_3m").model_dump()
+    own = [fields["agents"][0] | {"name": "General"}]
+    task = TaskConfig.model_validate(fields | {"sides": [{"side": "blue"}, {"side": "red", "agents": own}]})
+    found = [
+        [(agent.name, len(agent.images)) for agent in side.agents] for side in change(task, images="screen").per_side()
+    ]
+    assert found == [[("Captain", 1)], [("General", 1)]]
 
 
 def test_none_changes_nothing() -> None:

@@ -11,10 +11,10 @@ from khala_bridge.errors import GameError
 from khala_orchestrator.host import host
 from khala_orchestrator.roster import MissingAgents, Seat
 from khala_protocol.bus import Delivery
-from khala_protocol.codec import decode, encode
+from khala_protocol.codec import decode, decode_as, encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic, agent_key
-from khala_protocol.messages import Message, ModelCall, Observation, Reply, Report, Result, Run
+from khala_protocol.messages import Briefing, Message, ModelCall, Observation, Reply, Report, Result, Run
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
@@ -114,6 +114,14 @@ async def test_the_match_begins_when_the_last_required_agent_comes(
     coming.cancel()
     assert now_s() == 45
     assert result.statuses["Zealots"] == {"ok": 3}
+
+
+async def test_agents_are_briefed_while_others_are_waited_for(hall: Hall, config: MakeConfig, drain: Drain) -> None:
+    samples = await hall.broker.session().subscribe("**/briefing", Delivery.STATE)
+    with pytest.raises(MissingAgents):
+        await hall.play(config(episodes=3), Zealots=None)
+    briefed = [decode_as(Briefing, sample.payload) for sample in await drain(samples)]
+    assert [(one.agent, one.episode, one.episodes) for one in briefed] == [("Stalkers", 0, 3), ("Zealots", 0, 3)]
 
 
 async def test_a_required_agent_that_never_comes_ends_it_before_it_begins(hall: Hall, config: MakeConfig) -> None:

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_orchestrator.allowance import STEP_BYTES
 from khala_orchestrator.record import BestEffort, Listener, RecordingBus
 from khala_orchestrator.roster import Seat
+from khala_protocol.access import EXCHANGE_BYTES
 from khala_protocol.bus import Delivery, Sample
 from khala_protocol.codec import encode
 from khala_protocol.errors import BusClosed, RecordingError
-from khala_protocol.keys import Topic, agent_key, alive_key, every_agent
+from khala_protocol.keys import Topic, agent_key, alive_key, every_agent, run_key
 from khala_protocol.messages import ModelCall, Reply
 from khala_protocol.recording import Recorder, Recording
 
@@ -90,6 +92,29 @@ async def test_bytes_that_are_no_message_are_kept_as_they_came(broker: MemoryBro
         await anext(replies)
     (sample,) = Recording.open(tmp_path / "run.mcap")
     assert (sample.payload, sample.message) == (b"\x00\xff garbage", None)
+
+
+async def test_an_agent_cannot_fill_the_recording(
+    broker: MemoryBroker, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "run.mcap"
+    agent = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+    taken = []
+    with Recorder(path) as recorder:
+        bus = RecordingBus(broker.session(), recorder, [*SEATS, Seat("red", "Captain")])
+        reports = await bus.publisher(run_key(RUN, Topic.REPORT), Delivery.LOG)
+        for sent in (9, 1, 3):
+            heard = await bus.subscribe(every_agent(RUN, Topic.EXCHANGE), Delivery.LOG)
+            for _ in range(sent):
+                await agent.put(bytes(STEP_BYTES))
+            await heard.close()
+            taken.append(len([sample async for sample in heard]))
+            await reports.put(b"of one side of two: half a step")
+    assert taken == [EXCHANGE_BYTES // STEP_BYTES, 0, 1]
+    recording = Recording.open(path)
+    assert recording.counts[EXCHANGE] == 5
+    assert recording.left_out == {EXCHANGE: f"8 samples of {8 * STEP_BYTES} bytes"}
+    assert [r.message for r in caplog.records] == [f"{EXCHANGE} sends more than 1 MB a step: the rest is left out"]
 
 
 async def test_a_subscription_keeps_its_depth_and_says_what_it_lost(broker: MemoryBroker, tmp_path: Path) -> None:

@@ -11,7 +11,9 @@ import pytest
 from khala_orchestrator.host import host
 from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
-from khala_protocol.messages import Observation, Report, Run
+from khala_protocol.codec import encode
+from khala_protocol.keys import Topic
+from khala_protocol.messages import ModelCall, Observation, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
@@ -147,6 +149,22 @@ async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
     assert [report.incidents for report in steps] == [(), (), (RESUMED,), ()]
     topics = [sample.key.rsplit("/", 1)[1] async for sample in heard]
     assert topics == ["briefing", "observation", "reply", "observation", "reply"]
+
+
+async def test_what_a_model_was_asked_in_the_open_step_is_kept(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:
+    async def ask(peer: Peer, seen: Observation) -> None:
+        call = ModelCall(
+            run=seen.run, side="blue", agent="Stalkers", episode=0, step=seen.step, attempt=1, model="m", endpoint="e",
+            prompt=(), completion="", status="ok", started_s=0, latency_s=0,
+        )  # fmt: skip
+        await peer.put(Topic.EXCHANGE, encode(call))
+        await stalkers(peer, seen)
+
+    whole = tmp_path / "whole.mcap"
+    await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=ask)
+    kept = list(unfinished(killed_after(whole, 2, tmp_path / "killed.mcap")).kept())
+    assert [call.message.step for call in kept if isinstance(call.message, ModelCall)] == [0, 1, 2]
+    assert [seen.message.step for seen in kept if isinstance(seen.message, Observation)] == [0, 0, 1, 1]
 
 
 async def test_a_reply_under_the_key_of_another_agent_is_not_taken_for_one_of_its_own(

@@ -31,7 +31,7 @@ TOPICS = [
       for topic in ("briefing", "observation", "image/0", "reply", "exchange", "message", "advice")),
     f"{ADA}/advice",
 ]  # fmt: skip
-READS = {"khala/r/run", "khala/r/result", f"{A}/briefing", f"{A}/observation", f"{A}/image/0"}
+READS = {"khala/r/result", f"{A}/briefing", f"{A}/observation", f"{A}/image/0"}
 WRITES = {f"{A}/reply", f"{A}/exchange"}
 OF_THE_RUN = {topic for topic in TOPICS if not topic.startswith("khala/other")}
 

@@ -212,6 +212,7 @@ class GameThread:
 
     async def _run(self, call: Callable[[], T], limit_s: float) -> T:
         work = asyncio.get_running_loop().run_in_executor(self._threads, call)
+        work.add_done_callback(lambda done: done.exception())  # Ctrl-C ends the game too, when nobody waits for it
         try:
             async with asyncio.timeout(limit_s):
                 return await asyncio.shield(work)

@@ -50,12 +50,9 @@ _SOURCE_PLACE = re.compile(r"\s+at /\S+\.rs:\d+\.?")
 
 
 async def why_not_connected(config: BusConfig) -> str:
-    """Return the sentence for a client that found no router."""
+    """Return what a client found instead of a router."""
     reasons = [f"{endpoint} ({await _attempt(endpoint, config.tls)})" for endpoint in config.connect_to]
-    return (
-        f"no router answered within {config.connect_timeout_s:g} s at {', '.join(reasons)}: "
-        "start one there with `khala router`, or connect elsewhere"
-    )
+    return f"no router answered within {config.connect_timeout_s:g} s at {', '.join(reasons)}"
 
 
 def why_not_listening(config: BusConfig, said: str) -> str:

@@ -40,7 +40,7 @@ from khala_protocol.bus.keyexpr import check_key, check_key_expr
 from khala_protocol.bus.lane import DropGate, Lane, Shut, Window
 from khala_protocol.bus.sightings import PATIENCE_S, Sightings
 from khala_protocol.bus.threads import run_detached
-from khala_protocol.errors import BusClosed, BusError
+from khala_protocol.errors import BusClosed, BusError, NoRouter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,7 +82,7 @@ async def open_bus(config: BusConfig) -> ZenohBus:
     except zenoh.ZError as error:
         said = str(error)
         if "Unable to connect" in said:
-            raise BusError(await why_not_connected(config)) from None
+            raise NoRouter(await why_not_connected(config)) from None
         raise BusError(why_not_listening(config, said) if config.listen_on else plain(said)) from None
     return ZenohBus(session, config)
 

@@ -20,7 +20,7 @@ from khala_protocol.errors import PeerError, RecordingError
 from khala_protocol.files import MB, check_regular
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
-from khala_protocol.recording.recorder import KINDS, LIBRARY, METADATA, Recorder
+from khala_protocol.recording.recorder import KINDS, LEFT_OUT, LIBRARY, METADATA, Recorder
 from khala_protocol.recording.unpack import BROKEN, unpacked
 
 if TYPE_CHECKING:
@@ -111,6 +111,12 @@ class Recording:
     def samples(self) -> int:
         """The number of readable samples."""
         return sum(self.counts.values())
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """How much was not recorded because it was too much, by key."""
+        notes = self.metadata.items()
+        return {name.removeprefix(LEFT_OUT): words for name, words in notes if name.startswith(LEFT_OUT)}
 
     @classmethod
     def open(cls, path: Path | str) -> Self:

@@ -28,6 +28,8 @@ LIBRARY = "khala"
 
 METADATA = "khala"
 """Name of the metadata record that holds the versions."""
+LEFT_OUT = "left out of "
+"""In the metadata, before a key of which the recorder did not take everything."""
 
 
 class Recorder:
@@ -49,6 +51,7 @@ class Recorder:
         self._clock = clock
         self._schemas: dict[type[Wire], int] = {}
         self._channels: dict[str, int] = {}
+        self._notes: dict[str, str] = {}
         self._count = 0
         self._file = _create(self.path)
         self._writer = Writer(self._file, compression=CompressionType.ZSTD)
@@ -81,11 +84,17 @@ class Recorder:
         with _writing(self.path):
             self._flush()
 
+    def note_left_out(self, key: str, words: str) -> None:
+        """Keep how much of a key is not in the file, for its end; the last words count."""
+        self._notes[LEFT_OUT + key] = words
+
     def close(self) -> None:
-        """End the file, with index and statistics. May be called twice."""
+        """End the file, with notes, index and statistics. May be called twice."""
         if self._file.closed:
             return
         with _writing(self.path), self._file:
+            if self._notes:
+                self._writer.add_metadata(METADATA, self._notes)
             self._writer.finish()  # type: ignore[no-untyped-call]  # mcap annotates no return here
 
     def __enter__(self) -> Self:

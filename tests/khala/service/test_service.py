@@ -16,6 +16,8 @@ from khala.service.book import Limits
 from khala.service.client import NoService, Refused
 from khala.service.daemon import STARTS, Service
 from khala.service.pool import Ending
+from khala_bridge.game.game import GameIdentity
+from khala_orchestrator.cards import run_card
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.memory import MemoryBroker
@@ -23,6 +25,7 @@ from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import AgentReport, Report, Usage
+from khala_protocol.recording import Recorder
 from khala_protocol.service import MAX_ORDER_BYTES, MatchCard, Stop, Submit
 
 if TYPE_CHECKING:
@@ -174,6 +177,40 @@ async def test_what_cannot_or_may_not_be_played_is_refused_in_a_sentence(
     assert stage.begun == []
 
 
+async def test_each_side_may_have_its_own_model_and_half_of_the_budget(stage: Stage) -> None:
+    duel = new("duel_3m", "duel", Path("nowhere"), seed=1, episodes=1, assemble_s=60.0)
+    plain = duel.model_dump(mode="json", exclude={"record", "run"})
+    wanted = order("duel", match=plain, budget_usd=3.0).but(sides={"red": "scripted/skilled"})
+    await client.submit(stage.bus, wanted)
+    await asyncio.sleep(1)
+    job = stage.playing["duel"].job
+    assert job is not None
+    found = {side: (mind.model_name, mind.budget_usd) for side, mind in job.minds.items()}
+    assert found == {"blue": (None, 1.5), "red": ("skilled", 1.5)}
+    for sides, because in (({"green": "openai"}, "has no side green"), ({"red": "os:system"}, "is for a service")):
+        with pytest.raises(Refused, match=because):
+            await client.submit(stage.bus, wanted.but(run="other", number=client.new_number(), sides=sides))
+
+
+async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage) -> None:
+    config = new("2s3z_pair", "first", Path("nowhere"), seed=7, episodes=1, assemble_s=60.0)
+    card = run_card(config.model_copy(update={"game": "Khala simulator"}), GameIdentity("", "", "", ""))
+    wanted = order("first").but(match={}, resume=True)
+    with pytest.raises(Refused, match="the service has no run 'first' to go on with: it looks for its recording in"):
+        await client.submit(stage.bus, wanted)
+    with Recorder(stage.out / "first" / "recording.mcap") as recorder:
+        recorder.write(run_key("first", Topic.RUN), encode(card))
+    await client.submit(stage.bus, wanted.but(number=client.new_number()))
+    await asyncio.sleep(1)
+    job = stage.playing["first"].job
+    assert job is not None
+    assert (job.resume, job.config.seed, job.directory) == (True, 7, stage.out / "first")
+    stage.playing["first"].end("done")
+    (stage.out / "first").rename(stage.out / "second")
+    with pytest.raises(Refused, match="is of the run 'first'"):
+        await client.submit(stage.bus, wanted.but(run="second", number=client.new_number()))
+
+
 async def test_a_name_that_cannot_be_one_is_refused_and_not_listed_at_length(stage: Stage) -> None:
     wanted = order("first").model_copy(update={"run": "x/" * 10_000})
     with pytest.raises(Refused, match="cannot stand in a key"):
@@ -220,7 +257,7 @@ async def test_a_match_is_stopped_while_it_waits_and_while_it_plays(stage: Stage
     assert (waiting.state, waiting.reason) == ("stopped", "stopped by an order")
     card = await client.stop(stage.bus, Stop(run="first", number=client.new_number()))
     assert card.state == "stopped"
-    assert card.reason.startswith("stopped by an order; `khala run --resume ")
+    assert card.reason == "stopped by an order; `khala submit --resume first` goes on"
     with pytest.raises(ConfigError, match="the service has no match 'fourth'; its newest are first, second, third"):
         await client.stop(stage.bus, Stop(run="fourth", number=client.new_number()))
 
