@@ -108,6 +108,10 @@ def steps(path: Path) -> list[tuple[int, int]]:
     return [(report.episode, report.step) for report in Recording.open(path).of(Report)]
 
 
+def lost(directory: Path) -> list[str]:
+    return sorted(path.name for path in directory.glob("*lost*"))
+
+
 EVERY_STEP = [(episode, step) for episode in range(2) for step in range(3)]
 
 
@@ -152,9 +156,7 @@ async def test_a_game_that_dies_again_and_again_ends_the_match(
         await there.play(config(game=GAME, record=path))
     assert len(there.games) == 1
     assert steps(path) == [(0, 0)]
-    assert sorted(lost.name for lost in tmp_path.glob("*lost*")) == [
-        f"recording.lost-{number}.mcap" for number in range(1, MAX_RESTARTS + 1)
-    ]
+    assert lost(tmp_path) == [f"recording.lost-{number}.mcap" for number in range(1, MAX_RESTARTS + 1)]
 
 
 @pytest.mark.parametrize(
@@ -178,4 +180,4 @@ async def test_a_game_that_cannot_be_started_again_ends_the_match(
     with pytest.raises(type(error), match=str(error)):
         await there.play(config(**{"game": GAME, "record": tmp_path / "recording.mcap"} | changes))
     assert there.episodes == [0]
-    assert not list(tmp_path.glob("*lost*"))
+    assert not lost(tmp_path)
