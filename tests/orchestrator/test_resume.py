@@ -140,7 +140,7 @@ def killed_with_answers_on_the_table(whole: Path, reports: int, path: Path) -> R
     return Recording.open(path)
 
 
-@pytest.mark.parametrize("kills", [(3, 7), *(pytest.param(one, marks=pytest.mark.slow) for one in [(4, 8), (2, 6)])])
+@pytest.mark.parametrize("kills", [(3, 7), pytest.param((2, 6), marks=pytest.mark.slow)])
 async def test_what_was_asked_before_the_kill_and_is_answered_anew_after_it_plays_the_same_game_again(
     hall: Hall, config: MakeConfig, start: Start, still_game: MakeGame, tmp_path: Path, kills: tuple[int, ...]
 ) -> None:
