@@ -8,7 +8,7 @@ import pytest
 
 from bench import faults, orphans, resume, soak
 
-pytestmark = [pytest.mark.game, pytest.mark.slow]
+pytestmark = [pytest.mark.game, pytest.mark.slow, pytest.mark.timeout(900)]
 
 PATIENCE_S = 120.0
 """Tests run beside others, under coverage, on slow machines: the benches themselves are stricter about time."""
