@@ -2,7 +2,7 @@
 
     python -m bench.orphans --kills 20
 
-Every process is found by its environment, in `/proc`: Linux only.
+Every process is found by its environment, in `/proc`: Linux only. The exit code is 1 if one was left after `GONE_S`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,13 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 LATEST_S = 10.0
+GONE_S = 5.0
 GIVEN_UP_S = 30.0
 LOOK_S = 0.01
 
@@ -73,6 +78,11 @@ def measure(kills: int, seed: int) -> list[Killed]:
     return found
 
 
+def is_good(found: Sequence[Killed], gone_s: float = GONE_S) -> bool:
+    """Return whether there were processes to end, and all of them were gone in time."""
+    return any(killed.children for killed in found) and all(killed.gone_s <= gone_s for killed in found)
+
+
 def main() -> None:
     """Measure, and print each kill and the summary, or a JSON object."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -82,12 +92,14 @@ def main() -> None:
     arguments = parser.parse_args()
     found = measure(arguments.kills, arguments.seed)
     gone_s = [killed.gone_s for killed in found]
+    code = 0 if is_good(found) else 1
     if arguments.json:
         print(json.dumps({"gone_s": gone_s, "after_s": [killed.after_s for killed in found]}))
-        return
+        raise SystemExit(code)
     for killed in found:
         print(f"killed after {killed.after_s:5.2f} s: {killed.children} children, gone after {killed.gone_s:.2f} s")
     print(f"{len(found)} kills: median {statistics.median(gone_s):.2f} s, longest {max(gone_s):.2f} s")
+    raise SystemExit(code)
 
 
 if __name__ == "__main__":

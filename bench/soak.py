@@ -81,11 +81,10 @@ class Soaked:
         """What each process grew by from the third tenth on: until then caches and pools fill."""
         return {name: mb - self.marks[2].rss_mb[name] for name, mb in self.marks[-1].rss_mb.items()}
 
-    @property
-    def is_good(self) -> bool:
-        """Whether nothing grew, slowed down or failed."""
-        steady = self.overhead_ms[-1] <= MOST_GROWTH * self.overhead_ms[0]
-        return steady and not self.not_ok and not self.orphans and max(self.grown_mb.values()) <= MOST_GROWN_MB
+    def is_good(self, most_growth: float = MOST_GROWTH, most_grown_mb: float = MOST_GROWN_MB) -> bool:
+        """Return whether nothing grew, slowed down or failed; a short match, or a busy machine, may do more of it."""
+        steady = self.overhead_ms[-1] <= most_growth * self.overhead_ms[0]
+        return steady and not self.not_ok and not self.orphans and max(self.grown_mb.values()) <= most_grown_mb
 
 
 async def decide(briefing: Briefing, observation: Observation) -> str:  # noqa: ARG001  # an agent that does nothing
@@ -196,7 +195,7 @@ def main() -> None:
           file=sys.stderr)  # fmt: skip
     if arguments.json:
         print(json.dumps(asdict(soaked)))
-    raise SystemExit(0 if soaked.is_good else 1)
+    raise SystemExit(0 if soaked.is_good() else 1)
 
 
 if __name__ == "__main__":

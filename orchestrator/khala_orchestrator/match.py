@@ -209,6 +209,7 @@ class Stopwatch:
             observe_s=self._took_s["observe"],
             publish_s=answers.publish_s,
             wait_s=answers.wait_s,
+            held_s=answers.held_s,
             act_s=self._took_s["act"],
             game_s=self._took_s["game"],
             lag_s=lag_s,

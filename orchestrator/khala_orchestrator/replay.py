@@ -99,11 +99,7 @@ class RecordedTurn:
         self.differences: list[Difference] = []
         self._sides = len({report.side for report in recording.of(Report)} or {None})
         self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
-        self._replies: dict[tuple[int, int, Seat], Reply] = {}
-        for sample in recording:
-            reply = sample.message
-            if isinstance(reply, Reply) and sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):
-                self._replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
+        self._replies = _accepted(recording)
         self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
         for report in recording.of(Report):
             for agent in report.agents:
@@ -168,6 +164,21 @@ class RecordedTurn:
 
     def _differ(self, agent: str, step: RecordedStep, recorded: str, sent: str) -> None:
         self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
+
+
+def _accepted(recording: Recording) -> dict[tuple[int, int, Seat], Reply]:
+    """Return the first reply to each question since it was last asked.
+
+    A host asks again only what it has no answer to. What came before was lost with the host before it, or was a guess.
+    """
+    replies: dict[tuple[int, int, Seat], Reply] = {}
+    for sample in recording:
+        match sample.message:
+            case Observation() as seen:
+                replies.pop((seen.episode, seen.step, Seat(seen.side, seen.agent)), None)
+            case Reply() as reply if sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):
+                replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
+    return replies
 
 
 def _advice(message: Message) -> Advice:

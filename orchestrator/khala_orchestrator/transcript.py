@@ -122,8 +122,9 @@ def _report(report: Report, selection: StepSelection, *, named: bool) -> Iterato
     if selection.side not in {None, report.side}:
         return
     whose = Text.assemble(side(report.side), "  ") if named else Text()
+    held = f"  held for {report.timings.held_s:.1f} s" if report.timings.held_s else ""
     yield Text.assemble(
-        f"step {report.step}  {clock(report.game_loop)}  ", whose, f"score {report.score:g}", style="bold"
+        f"step {report.step}  {clock(report.game_loop)}  ", whose, f"score {report.score:g}", held, style="bold"
     )
     for agent in report.agents:
         if selection.holds(report.step, _seat(agent)):

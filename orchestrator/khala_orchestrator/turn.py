@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 from khala_orchestrator.roster import Seat
@@ -72,6 +72,8 @@ class Answers:
     by_seat: Mapping[Seat, Answer]
     publish_s: float = 0.0
     wait_s: float = 0.0
+    held_s: float = 0.0
+    """Of `wait_s`: until the last agent that was away was back, and had all its time again."""
     lost: Collection[Seat] = ()
     """Required agents that went away and did not come back within the grace."""
     incidents: Sequence[str] = ()
@@ -158,6 +160,8 @@ class Turn:
         self._ignored: Counter[Seat] = Counter()
         self._open: dict[Seat, _Question] = {}
         self._incidents: list[str] = []
+        self._held_until = 0.0
+        """When an agent was last away that the clock stood still for."""
         self._changed = asyncio.Event()
 
     async def __aenter__(self) -> Self:
@@ -201,7 +205,9 @@ class Turn:
             one.wait_until_answered(began)
         if wait:
             await self._settled()
-        return self._collect(publish_s=publish_s, wait_s=now() - began)
+        wait_s, answers = now() - began, self._collect()
+        held_s = min(max(self._held_until - began, 0.0), wait_s)
+        return replace(answers, publish_s=publish_s, wait_s=wait_s, held_s=held_s)
 
     # --- asking -------------------------------------------------------------------------------------
 
@@ -244,10 +250,14 @@ class Turn:
         if asked.held_at is not None:
             now = asyncio.get_running_loop().time()
             self._note(f"required agent {seat} was away for {now - asked.held_at:.1f} s")
-            asked.held_at = asked.until = None
+            self._end_hold(asked, now)
+            asked.until = None
             asked.wait_until_answered(now)
             self._changed.set()
         await self._publishers[seat].put(asked.payload)
+
+    def _end_hold(self, asked: _Question, now: float) -> None:
+        asked.held_at, self._held_until = None, now
 
     # --- collecting ---------------------------------------------------------------------------------
 
@@ -279,7 +289,7 @@ class Turn:
                 asked.waiting = False
                 log.info("step %d: no reply in time from %s", asked.observation.step, seat)
 
-    def _collect(self, *, publish_s: float, wait_s: float) -> Answers:
+    def _collect(self) -> Answers:
         """Return the answers to the settled questions, which are closed."""
         self._check_pump()
         self._close_overdue()
@@ -290,8 +300,9 @@ class Turn:
         lost = [seat for seat, asked in settled.items() if asked.held]
         for seat in lost:
             self._note(f"required agent {seat} did not come back within {self._grace_s:g} s")
+            self._held_until = asyncio.get_running_loop().time()
         incidents, self._incidents = self._incidents, []
-        return Answers(answers, publish_s, wait_s, lost, incidents, self._advice())
+        return Answers(answers, lost=lost, incidents=incidents, advice=self._advice())
 
     def _note(self, incident: str) -> None:
         log.warning("%s", incident)
@@ -346,7 +357,9 @@ class Turn:
             self._ignored[seat] += 1
             return
         asked.reply, asked.arrived_at = reply, asyncio.get_running_loop().time()
-        asked.waiting, asked.held_at = False, None
+        asked.waiting = False
+        if asked.held:
+            self._end_hold(asked, asked.arrived_at)
         if not any(other.waiting for other in self._open.values()):
             self._changed.set()
 

@@ -731,6 +731,9 @@ class Timings(Frozen):
     observe_s: float = 0.0
     publish_s: float = 0.0
     wait_s: float = 0.0
+    held_s: float = 0.0
+    """Of `wait_s`: until the last required agent that was away was back, and had its whole time again; the rest is
+    within the deadline."""
     act_s: float = 0.0
     game_s: float = 0.0
     lag_s: float = 0.0

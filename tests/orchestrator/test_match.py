@@ -50,7 +50,7 @@ class Pool:
             self.pictures.append(tuple(pictures))
             found = self.script.get((seen.agent, seen.step), "")
             answers[Seat(seen.side, seen.agent)] = self._said(seen, found) if isinstance(found, str) else found
-        return Answers(answers, publish_s=0.25, wait_s=0.5)
+        return Answers(answers, publish_s=0.25, wait_s=0.5, held_s=0.125)
 
     def _said(self, seen: Observation, text: str) -> Answer:
         reply = Reply(
@@ -287,7 +287,7 @@ async def test_every_episode_is_counted_by_itself(play: Play) -> None:
 async def test_a_report_says_how_long_each_phase_took(play: Play) -> None:
     played = await play({}, max_steps=2)
     for report in played.ear.reports:
-        assert (report.timings.publish_s, report.timings.wait_s) == (0.25, 0.5)
+        assert (report.timings.publish_s, report.timings.wait_s, report.timings.held_s) == (0.25, 0.5, 0.125)
         assert min(report.timings.model_dump(exclude={"lag_s"}).values()) > 0
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import itertools
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from khala_orchestrator.host import host
+from khala_orchestrator.replay import replay
 from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic
-from khala_protocol.messages import ModelCall, Observation, Report, Run
+from khala_protocol.messages import ModelCall, Observation, Reply, Report, Run
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from tests.orchestrator.conftest import Hall, Peer, StillGame
 
     MakeConfig = Callable[..., MatchConfig]
+    MakeGame = Callable[..., StillGame]
     Start = Callable[[StillGame], Awaitable[Sides]]
 
 CLOCK = "jumps"
@@ -123,6 +127,48 @@ async def test_a_match_that_was_resumed_with_open_questions_is_resumed_once_more
 
         await hall.play(past.config.model_copy(update={"record": path}), by=played, Stalkers=slow)
     assert [report.step for report in Recording.open(path).of(Report)] == [*range(12)]
+
+
+def killed_with_answers_on_the_table(whole: Path, reports: int, path: Path) -> Recording:
+    """Write what a host leaves that is killed when answers have arrived that it has not taken yet."""
+    samples = list(Recording.open(whole))
+    ends = [number for number, sample in enumerate(samples) if isinstance(sample.message, Report)]
+    last, end = ends[reports - 1 : reports + 1]
+    replies = ((sample, sample.message) for sample in samples[last:end])
+    arrived = [sample for sample, reply in replies if isinstance(reply, Reply) and reply.step < reports]
+    with Recorder(path) as recorder:
+        for sample in (*samples[:last], *arrived, samples[last]):
+            recorder.write(sample.key, sample.payload)
+    return Recording.open(path)
+
+
+@pytest.mark.parametrize("kills", [(3, 7), pytest.param((2, 6), marks=pytest.mark.slow)])
+async def test_what_was_asked_before_the_kill_and_is_answered_anew_after_it_plays_the_same_game_again(
+    hall: Hall, config: MakeConfig, start: Start, still_game: MakeGame, tmp_path: Path, kills: tuple[int, ...]
+) -> None:
+    numbers = itertools.count()
+
+    async def slow(peer: Peer, seen: Observation) -> None:
+        number = next(numbers)  # an agent that was started again answers a question in another way
+        await asyncio.sleep({"Stalkers": 0.05, "Zealots": 0.08}[seen.agent])  # for some steps of the game
+        await peer.answer(seen, ATTACK.format(f"{seen.step}, answer {number}"))
+
+    path = tmp_path / "0.mcap"
+    match = config(game=GAME, max_steps=12, rule="realtime", speed=10.0, step_loops=8)
+    await hall.play(match.model_copy(update={"record": path}), Stalkers=slow, Zealots=slow)
+    for reports in kills:
+        past = unfinished(killed_with_answers_on_the_table(path, reports, tmp_path / f"killed-{reports}.mcap"))
+        path = tmp_path / f"{reports}.mcap"
+
+        async def played(*arguments: Any, past: Any = past, **options: Any) -> list[Result]:
+            return await host(*arguments, **options, past=past)
+
+        resumed = past.config.model_copy(update={"record": path})
+        await hall.play(resumed, by=played, Stalkers=slow, Zealots=slow)
+        assert [report.step for report in Recording.open(path).of(Report)] == [*range(12)]
+        assert await replay(Recording.open(path), await start(still_game())) == []
+    answered = Counter((reply.agent, reply.step) for reply in Recording.open(path).of(Reply))
+    assert max(answered.values()) > 1
 
 
 async def _resume(hall: Hall, config: MatchConfig, past: Any) -> list[Result]:

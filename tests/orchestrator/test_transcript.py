@@ -25,6 +25,7 @@ from khala_protocol.messages import (
     Report,
     Result,
     Run,
+    Timings,
     View,
 )
 from khala_protocol.recording import Recorder
@@ -158,6 +159,13 @@ def test_a_recording_is_told_step_by_step(path: Path, printed: Printed) -> None:
         "  Zealots: late (no reply before the deadline)",
     ]
     assert rest[end] == "╭──────────────────────── draw, step limit (episode 0) ────────────────────────╮"
+
+
+def test_a_step_that_was_held_says_how_long(tmp_path: Path, printed: Printed) -> None:
+    held = report(3).model_copy(update={"timings": Timings(wait_s=4.0, held_s=3.25)})
+    with Recorder(tmp_path / "held.mcap") as recorder:
+        recorder.write(f"khala/{RUN}/report", encode(held))
+    assert printed(*transcript(tmp_path / "held.mcap", StepSelection())) == ["step 3  0:30  score 15  held for 3.2 s"]
 
 
 def test_the_whole_transcript_has_every_word(path: Path, printed: Printed) -> None:

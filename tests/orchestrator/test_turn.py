@@ -545,6 +545,7 @@ async def test_a_required_agent_that_dies_is_waited_for_and_its_successor_loses_
         answers = await asked
     assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("back", [])
     assert answers.incidents == ["required agent p1/Zealots was away for 29.0 s"]
+    assert (answers.wait_s, answers.held_s) == (29 + 9, 29)
 
 
 async def test_a_required_agent_that_does_not_come_back_is_lost(
@@ -559,6 +560,7 @@ async def test_a_required_agent_that_does_not_come_back_is_lost(
         ("Zealots", "Stalkers"), "gone"
     )
     assert answers.lost == [ZEALOTS]
+    assert answers.held_s == answers.wait_s == 30
     assert answers.incidents == ["required agent p1/Zealots did not come back within 30 s"]
 
 
@@ -574,6 +576,23 @@ async def test_one_that_is_back_and_silent_is_late_and_not_lost(
         answers = await asked
         assert asyncio.get_running_loop().time() == 5 + 20 + 10
     assert (answers.by_seat[ZEALOTS].status, answers.lost) == ("late", [])
+    assert answers.wait_s - answers.held_s == 10
+
+
+async def test_a_step_is_held_for_required_agents_alone_and_not_for_what_was_before_it(
+    broker: MemoryBroker, peer: MakePeer, observe: Observe
+) -> None:
+    async with requiring(broker, peer, ZEALOTS, STALKERS) as (turn, (zealots, stalkers)):
+        asked = asyncio.create_task(turn.ask(observe(ZEALOTS, within_s=10)))
+        await zealots.observed()
+        await zealots.leave()
+        await asyncio.sleep(3)
+        await zealots.arrive()
+        await zealots.reply()
+        held = [await asked]
+        await stalkers.leave()
+        held.append(await turn.ask(observe(ZEALOTS, STALKERS, step=1, within_s=10)))
+    assert [(answers.wait_s, answers.held_s) for answers in held] == [(3, 3), (10, 0)]
 
 
 async def test_one_whose_link_is_back_is_asked_again(broker: MemoryBroker, peer: MakePeer, observe: Observe) -> None:
@@ -614,7 +633,8 @@ async def test_one_whose_return_was_not_reported_is_found_by_its_answer(
         seen = [await zealots.observed() for _ in range(3)]
         assert asyncio.get_running_loop().time() == pytest.approx(2)
         await zealots.reply("here all the time")
-        assert (await asked).by_seat[ZEALOTS].text == "here all the time"
+        answers = await asked
+    assert (answers.by_seat[ZEALOTS].text, answers.held_s) == ("here all the time", answers.wait_s)
     assert seen == [seen[0]] * 3
 
 
