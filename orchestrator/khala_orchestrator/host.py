@@ -66,10 +66,7 @@ async def host(
     async with contextlib.AsyncExitStack() as stack:
         flush = _nothing
         if config.record is not None:
-            recorder = stack.enter_context(_recorder(config, config.record))
-            for sample in past.kept() if past else ():
-                recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
-            recorder.flush()
+            recorder = stack.enter_context(_recorder(config, config.record, past))
             bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
             await stack.enter_async_context(Listener(bus, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
@@ -90,9 +87,23 @@ async def host(
         return [*past.results, *[result async for result in _resumed(match, past, observer)]]
 
 
-def _recorder(config: MatchConfig, path: Path) -> OwnedSink:
-    recorder = Recorder(path)
+def _recorder(config: MatchConfig, path: Path, past: Unfinished | None) -> OwnedSink:
+    recorder = Recorder(path) if past is None else _continued(path, past)
     return BestEffort(recorder) if config.task.faults.recording_lost == "go_on" else recorder
+
+
+def _continued(path: Path, past: Unfinished) -> Recorder:
+    """Return a recorder that has what is kept of a recording.
+
+    The file has its name only then: who resumes takes the newest recording, and half a copy is not one.
+    """
+    part = path.with_suffix(".part")
+    recorder = Recorder(part)
+    for sample in past.kept():
+        recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    recorder.flush()
+    part.replace(path)
+    return recorder
 
 
 def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat], inbox: AdviceInbox) -> Turn:
