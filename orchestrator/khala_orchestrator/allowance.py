@@ -1,8 +1,8 @@
 """How much of what agents send a recording takes: so much for each step, and some steps' worth at once.
 
 Ordinary exchanges have 8 to 17 kB (scripted model, a battle and the first minutes of a game with pictures, which are in
-them by their hashes only). Without a limit an agent could send 500 of 4 MiB a second, which is what a router passes. Above it:
-`khala_orchestrator.record`.
+them by their hashes only). Without a limit an agent could send 500 of 4 MiB a second, which is what a router passes.
+Above it: `khala_orchestrator.record`.
 """
 
 from __future__ import annotations

@@ -98,6 +98,7 @@ def _continued(path: Path, past: Unfinished) -> Recorder:
     The file has its name only then: who resumes takes the newest recording, and half a copy is not one.
     """
     part = path.with_suffix(".part")
+    part.unlink(missing_ok=True)  # of a host that was killed here
     recorder = Recorder(part)
     for sample in past.kept():
         recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)

@@ -91,5 +91,5 @@ def test_a_directory_without_a_recording_says_what_to_give(tmp_path: Path) -> No
 @pytest.mark.parametrize("both", [True, False])
 def test_either_a_task_or_a_recording_is_given(tmp_path: Path, *, both: bool) -> None:
     task, resume = ("2s3z_pair", tmp_path) if both else (None, None)
-    with pytest.raises(ConfigError, match="give a task, such as .*, or a recording with --resume"):
+    with pytest.raises(ConfigError, match=r"give a task, such as .*, or a recording with --resume"):
         new_or_resumed(task, resume, None, tmp_path, **GIVEN)
