@@ -41,6 +41,7 @@ from khala.options import (
     Mind,
     Model,
     ModelName,
+    Opponent,
     Out,
     PolicyName,
     Resume,
@@ -85,6 +86,7 @@ Examples:\n
     khala run my_task.yaml --policy my_agent:decide --json\n
     khala run 2s3z_pair --clock realtime --speed 2\n
     khala run simple64_duel --blue openai --red anthropic\n
+    khala run simple64_terran --opponent "guest:python my_bot/run.py"\n
     khala run --resume runs/2s3z-20260101-120000-ab12
 """
 ADVISE_EPILOG = """
@@ -115,6 +117,7 @@ def run(
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     game: Game = "simulator",
+    opponent: Opponent = None,
     seed: Seed = 1,
     episodes: Episodes = 1,
     executor: ExecutorName = None,
@@ -143,7 +146,7 @@ def run(
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, images=images,
+        speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
     )  # fmt: skip
     common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
     named = named_sides(side_model or (), blue=blue, red=red)
@@ -166,6 +169,7 @@ def host(
     tls: Tls = None,
     insecure: Insecure = False,
     game: Game = "simulator",
+    opponent: Opponent = None,
     seed: Seed = 1,
     episodes: Episodes = 1,
     executor: ExecutorName = None,
@@ -191,7 +195,7 @@ def host(
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, images=images,
+        speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
     )  # fmt: skip
     bus = _bus(config, connect, listen, tls, insecure=insecure)
     _until_interrupted(

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from khala import environment
 from khala_bridge.act import executor_of
 from khala_bridge.errors import GameError, GameMissing
-from khala_bridge.game.game import GameConfig, GameThread, Sides
+from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides
+from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.host import host
 from khala_orchestrator.resume import unfinished
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala_bridge.game.pysc2_game import Launched
+    from khala_bridge.game.env import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus import Bus
@@ -81,15 +82,23 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launc
     """Return the game of a match, not started yet; it takes a process that is launched already, if it can."""
     task = config.task
     sides = task.per_side()
+    invitation = Invitation(log=config.record and config.record.with_name("guest.log"))
     started = GameConfig(
         sc2path=sc2path,
         map=task.map_spec,
         players=len(sides),
+        opponent=task.opponent,
+        realtime=task.clock.rule == "realtime",
         seed=config.seed + first_episode,
         render_px=task.render_px,
         environment=environment.plain() | named_parent(),
     )
-    return Sides(GameThread(lambda: PySC2Game(started, launched)), [executor_of(side) for side in sides])
+    thread = GameThread(
+        lambda: PySC2Game(started, launched, invitation),
+        patience=Patience().against(task.opponent),
+        give_up=invitation.withdrawn.set,
+    )
+    return Sides(thread, [executor_of(side) for side in sides])
 
 
 def _played(config: MatchConfig) -> Unfinished | None:

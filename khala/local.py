@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.minds import Minds
-    from khala_bridge.game.pysc2_game import Launched
+    from khala_bridge.game.env import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus

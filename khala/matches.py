@@ -9,9 +9,12 @@ import itertools
 import os
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
 from khala_orchestrator.resume import unfinished
+from khala_protocol.configfile import words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.recording import Recording
@@ -45,7 +48,10 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     loaded = change(load_task(task), **given)
     Observer(loaded)  # report an unknown section before a game is started
     name = check_name(run or new_run_name(loaded.name), "run")
-    return MatchConfig(task=loaded, run=name, record=free_recording(out / name), **match)
+    try:
+        return MatchConfig(task=loaded, run=name, record=free_recording(out / name), **match)
+    except ValidationError as error:
+        raise ConfigError(words_of(error.errors(include_url=False)[0]), source="command line") from None
 
 
 def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:

@@ -59,6 +59,14 @@ Images = Annotated[
         metavar="LIST",
     ),
 ]
+Opponent = Annotated[
+    str | None,
+    typer.Option(
+        help="Who the agents play: computer, guest (a bot that joins), guest:COMMAND (starts it), lan:127.0.0.1:PORT.",
+        show_default="as the task says",
+        metavar="WHO",
+    ),
+]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
 Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 Model = Annotated[

@@ -99,8 +99,8 @@ def protobuf_kind() -> str:
 with old_shuffle(), quiet_pygame(), late_video(), warnings.catch_warnings():
     warnings.simplefilter("ignore")
     from pysc2 import run_configs
-    from pysc2.env import environment, sc2_env
-    from pysc2.lib import actions, buffs, features, point, units, upgrades
+    from pysc2.env import environment, lan_sc2_env, sc2_env
+    from pysc2.lib import actions, buffs, features, point, portspicker, units, upgrades
     from pysc2.maps import lib as maps
 
 __all__ = [
@@ -108,10 +108,12 @@ __all__ = [
     "buffs",
     "environment",
     "features",
+    "lan_sc2_env",
     "late_video",
     "maps",
     "old_shuffle",
     "point",
+    "portspicker",
     "protobuf_kind",
     "quiet_pygame",
     "run_configs",

@@ -21,6 +21,7 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from khala_protocol.service import Submit
@@ -46,8 +47,8 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     if unknown := sorted(order.minds.keys() - {field.name for field in dataclasses.fields(Minds)}):
         raise ConfigError(f"there is no option {unknown[0]!r}; is the service of the same version?", source="match")
     minds = minds_of([side.side for side in config.task.per_side()], common, order.sides)
-    asked = "" if trusts else next(filter(None, (_needs_trust(config, mind) for mind in minds.values())), "")
-    if asked:
+    needs = (what for mind in minds.values() for what in _needs_trust(config, mind))
+    if not trusts and (asked := next(needs, None)):
         raise ConfigError(f"{asked} is for a service that was started with --trust: this machine would run or call it")
     Observer(config.task)
     for mind in minds.values():
@@ -69,15 +70,17 @@ def _resumed(run: str, out: Path) -> MatchConfig:
     return config
 
 
-def _needs_trust(config: MatchConfig, minds: Minds) -> str:
+def _needs_trust(config: MatchConfig, minds: Minds) -> Iterator[str]:
+    """Yield what this machine would run or call for the match."""
     if minds.base_url is not None:
-        return "--base-url"
+        yield "--base-url"
     if minds.policy is not None and ":" in minds.policy:
-        return "--policy MODULE:NAME"
+        yield "--policy MODULE:NAME"
     if minds.fallback is not None and ":" in minds.fallback:
-        return "--fallback MODULE:NAME"
+        yield "--fallback MODULE:NAME"
     if minds.model.endswith((".yaml", ".yml")):
-        return "a model file"
+        yield "a model file"
     if modules := sorted(modules_of(config.task)):
-        return f"the section of {modules[0]} in the task"
-    return ""
+        yield f"the section of {modules[0]} in the task"
+    if config.task.opponent.command:
+        yield "the command of an opponent"

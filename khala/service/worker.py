@@ -21,7 +21,7 @@ from khala.matches import resumed
 from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala.service import logs
 from khala.service.spare import Spares
-from khala_bridge.game.pysc2_game import Launched
+from khala_bridge.game.env import Launched
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_protocol.bus.config import BusConfig  # noqa: TC001  # pydantic evaluates it

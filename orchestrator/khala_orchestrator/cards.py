@@ -49,6 +49,7 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         seed=config.seed,
         episodes=config.episodes,
         game=f"{config.game} {game.version}",
+        opponent=game.opponent or task.against,
         executor=task.executor,
         clock=task.clock,
         agents=tuple(card for side in task.per_side() for card in side.cards()),

@@ -122,6 +122,7 @@ def tasks(*, as_json: Json = False) -> None:
                 "name": t.name,
                 "map": t.map_spec.name,
                 "agents": [card.name for card in t.cards()],
+                "opponent": t.against,
                 "description": t.description,
             }
             for t in found

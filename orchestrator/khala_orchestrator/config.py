@@ -10,9 +10,9 @@ import difflib
 import secrets
 from datetime import UTC, datetime
 from pathlib import Path  # noqa: TC003  # pydantic evaluates it
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from khala_bridge.task.config import TaskConfig
 from khala_bridge.task.images import images_for
@@ -43,6 +43,12 @@ class MatchConfig(Frozen):
     """How long the host waits for its agents at the start."""
     record: Path | None = None
     """The MCAP file that every topic is written to; None for no recording."""
+
+    @model_validator(mode="after")
+    def _once_over_lan(self) -> Self:
+        if self.episodes > 1 and self.task.opponent.kind == "lan":
+            raise ValueError("a game over LAN is played once: its host has to begin each one; give one episode")
+        return self
 
 
 def task_files() -> Iterator[Path]:

@@ -144,6 +144,8 @@ def card(run: Run) -> Panel:
     rows = Table.grid(padding=(0, 2))
     rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
     rows.add_row("game", f"{run.game}, {run.executor} executor")
+    if run.opponent:
+        rows.add_row("against", run.opponent)
     rows.add_row("clock", rule(run.clock))
     sides: dict[str, list[str]] = {}
     for agent in run.agents:

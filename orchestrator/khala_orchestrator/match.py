@@ -119,7 +119,7 @@ class Match:
         snapshots: Sequence[Snapshot] = await self.game.reset()
         self.pacing.begin()
         both = zip(self.sides, snapshots, strict=True)
-        tallies, at = [Tally(snapshot, side.name, side.required) for side, snapshot in both], StepId(episode, 0)
+        tallies, at = [self._tally(side, snapshot) for side, snapshot in both], StepId(episode, 0)
         lost: Collection[Seat] = ()
         while not (lost or any(snapshot.ended for snapshot in snapshots) or at.step == self.config.task.max_steps):
             reports, snapshots, lost = await self._step(at, snapshots)
@@ -169,6 +169,11 @@ class Match:
             with watch.phase("observe"):
                 question = self._side(seat).question(seat.agent, at)
             yield question
+
+    def _tally(self, side: Side, snapshot: Snapshot) -> Tally:
+        others = [f"side {other.name}" for other in self.sides if other is not side]
+        opponent = self.game.info.opponent or self.config.task.against or ", ".join(others)
+        return Tally(snapshot, side.name, side.required, opponent=opponent)
 
     def _side(self, seat: Seat) -> Side:
         return next(side for side in self.sides if side.name == seat.side)

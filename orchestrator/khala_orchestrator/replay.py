@@ -40,7 +40,8 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
             run it.
 
     Raises:
-        RecordingError: it has no run card, its run card is wrong, or it names another module.
+        RecordingError: it has no run card, its run card is wrong, it names another module, or it cannot be played
+            again.
     """
     run = recording.run
     if run is None:
@@ -55,12 +56,27 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
         raise RecordingError(
             f"{recording.path}: its run card is not one of this version: {place}: {fault['msg']}"
         ) from None
+    check_repeatable(recording, task)
     if foreign := sorted(modules_of(task) - set(modules)):
         raise RecordingError(
             f"{recording.path} names the module {foreign[0]!r} for a section of its text, and a recording imports "
             f"nothing by itself: if you trust it, allow modules=[{foreign[0]!r}]"
         )
     return config
+
+
+def check_repeatable(recording: Recording, task: TaskConfig) -> None:
+    """Check that the decisions of all players are in the recording or in the game.
+
+    Raises:
+        RecordingError: the opponent's are not.
+    """
+    if task.opponent.joins:
+        run = recording.run
+        raise RecordingError(
+            f"{recording.path} was played against a {run.opponent if run else task.against}, whose decisions are not "
+            "recorded: it cannot be played again"
+        )
 
 
 def modules_of(task: TaskConfig) -> set[str]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from khala_orchestrator.replay import EndOfRecording, RecordedTurn, recorded_config
+from khala_orchestrator.replay import EndOfRecording, RecordedTurn, check_repeatable, recorded_config
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import ModelCall, Report
@@ -85,9 +85,10 @@ def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfin
 
     Raises:
         ResumeError: it is over, or its game cannot be played again.
-        RecordingError: it has no run card.
+        RecordingError: it has no run card, or not all decisions.
     """
     config = config or recorded_config(recording)
+    check_repeatable(recording, config.task)
     if not config.game.startswith("Khala simulator"):
         raise ResumeError(
             f"{recording.path} was played on {config.game}, which does not play the same game twice: begin a new run"

@@ -12,7 +12,7 @@ from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usa
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from khala_bridge.state import Snapshot
+    from khala_bridge.state import Forfeit, Snapshot
     from khala_orchestrator.roster import Seat
     from khala_protocol.messages import Ending, Outcome
 
@@ -23,9 +23,18 @@ MAX_INCIDENTS = 100
 class Tally:
     """The running account of one episode."""
 
-    def __init__(self, snapshot: Snapshot, side: str = "blue", required: Collection[str] = ()) -> None:
-        """Begin with the first snapshot of a side; `required` are the agents that it cannot do without."""
-        self._side, self._required = side, tuple(required)
+    def __init__(
+        self, snapshot: Snapshot, side: str = "blue", required: Collection[str] = (), *, opponent: str = ""
+    ) -> None:
+        """Begin with the first snapshot of a side.
+
+        Args:
+            snapshot: of the side.
+            side: its name.
+            required: the agents that it cannot do without.
+            opponent: who it plays against, in words.
+        """
+        self._side, self._required, self._opponent = side, tuple(required), opponent
         self._first = self._last = snapshot
         self._alliance: dict[int, Alliance] = {}
         self._dead: Counter[Alliance] = Counter()
@@ -84,6 +93,7 @@ class Tally:
             episode=episode,
             outcome=outcome,
             cause=cause,
+            opponent=self._opponent,
             valid=not why_not,
             invalid_because=why_not,
             steps=self._steps,
@@ -112,13 +122,15 @@ class Tally:
 
     def _ending(self, gone: Collection[Seat]) -> tuple[Ending, str]:
         if self._last.outcome is not None:
-            return self._last.outcome, CAUSES[self._last.outcome]
+            return self._last.outcome, self._last.forfeit or CAUSES[self._last.outcome]
         return ("aborted", "agents gone") if gone else ("draw", "step limit")
 
     def _invalid_because(self, gone: Collection[Seat]) -> str:
         """Return why the episode says nothing about its agents; "" if it does."""
         if gone:
             return f"required agents went away: {', '.join(map(str, gone))}"
+        if (forfeit := self._last.forfeit) in NO_MERIT:
+            return NO_MERIT[forfeit]
         silent = [agent for agent in self._required if self._failed_always(agent)]
         return f"no model ever answered for {', '.join(silent)}" if silent else ""
 
@@ -134,6 +146,13 @@ class Tally:
 
 CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
 """What a result of the game means on maps that end by the death of one side or by a clock."""
+
+
+NO_MERIT: dict[Forfeit | None, str] = {
+    "guest gone": "the guest's connection or process ended, so that nobody was beaten",
+    "guest hung": "the guest did not go on, so that nobody was beaten",
+}
+"""Why a win over a guest that went away says nothing; one that gives up is beaten."""
 
 
 def valid_together(results: Sequence[Result]) -> Sequence[Result]:

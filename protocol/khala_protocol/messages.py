@@ -691,6 +691,8 @@ class Run(Wire):
     episodes: int
     game: str
     """The game and its version, `StarCraft II 4.10.0.75689` or `Khala simulator 0.1.0, as 4.10.0.75689`."""
+    opponent: str = ""
+    """Who the agents play against: `computer (zerg, easy)`, `guest bot Rush, zerg`, `nobody`; "" with two sides."""
     executor: Literal["raw", "screen"]
     clock: Clock
     agents: tuple[AgentCard, ...]
@@ -780,7 +782,10 @@ class Result(Wire):
     episode: int = Field(ge=0)
     outcome: Ending
     cause: str
-    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`, `agents gone`."""
+    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`, `agents gone`; against a guest also
+    `guest left` (it gave up), `guest gone` (its connection or its process ended), `guest hung`."""
+    opponent: str = ""
+    """As in the run card, but a guest may be another one in each episode; the other side, if there are two."""
     valid: bool = True
     """False if the episode says nothing about its agents; `invalid_because` has the reason."""
     invalid_because: str = ""

@@ -21,6 +21,7 @@ from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Patienc
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.task.maps import known_maps
+from khala_bridge.task.opponent import Opponent
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
@@ -106,6 +107,13 @@ def test_the_limit_for_a_step_suits_what_the_game_has_shown(slowest_s: float | N
     assert Patience().limit_s(slowest_s) == limit_s
 
 
+def test_an_opponent_who_joins_may_take_its_time_too_and_is_named_if_the_game_hangs() -> None:
+    patience = Patience().against(Opponent(kind="lan", wait_s=30))
+    assert (patience.limit_s(None), patience.limit_s(0.5)) == (150, 40)
+    assert patience.hangs == "the game, or the player over LAN at 127.0.0.1:14380"
+    assert Patience().against(Opponent()) == Patience()
+
+
 async def test_a_game_that_has_played_is_given_less_time_to_answer(
     snapshot: Callable[..., Snapshot], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -165,6 +173,8 @@ async def test_a_game_that_cannot_be_started_is_an_error_of_the_entering() -> No
 
 class StubEnv:
     """An `SC2Env` of two players that counts loops and notes what enters."""
+
+    forfeit = None
 
     def __init__(self, last_loop: int) -> None:
         self.entered: list[tuple[list[list[str]], int]] = []

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from khala_bridge.task.config import AdviserConfig, AgentConfig, TaskConfig, TeamConfig
 from khala_bridge.task.maps import known_maps
+from khala_bridge.task.opponent import Opponent
 from khala_protocol.configfile import load, loads
 from khala_protocol.errors import ConfigError
 
@@ -53,6 +54,35 @@ def test_two_agents_share_the_battle_and_can_talk(task: Callable[..., TaskConfig
     assert [card.name for card in config.cards()] == ["Stalkers", "Zealots"]
     assert config.communication
     assert config.channels
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("guest", Opponent(kind="guest")),
+        ("'guest:python run.py --slow'", Opponent(kind="guest", command=("python", "run.py", "--slow"))),
+        ("lan:localhost:5000", Opponent(kind="lan", at="127.0.0.1:5000")),
+        ("computer", Opponent()),
+    ],
+)
+def test_an_opponent_is_also_given_in_one_line(line: str, expected: Opponent) -> None:
+    text = GOOD.replace("map: 2s3z", "map: Simple64") + f"opponent: {line}\n"
+    assert loads(text, TaskConfig, source="t").opponent == expected
+
+
+@pytest.mark.parametrize(
+    ("fields", "error"),
+    [
+        ({"kind": "guest", "race": "zerg"}, "only the computer is given a race and a difficulty"),
+        (
+            {"kind": "lan", "command": "run.py"},
+            "only a guest is started by a command, and the opponent is of the kind lan",
+        ),
+    ],
+)
+def test_an_opponent_is_given_only_what_it_can_use(fields: dict[str, str], error: str) -> None:
+    with pytest.raises(ValueError, match=error):
+        Opponent.model_validate(fields)
 
 
 def test_a_task_may_change_who_the_opponent_is() -> None:

@@ -6,19 +6,18 @@ import importlib.metadata
 import platform
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.game.game import GameIdentity
 from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.cards import briefing, run_card
-from khala_orchestrator.config import load_task
+from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import AgentCard, Clock, Contact, Frames, TeamSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import pytest
-
-    from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Briefing
 
 
@@ -90,6 +89,21 @@ def test_the_run_card_says_what_repeats_the_run(config: Callable[..., MatchConfi
     )
     assert card.catalogue_sha256 == catalogue_sha256()
     assert TaskConfig.model_validate(card.config) == match.task
+
+
+@pytest.mark.parametrize(
+    ("task", "opponent", "met", "against"),
+    [
+        ("simple64_terran", None, "", "computer (zerg, easy)"),
+        ("simple64_terran", "guest", "guest bot Rush, zerg", "guest bot Rush, zerg"),
+        ("simple64_terran", "lan", "", "player over LAN at 127.0.0.1:14380"),
+        ("MoveToBeacon", None, "", "nobody"),
+        ("duel_3m", None, "", ""),
+    ],
+)
+def test_the_run_card_names_the_opponent(task: str, opponent: str | None, met: str, against: str) -> None:
+    match = MatchConfig(task=change(load_task(task), opponent=opponent), run="r")
+    assert run_card(match, GameIdentity("4.10", "B", "m", "0", met)).opponent == against
 
 
 def test_the_run_card_names_the_versions_that_numbers_depend_on(config: Callable[..., MatchConfig]) -> None:

@@ -54,6 +54,7 @@ def test_tasks_are_data_for_a_program(capsys: pytest.CaptureFixture[str]) -> Non
         "name": "2s3z_pair",
         "map": "2s3z",
         "agents": ["Stalkers", "Zealots"],
+        "opponent": "computer (protoss, very_hard)",
         "description": load_task("2s3z_pair").description,
     }
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 import pytest
 
 from khala_bridge.observe.text import SECTIONS
+from khala_orchestrator.config import change, load_task
 from khala_orchestrator.replay import RecordedTurn, recorded_config, replay
+from khala_orchestrator.resume import unfinished
 from khala_orchestrator.turn import Question
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
@@ -127,6 +129,17 @@ async def test_a_recording_reads_the_modules_that_are_allowed(foreign: Recording
     differences = await again(foreign, modules=["foreign_sections"])
     assert "foreign_sections" in sys.modules
     assert any('"text":"seen' in found.sent for found in differences)
+
+
+def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_played_again(
+    recording: Recording, tmp_path: Path
+) -> None:
+    task = change(load_task("simple64_terran"), opponent="guest:rm -r x").model_dump(mode="json")
+    met = {"config": task, "game": "Khala simulator 1, as 4.10", "opponent": "guest bot Rush, zerg"}
+    other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(**met) if isinstance(m, Run) else m)
+    for repeat in (recorded_config, unfinished):
+        with pytest.raises(RecordingError, match=r"against a guest bot Rush, zerg, whose decisions are not recorded"):
+            repeat(other)
 
 
 async def test_a_run_card_of_another_version_is_named(recording: Recording, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,6 +12,7 @@ from khala_orchestrator.tally import Tally, valid_together
 from khala_protocol.messages import AgentReport, Rejection, Report, Usage
 
 if TYPE_CHECKING:
+    from khala_bridge.state import Forfeit
     from khala_protocol.messages import AgentStatus, Outcome, Result
 
 
@@ -52,6 +54,18 @@ def test_deaths_are_counted_by_side_and_values_since_the_beginning() -> None:
     )
     assert (found.lost.units, found.lost.value, found.killed.units, found.killed.value) == (1, 100, 2, 300)
     assert (found.outcome, found.cause, found.kd) == ("win", "enemy defeated", 3.0)
+
+
+@pytest.mark.parametrize(
+    ("forfeit", "why_not"),
+    [("guest left", ""), ("guest gone", "connection or process ended"), ("guest hung", "did not go on")],
+)
+def test_a_win_over_a_guest_that_went_away_says_so_and_is_valid_only_if_it_gave_up(
+    forfeit: Forfeit, why_not: str
+) -> None:
+    found = result(dataclasses.replace(snapshot({1}, {11}, outcome="win"), forfeit=forfeit))
+    assert (found.outcome, found.cause, found.valid) == ("win", forfeit, not why_not)
+    assert why_not in found.invalid_because
 
 
 def test_units_that_came_later_are_counted_too() -> None:

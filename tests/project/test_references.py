@@ -38,6 +38,8 @@ FOREIGN = {
     "my_model.yaml": "a reader writes it",
     "my_sections.py": "a reader writes it",
     "my_agent.py": "a reader writes it",
+    "run.py": "a reader writes it, or has it of a bot",
+    "my_bot/run.py": "a reader has it",
     "tests/golden.mcap": "a reader records it",
     "<out>/scenarios.md": "`make scenarios` writes it",
     "stableid.json": "StarCraft II writes it",

@@ -16,7 +16,7 @@ import functools
 import logging
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeVar
 
@@ -25,6 +25,7 @@ from pydantic import Field, model_validator
 from khala_bridge.errors import GameHangs, GameMissing
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.task.maps import MapSpec  # noqa: TC001  # pydantic evaluates it
+from khala_bridge.task.opponent import Opponent
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
@@ -48,6 +49,10 @@ class GameConfig(Frozen):
     map: MapSpec
     players: Literal[1, 2] = 1
     """That Khala plays: with 2, the second one plays the race of the opponent in place of the computer."""
+    opponent: Opponent = Opponent()
+    """Who plays against one player of Khala's."""
+    realtime: bool = False
+    """Whether the agents are ready for a game that goes on by itself, as one over LAN may."""
     seed: int | None = None
     """Of the first episode; the next ones count up from it. None: the game chooses."""
     screen_px: int = 128
@@ -85,6 +90,8 @@ class GameIdentity:
     data_version: str
     map_file: str
     map_sha256: str
+    opponent: str = ""
+    """Who the opponent says it is, `guest bot Rush, zerg`; "" if the task knows it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +135,15 @@ class Patience:
     """Times the slowest step so far; steps grow with the armies, 3.5-fold in the first 177 on Simple64."""
     remark_s: float = 2.0
     """When a log line says that a step takes long, unless steps of half that time are usual here."""
+    hangs: str = "the game"
+    """What it is that does not answer then."""
+
+    def against(self, opponent: Opponent) -> Patience:
+        """Return it for a game whose opponent may take its time, too."""
+        if not opponent.joins:
+            return self
+        wait_s, hangs = opponent.wait_s, f"the game, or the {opponent.words}"
+        return replace(self, unknown_s=self.unknown_s + wait_s, least_s=self.least_s + wait_s, hangs=hangs)
 
     def limit_s(self, slowest_s: float | None) -> float:
         """Return the limit for a step of a game whose slowest one took so long; None if there was none."""
@@ -146,14 +162,22 @@ class GameThread:
     Entering it starts the game, leaving it closes the game. The calls are not reentrant: one at a time.
     """
 
-    def __init__(self, start: Callable[[], Game], *, patience: Patience | None = None) -> None:
+    def __init__(
+        self,
+        start: Callable[[], Game],
+        *,
+        patience: Patience | None = None,
+        give_up: Callable[[], None] = lambda: None,
+    ) -> None:
         """Prepare a game without starting it.
 
         Args:
             start: makes the game; runs in the thread.
             patience: longest time that one call may take before the game is ended and `GameHangs` is raised.
+            give_up: ends the wait for a player, if the game is no longer wanted while it starts.
         """
         self._start = start
+        self._give_up = give_up
         self._patience = patience or Patience()
         self._slowest_s: float | None = None
         self._slowest_reset_s: float | None = None
@@ -165,6 +189,7 @@ class GameThread:
         try:
             self._game = await asyncio.get_running_loop().run_in_executor(self._threads, self._start)
         except BaseException:
+            self._give_up()
             self._threads.shutdown(wait=False)
             raise
         return self
@@ -197,7 +222,7 @@ class GameThread:
         play = functools.partial(self._playing.act, plans)
         loop = asyncio.get_running_loop()
         began_s, remark_s = loop.time(), self._patience.remark_after_s(self._slowest_s)
-        remark = loop.call_later(remark_s, log.warning, "the game has not answered for %g s", remark_s)
+        remark = loop.call_later(remark_s, log.warning, "%s has not answered for %g s", self._patience.hangs, remark_s)
         try:
             played = await self._run(play, self._patience.limit_s(self._slowest_s))
         finally:
@@ -217,11 +242,13 @@ class GameThread:
             async with asyncio.timeout(limit_s):
                 return await asyncio.shield(work)
         except TimeoutError:
+            self._give_up()
             self._playing.kill()
             await asyncio.wait([work])  # it fails soon: its process is gone
             work.exception()
             raise GameHangs(
-                f"the game did not answer within {limit_s:g} s and was ended; try again, or another game or map"
+                f"{self._patience.hangs} did not answer within {limit_s:g} s and was ended; "
+                "try again, or another game or map"
             ) from None
 
 

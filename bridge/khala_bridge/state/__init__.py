@@ -11,7 +11,7 @@ from khala_bridge.state.episode import EpisodeInfo, PictureSizes
 from khala_bridge.state.grid import Grid
 from khala_bridge.state.pictures import GamePictures
 from khala_bridge.state.read import read_info, read_snapshot, read_unit
-from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
+from khala_bridge.state.snapshot import ActionError, Effect, Forfeit, PlayerScore, PlayerState, PowerSource, Snapshot
 from khala_bridge.state.unit import Alliance, Display, Unit, UnitOrder
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Display",
     "Effect",
     "EpisodeInfo",
+    "Forfeit",
     "GamePictures",
     "Grid",
     "PictureSizes",

@@ -7,7 +7,7 @@ the messages of the SC2 API. A snapshot is not a connection: it asks the game no
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from khala_bridge.state.pictures import GamePictures
     from khala_bridge.state.unit import Alliance, Unit
     from khala_protocol.messages import Outcome
+
+
+Forfeit: TypeAlias = Literal["guest left", "guest gone", "guest hung"]
+"""How a guest lost a game that was going on: it gave up, its connection or its process ended, or it did not go on."""
 
 
 class PlayerState(NamedTuple):
@@ -123,3 +127,5 @@ class Snapshot:
     """True if the episode is over: by a result, or at its limit of steps."""
     outcome: Outcome | None = None
     """The player's result; None while it plays, and after an end without one."""
+    forfeit: Forfeit | None = None
+    """Why the opponent lost other than by being beaten; None if it was beaten, or not at all."""

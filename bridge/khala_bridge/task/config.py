@@ -19,7 +19,8 @@ from khala_bridge.catalogue.catalogue import alias_of, catalogue, chosen
 from khala_bridge.knowledge import knowledge
 from khala_bridge.knowledge.forms import forms_of
 from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
-from khala_bridge.task.maps import MOST_LOOPS, Difficulty, MapSpec, Race, known_maps
+from khala_bridge.task.maps import MOST_LOOPS, MapSpec, Race, known_maps
+from khala_bridge.task.opponent import Opponent, opponent_of
 from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
@@ -262,13 +263,6 @@ class FaultRules(Frozen):
     """The recording cannot be written, because the disk is full for example."""
 
 
-class Opponent(Frozen):
-    """The computer player; values that are missing come from the map table."""
-
-    race: Race | None = None
-    difficulty: Difficulty | None = None
-
-
 class TaskConfig(Frozen):
     """The map, the agents, and the rules of a match."""
 
@@ -280,6 +274,7 @@ class TaskConfig(Frozen):
     race: Race | None = None
     """The agents' race; None for the map's own."""
     opponent: Opponent = Opponent()
+    """Also in one line, as on the command line: `guest:python run.py`."""
     side: KeyName = "blue"
     """Name of the agents' side in keys and reports."""
     sides: tuple[SideConfig, ...] = ()
@@ -315,6 +310,11 @@ class TaskConfig(Frozen):
         _once((side.side for side in sides), "side")
         return sides
 
+    @field_validator("opponent", mode="before")
+    @classmethod
+    def _in_one_line(cls, value: object) -> object:
+        return opponent_of(value) if isinstance(value, str) else value
+
     @field_validator("task", "agents", mode="before")
     @classmethod
     def _given(cls, value: object, info: ValidationInfo) -> object:
@@ -340,14 +340,17 @@ class TaskConfig(Frozen):
         return self
 
     @model_validator(mode="after")
-    def _room_for_two(self) -> Self:
-        if not self.sides:
-            return self
-        if not self._map.two_sides:
-            raise ValueError(f"the map {self._map.name} has no place for a second side of agents")
-        if self.opponent != Opponent():
+    def _room_for_another(self) -> Self:
+        if (self.sides or self.opponent.joins) and not self._map.two_sides:
+            another = "second side of agents" if self.sides else "player who joins"
+            raise ValueError(f"the map {self._map.name} has no place for a {another}")
+        return self
+
+    @model_validator(mode="after")
+    def _nobody_else(self) -> Self:
+        if self.sides and self.opponent != Opponent():
             raise ValueError("a task of two sides has no opponent: give the race of each side in `sides`")
-        if self.side != type(self).model_fields["side"].default:
+        if self.sides and self.side != type(self).model_fields["side"].default:
             raise ValueError("a task of two sides has no side of its own: name both in `sides`")
         return self
 
@@ -374,6 +377,11 @@ class TaskConfig(Frozen):
         if self.own_map is None:
             return known_maps()[self.map]
         return self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
+
+    @property
+    def against(self) -> str:
+        """Who the agents play against, as far as the task says; "" if there are two sides of agents."""
+        return "" if self.sides else self.opponent.against(self.map_spec)
 
     def per_side(self) -> tuple[TaskConfig, ...]:
         """Return the task of each side, as if the other one were an opponent; itself if there is only one."""

@@ -46,7 +46,7 @@ class MapSpec(Frozen):
     any_race: bool = False
     """Whether a task may choose the race of a side: the map does not place its units."""
     two_sides: bool = False
-    """Whether a second side of agents can take the place of the computer player."""
+    """Whether a second side of agents, or another player, can take the place of the computer player."""
     difficulty: Difficulty = "very_hard"
     """Of the computer player; the paper's setting."""
     limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)

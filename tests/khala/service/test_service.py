@@ -18,6 +18,7 @@ from khala.service.daemon import STARTS, Service
 from khala.service.pool import Ending
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.cards import run_card
+from khala_orchestrator.config import change, load_task
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.memory import MemoryBroker
@@ -116,6 +117,9 @@ class Stage:
         await publisher.put(encode(Report(run=run, episode=0, step=step, game_loop=1, agents=(agent,))))
 
 
+WITH_A_COMMAND = change(load_task("simple64_terran"), opponent="guest:rm -r x").model_dump(mode="json")
+
+
 def order(run: str, owner: str = "", match: dict[str, Any] | None = None, **minds: Any) -> Submit:
     config = new("2s3z_pair", run, Path("nowhere"), seed=1, episodes=1, assemble_s=60.0)
     plain = config.model_dump(mode="json", exclude={"record", "run"})
@@ -160,6 +164,7 @@ async def test_owners_take_turns(stage: Stage) -> None:
     ("wanted", "because"),
     [
         ({"base_url": "http://elsewhere"}, "--base-url is for a service that was started with --trust"),
+        ({"match": {"task": WITH_A_COMMAND}}, "the command of an opponent is for a service"),
         ({"policy": "os:system"}, "--policy MODULE:NAME is for a service that was started with --trust"),
         ({"fallback": "os:system"}, "--fallback MODULE:NAME is for a service"),
         ({"model": "/etc/model.yaml"}, "a model file is for a service"),
