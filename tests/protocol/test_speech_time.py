@@ -11,6 +11,8 @@ import pytest
 from bench.hostile import TOKENS
 from khala_protocol.speech import MAX_REPLY_CHARACTERS, parse
 
+PAIRS = list(itertools.product(TOKENS, TOKENS))
+"""5 300; a long test tries 800 of them."""
 PREFIXES = ("", "Actions:\n<Stop()>\n")
 FOUND = (  # each was quadratic, or worse, before
     *("A_", "A_A_", "Aa_bAa_b", "<!--", "[\n", ". Actions: A1| ", '{"action":"A_b"}A1| ', "\nMessageTo(A, x"),
@@ -46,10 +48,16 @@ def test_what_was_slow_takes_linear_time(piece: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("token", TOKENS)
-def test_no_two_tokens_take_more_than_linear_time(token: str) -> None:
-    units = (token, *(token + other for other in TOKENS))
-    slow = [(unit, prefix) for unit in units for prefix in PREFIXES if not is_linear(unit, prefix)]
-    assert not slow
+def test_no_token_takes_more_than_linear_time(token: str) -> None:
+    assert all(is_linear(token, prefix) for prefix in PREFIXES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_no_two_tokens_take_more_than_linear_time(seed: int) -> None:
+    chance = random.Random(seed)
+    units = ("".join(pair) for pair in chance.sample(PAIRS, 40))
+    assert not [unit for unit in units if not is_linear(unit, chance.choice(PREFIXES))]
 
 
 @pytest.mark.slow
@@ -61,12 +69,14 @@ def test_no_mixture_of_tokens_takes_more_than_linear_time(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("token", TOKENS)
-def test_many_openings_and_a_far_end_take_linear_time(token: str) -> None:
-    for other, prefix in itertools.product(TOKENS, PREFIXES):
+@pytest.mark.parametrize("seed", range(20))
+def test_many_openings_and_a_far_end_take_linear_time(seed: int) -> None:
+    chance = random.Random(seed)
+    for token, other in chance.sample(PAIRS, 40):
+        prefix = chance.choice(PREFIXES)
         texts = (prefix + token * (size // len(token)) + other * (size // len(other)) for size in (8_192, 32_768))
         short, long = (min(seconds(text) for _ in range(2)) for text in texts)
-        assert long < max(10 * short, 2 * NOTICED_S), other
+        assert long < max(10 * short, 2 * NOTICED_S), (token, other)
 
 
 @pytest.mark.parametrize(
