@@ -1,7 +1,7 @@
 """How much of what agents send a recording takes: so much for each step, and some steps' worth at once.
 
-Ordinary exchanges have 8 to 17 kB (scripted model, a battle and a whole game; pictures are in them by their hashes
-only). Without a limit an agent could send 500 of 4 MiB a second, which is what a router passes. Above it:
+Ordinary exchanges have 8 to 17 kB (scripted model, a battle and the first 90 s of a game; pictures are in them by their
+hashes only). Without a limit an agent could send 500 of 4 MiB a second, which is what a router passes. Above it:
 `khala_orchestrator.record`.
 """
 
