@@ -122,7 +122,10 @@ def test_an_expired_certificate_is_refused_with_the_command_for_a_new_one(
     assert str(error.value) == (
         f"the certificate of agent:red/A expired on {agent.ends:%Y-%m-%d} ({files.certificate}): {remedy}"
     )
-    later -= timedelta(days=100)
+    later += timedelta(days=3650)
+    with pytest.raises(BusError, match=r"the certificate of authority expired .*: `khala keys init DIR` in a new dir"):
+        check(BusConfig(tls=files))
+    later -= timedelta(days=3750)
     with pytest.raises(BusError, match=r"is valid from .* on: is the clock here right"):
         check(BusConfig(tls=files))
 
