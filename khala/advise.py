@@ -21,9 +21,9 @@ from khala_orchestrator.mailbox import EVERYONE
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
-from khala_protocol.errors import ConfigError, NoRouter
+from khala_protocol.errors import ConfigError, KhalaError, NoRouter
 from khala_protocol.joining import client_config
-from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.keys import Topic, agent_key, host_key, run_key
 from khala_protocol.messages import MAX_ADVICE_CHARACTERS, Advice, Report, Result, Run
 from khala_protocol.visible import visible_line
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator, Sequence
     from pathlib import Path
 
-    from khala_protocol.bus import Bus, Publisher, Sample, Subscription
+    from khala_protocol.bus import Bus, Liveness, Publisher, Sample, Subscription
     from khala_protocol.bus.config import BusConfig
 
 FIND_S = 5.0
-"""How long to wait for the run card, which every running match has published."""
+"""How long to wait for the run card, which every running match has published, and for a host that is away."""
 
 
 FIND_NEAR_S = 1.0
@@ -44,6 +44,10 @@ FIND_NEAR_S = 1.0
 
 class NoMatch(ConfigError):
     """There is no such match on a bus."""
+
+
+class MatchGone(KhalaError):
+    """The host went away, and there is no result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +105,13 @@ class Advising:
 
         Raises:
             ConfigError: there is no such run within `find_s`, or the adviser may not write to its agents.
+            MatchGone: the host is away for `find_s`.
         """
         async with contextlib.AsyncExitStack() as stack:
             reports = await self._hear(stack, Topic.REPORT, Delivery.LOG)
             results = await self._hear(stack, Topic.RESULT, Delivery.STATE)
+            hosts = await self._bus.watch(host_key(self._adviser.run))
+            stack.push_async_callback(hosts.close)
             card = await self._card(await self._hear(stack, Topic.RUN, Delivery.STATE), find_s)
             key = agent_key(self._adviser.run, self._adviser.side, self._adviser.name, Topic.ADVICE)
             publisher = await self._bus.publisher(key, Delivery.SPEECH)
@@ -113,7 +120,7 @@ class Advising:
             writing = asyncio.create_task(self._write(publisher, lines, card), name="write advice")
             reading = asyncio.create_task(self._read_reports(reports), name="read reports")
             try:
-                await self._read_results(results, card)
+                await self._read_results_while(hosts, results, card, away_s=find_s)
             finally:
                 await reports.close()  # what has arrived is still shown
                 writing.cancel()
@@ -148,6 +155,29 @@ class Advising:
             report = decode_as(Report, sample.payload)
             if report.side == self._adviser.side:
                 self._show(report)
+
+    async def _read_results_while(
+        self, hosts: Subscription[Liveness], results: Subscription[Sample], card: Run, *, away_s: float
+    ) -> None:
+        """Read results as long as the host is there; a link that comes back, or a host that goes on, loses nothing."""
+        loop = asyncio.get_running_loop()
+
+        async def watch() -> None:
+            async for host in hosts:
+                patience.reschedule(None if host.alive else loop.time() + away_s)
+
+        try:
+            async with asyncio.timeout(None) as patience:
+                watching = asyncio.create_task(watch(), name="watch the host")
+                try:
+                    await self._read_results(results, card)
+                finally:
+                    watching.cancel()
+        except TimeoutError:
+            raise MatchGone(
+                f"the match {card.run!r} is gone: its host went away without a result, and was not back within "
+                f"{away_s:g} s; `khala run --resume` or `khala host --resume` goes on with its recording"
+            ) from None
 
     async def _read_results(self, results: Subscription[Sample], card: Run) -> None:
         """Show results until that of the last episode, or of one that was aborted, has come for every side."""

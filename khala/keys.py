@@ -1,6 +1,7 @@
 """`khala keys`: the certificates with which machines join the bus; see `khala_protocol.certificates`."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -37,7 +38,7 @@ def init(
         list[str] | None,
         typer.Option(
             help="Name or address at which the router can be reached; may be given several times.",
-            show_default="those of this machine",
+            show_default="those of the last time, or of this machine",
             metavar="NAME",
         ),
     ] = None,
@@ -45,13 +46,12 @@ def init(
 ) -> None:
     """Make an authority, and certificates for a router and for the host.
 
-    An authority that is there already stays, and the two get new certificates. The folder `ca` should not leave this
-    machine: who has its key can be anyone.
+    An authority that is there already stays, and the two get new certificates; copies of the old ones stay good. The
+    folder `ca` should not leave this machine: who has its key can be anyone.
     """
     from khala_protocol.certificates import make_authority  # noqa: PLC0415  # the library is not for --help
 
-    for place in make_authority(directory, host or (), days=days):
-        _made(place)
+    _make(directory, lambda: make_authority(directory, host or (), days=days))
 
 
 @app.command()
@@ -65,7 +65,7 @@ def agent(
     """Make a certificate for one agent, in a folder that can be copied to its machine alone."""
     from khala_protocol.certificates import certify_agent  # noqa: PLC0415
 
-    _made(certify_agent(directory, side, name, days=days))
+    _make(directory, lambda: [certify_agent(directory, side, name, days=days)])
 
 
 @app.command()
@@ -79,7 +79,7 @@ def adviser(
     """Make a certificate for one adviser, who may read reports and write to agents; see `khala advise`."""
     from khala_protocol.certificates import certify_adviser  # noqa: PLC0415
 
-    _made(certify_adviser(directory, side, name, days=days))
+    _make(directory, lambda: [certify_adviser(directory, side, name, days=days)])
 
 
 @app.command()
@@ -92,7 +92,7 @@ def observer(
     """Make a certificate for a program that may read everything and write nothing."""
     from khala_protocol.certificates import certify_observer  # noqa: PLC0415
 
-    _made(certify_observer(directory, name, days=days))
+    _make(directory, lambda: [certify_observer(directory, name, days=days)])
 
 
 @app.command()
@@ -119,5 +119,15 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
     Console(highlight=False).print(table)
 
 
-def _made(place: Path) -> None:
-    typer.echo(f"made {place}", err=True)
+def _make(directory: Path, make: Callable[[], list[Path]]) -> None:
+    """Make certificates, and say which ones, where their holders listen, and what they replace."""
+    from khala_protocol.bus.certificate import read  # noqa: PLC0415
+    from khala_protocol.certificates import certificates  # noqa: PLC0415
+
+    before = {one.path: one for one in certificates(directory) if not one.has_expired}
+    for place in make():
+        made = read(place / "certificate.pem")
+        at = f", which listens at {', '.join(made.hosts)}" if made.hosts else ""
+        old = before.get(made.path)
+        instead = f"; copies of the one before are good until {old.ends:%Y-%m-%d}" if old else ""
+        typer.echo(f"made {place}{at}{instead}", err=True)

@@ -25,26 +25,79 @@ if TYPE_CHECKING:
     from khala_orchestrator.resume import Unfinished
 
 
+RECORDED = {
+    "task": "the task",
+    "run": "--run",
+    "seed": "--seed",
+    "episodes": "--episodes",
+    "executor": "--executor",
+    "rule": "--clock",
+    "max_wait_s": "--max-wait",
+    "step_loops": "--step-loops",
+    "thinking_loops": "--thinking-loops",
+    "speed": "--speed",
+    "grace_s": "--grace",
+    "max_steps": "--max-steps",
+    "images": "--images",
+    "opponent": "--opponent",
+}
+"""Options of what a run card holds, so that a match keeps them when it is gone on with. All others may be new: where it
+is played and recorded, how long it waits for its agents at the start, and how they decide."""
+
+
 def new_or_resumed(
     task: str | None, resume: Path | None, run: str | None, out: Path, **given: Any
 ) -> tuple[MatchConfig, Unfinished | None]:
     """Return the match that the options describe, and what was played of it.
 
     Raises:
-        ConfigError: an option or a file is wrong.
+        ConfigError: an option or a file is wrong, or says something else than the recording.
         RecordingError: there is nothing to go on with.
     """
-    if (task is None) == (resume is None):
-        raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume")
     if resume is None:
-        assert task is not None
+        if task is None:
+            raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume")
         return new(task, run, out, **given), None
-    return resumed(resume, out, assemble_s=given["assemble_s"])
+    config, past = resumed(resume, out, assemble_s=given.pop("assemble_s"))
+    refuse_others(config, task=task, run=run, **given)
+    return config, past
+
+
+def refuse_others(config: MatchConfig | None, **given: Any) -> None:
+    """Refuse options that say something else than the match that is gone on with.
+
+    Args:
+        config: the match; None if it is not known here, and no option can be seen to say the same.
+        given: by the names in `RECORDED`; None for an option that was left out.
+
+    Raises:
+        ConfigError: there are some; the text names them all.
+    """
+    others = [
+        f"{option} {value}"
+        for name, option in RECORDED.items()
+        if (value := given.get(name)) is not None and (config is None or not _says(config, name, value))
+    ]
+    if others:
+        raise ConfigError(
+            f"--resume goes on with a match as it was begun: leave out {', '.join(others)}, or begin a new one"
+        )
+
+
+def _says(config: MatchConfig, name: str, value: object) -> bool:
+    if name == "task":
+        return value == config.task.name
+    if name in MatchConfig.model_fields:
+        return bool(getattr(config, name) == value)
+    try:
+        return change(config.task, **{name: value}) == config.task
+    except ConfigError:  # the option does not go with the others of the match
+        return False
 
 
 def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     """Return the match that the options describe; its recording is in its own directory below `out`."""
-    match = {name: given.pop(name) for name in ("seed", "episodes", "assemble_s")}
+    match = {name: value for name in ("seed", "episodes", "assemble_s") if (value := given.pop(name)) is not None}
     loaded = change(load_task(task), **given)
     Observer(loaded)  # report an unknown section before a game is started
     name = check_name(run or new_run_name(loaded.name), "run")

@@ -24,8 +24,10 @@ Game = Annotated[
     str,
     typer.Option(help="Game to use: simulator, starcraft2 (at SC2PATH), or a directory of either.", metavar="GAME"),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; each further one adds 1.")]
-Episodes = Annotated[int, typer.Option(min=1, help="Number of episodes.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, help="Seed of the first episode; each further one adds 1.", show_default="1")
+]
+Episodes = Annotated[int | None, typer.Option(min=1, help="Number of episodes.", show_default="1")]
 RunName = Annotated[
     str | None,
     typer.Option(envvar="KHALA_RUN", help="Name of the run.", show_default="task, time, digits", metavar="NAME"),

@@ -183,15 +183,35 @@ def as_policy(thing: object) -> Policy:
     """Return a policy unchanged; wrap a function or an object with a method `decide` in a policy.
 
     Raises:
-        TypeError: it is none of these.
+        TypeError: it is none of these, or cannot be called with briefing and observation.
     """
     if isinstance(thing, Policy):
         return thing
     if hasattr(thing, "decide"):
+        _check_parameters(thing.decide, "its `decide`")
         return ObjectPolicy(thing)
     if callable(thing):
+        _check_parameters(thing, "it")
         return FunctionPolicy(thing)
     raise TypeError("it is no function and has no method `decide`")
+
+
+def _check_parameters(function: Any, what: str) -> None:
+    """Raise TypeError if a function is known to take something else than briefing and observation."""
+    try:
+        parameters = inspect.signature(function)
+    except ValueError:  # some functions written in C do not say
+        return
+    except TypeError:
+        raise TypeError(f"{what} is no function: write decide(briefing, observation)") from None
+    try:
+        parameters.bind("briefing", "observation")
+    except TypeError:
+        taken = ", ".join(parameters.parameters)
+        raise TypeError(
+            f"{what} takes ({taken}): a function of a policy takes (briefing, observation), and a policy that decides "
+            "with a context is a subclass of khala_agents.policy.Policy"
+        ) from None
 
 
 async def _in_thread(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

@@ -214,8 +214,8 @@ def submit(
     side_model: SideModel = None,
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
-    seed: Seed = 1,
-    episodes: Episodes = 1,
+    seed: Seed = None,
+    episodes: Episodes = None,
     executor: ExecutorName = None,
     clock: Rule = None,
     max_wait: MaxWait = None,
@@ -233,17 +233,20 @@ def submit(
 
     Options are those of `khala run`; keys, policies and model files are those of the service's machine.
     """
-    from khala.matches import new  # noqa: PLC0415
+    from khala.matches import new, refuse_others  # noqa: PLC0415
     from khala.minds import Minds, named_sides  # noqa: PLC0415
     from khala.service import client  # noqa: PLC0415
 
-    if (task is None) == (resume is None):
+    if task is None and resume is None:
         raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume")
-    config = None if task is None else new(
-        task, run, Path(), seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, images=images,
-    )  # fmt: skip
+    given: dict[str, Any] = {
+        "seed": seed, "episodes": episodes, "executor": executor, "rule": clock, "max_wait_s": max_wait,
+        "step_loops": step_loops, "thinking_loops": thinking_loops, "speed": speed, "grace_s": grace,
+        "max_steps": max_steps, "images": images,
+    }  # fmt: skip
+    if resume is not None:
+        refuse_others(None, task=task, run=None if run == resume else run, **given)
+    config = None if task is None else new(task, run, Path(), assemble_s=assemble, **given)
     order = Submit(
         run=config.run if config else str(resume),
         number=client.new_number(),

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from khala.matches import free_recording
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
     from pathlib import Path
 
+    from khala.minds import Minds
     from khala.service.pool import Player
+    from khala_orchestrator.config import MatchConfig
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription
     from khala_protocol.bus.config import BusConfig
     from khala_protocol.messages import Wire
@@ -124,30 +127,35 @@ class Service:
             try:
                 order = decode_order(sample.payload)
                 if sample.key == order_key(order.number):
-                    self._obey(order)
+                    await self._obey(order)
             except PeerError as error:
                 log.warning("an order that is none: %s", error)
             self._changed.set()
 
-    def _obey(self, order: Order) -> None:
+    async def _obey(self, order: Order) -> None:
         match order:
             case Submit() if not self.book.knows(order.number):
-                self._submit(order)
+                await self._submit(order)
             case Stop() if (entry := self.book.entry(order.run)) is not None:
                 self._stop(entry, "stopped by an order")
 
-    def _submit(self, order: Submit) -> None:
+    async def _submit(self, order: Submit) -> None:
         try:
-            if why := self.book.why_not(order.run):
-                self.book.refuse(order, why)
+            match = None if self.book.why_not(order.run) else await self._match(order)
+            if match is None or self.book.draining:  # it may have begun meanwhile
+                self.book.refuse(order, self.book.why_not(order.run))
                 return
-            entry = self.book.add(order, *match_of(order, self.out, trusts=self.limits.trusts))
+            entry = self.book.add(order, *match)
             log.info("match taken: %s for %s", entry.card.task, order.owner or "nobody", extra={"run": order.run})
         except KhalaError as error:
             self.book.refuse(order, str(error))
         except Exception as error:  # an order comes from somewhere else: it must not end the service
             log.exception("an order that cannot be read", extra={"run": order.run[:64]})
             self.book.refuse(order, f"the service could not read it: {type(error).__name__}")
+
+    async def _match(self, order: Submit) -> tuple[MatchConfig, dict[str, Minds]]:
+        read = partial(match_of, order, self.out, trusts=self.limits.trusts)
+        return await asyncio.to_thread(read) if order.resume else read()  # a long recording takes seconds to read
 
     def _stop(self, entry: Entry, because: str) -> None:
         if entry.card.state == "queued":

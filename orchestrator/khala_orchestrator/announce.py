@@ -1,4 +1,4 @@
-"""Publish the host's public messages: the run card, briefings, messages between agents, reports and results.
+"""Say that the host is there, and publish its run card, briefings, messages between agents, reports and results.
 
 Below it: the bus. Above it: `khala_orchestrator.match`, which decides what is published, and this module where.
 """
@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Self
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import encode
-from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.keys import Topic, agent_key, host_key, run_key
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import TracebackType
 
-    from khala_protocol.bus import Bus, Publisher
+    from khala_protocol.bus import Bus, Publisher, Token
     from khala_protocol.messages import Briefing, Message, Report, Result, Run
 
 _DELIVERY = {Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT: Delivery.STATE}
 
 
 class Announcer:
-    """The host's publishers. An asynchronous context manager."""
+    """The host's publishers, and its liveliness token. An asynchronous context manager."""
 
     def __init__(self, bus: Bus, run: str, seats: Iterable[Seat], advisers: Iterable[Seat] = ()) -> None:
         self._bus = bus
@@ -34,6 +34,7 @@ class Announcer:
         self._briefings: dict[Seat, Publisher] = {}
         self._newest: dict[Seat, Briefing] = {}
         self._messages: dict[Seat, Publisher] = {}
+        self._token: Token | None = None
 
     async def __aenter__(self) -> Self:
         for topic, delivery in _DELIVERY.items():
@@ -44,6 +45,7 @@ class Announcer:
         for seat in (*self._seats, *self._advisers):
             key = agent_key(self._run, seat.side, seat.agent, Topic.MESSAGE)
             self._messages[seat] = await self._bus.publisher(key, Delivery.LOG)
+        self._token = await self._bus.announce(host_key(self._run))
         return self
 
     async def __aexit__(
@@ -51,6 +53,8 @@ class Announcer:
     ) -> None:
         for publisher in (*self._topics.values(), *self._briefings.values(), *self._messages.values()):
             await publisher.close()
+        if self._token is not None:
+            await self._token.close()
 
     async def run(self, card: Run) -> None:
         """Publish the run card."""

@@ -6,7 +6,7 @@ subject to them, which is right for a host that is its own router.
     who         reads                                                              writes
     host        everything of the run                                              everything of the run
     agent       result; briefing, observation, images of its own                   its reply, exchange, alive
-    adviser     run, report, result                                                its advice
+    adviser     run, report, result, whether the host is there                     its advice
     observer    everything of the run                                              nothing
     service     everything of every run, on the unix socket of `khala serve`       the same
 
@@ -118,7 +118,7 @@ def _agent(root: str, name: str, own: str) -> list[dict[str, Any]]:
 
 def _adviser(root: str, side: str, adviser: str) -> list[dict[str, Any]]:
     name, own = adviser_name(side, adviser), f"{root}/{side}/{adviser}/{Topic.ADVICE}"
-    keys = _with_caches(f"{root}/run", f"{root}/report", f"{root}/result")
+    keys = _with_caches(f"{root}/run", f"{root}/report", f"{root}/result", f"{root}/host")
     return [
         _rule(f"listen:{name}", ["ingress"], _LISTEN, keys),
         _rule(f"hear:{name}", ["egress"], _HEAR, keys),

@@ -65,17 +65,19 @@ def make_authority(directory: Path, hosts: Iterable[str] = (), *, days: int = DE
 
     Args:
         directory: gets one folder for each.
-        hosts: names and addresses at which the router listens; those of this machine if there are none.
+        hosts: names and addresses at which the router listens; if there are none, those of the router that there is,
+            or else of this machine.
         days: how long the certificates are valid.
 
     Raises:
-        ConfigError: the directory cannot be written, or holds a broken authority.
+        ConfigError: the directory cannot be written, holds a broken authority, or certificates of one that is gone.
     """
     if not (directory / "ca" / "key.pem").exists():
+        _check_empty(directory)
         with _writing(directory):
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             _make_ca(directory / "ca")
-    names = tuple(hosts) or (*THIS_MACHINE, *_own_names())
+    names = tuple(hosts) or _router_hosts(directory) or (*THIS_MACHINE, *_own_names())
     return [issue(directory, ROUTER, "router", hosts=names, days=days), issue(directory, HOST, "host", days=days)]
 
 
@@ -151,6 +153,22 @@ def files_of(directory: Path, *names: str) -> TlsFiles:
     wanted = names or (HOST,)
     remedy = f"make it with {command_for(wanted[0])}, and copy its folder"
     raise ConfigError(f"no certificate of {' or '.join(wanted)}, {there}: {remedy}", source=str(directory))
+
+
+def _check_empty(directory: Path) -> None:
+    """Raise ConfigError if there are certificates, which a new authority would make worthless."""
+    if found := certificates(directory):
+        names = ", ".join(sorted({one.name for one in found}))
+        raise ConfigError(
+            f"holds certificates ({names}) and not the key of their authority, ca/key.pem: put it back, or make new "
+            "ones for all in another directory",
+            source=str(directory),
+        )
+
+
+def _router_hosts(directory: Path) -> tuple[str, ...]:
+    path = directory / "router" / "certificate.pem"
+    return read(path).hosts if path.exists() else ()
 
 
 def _make_ca(place: Path) -> None:

@@ -1,6 +1,7 @@
 """Key expressions of the bus, built and parsed in this one place.
 
     khala/<run>/<topic>                          topic: run, report, result
+    khala/<run>/host                             liveliness token of the host
     khala/<run>/<side>/<agent>/<topic>           topic: briefing, observation, reply, message, exchange
     khala/<run>/<side>/<adviser>/advice          what somebody outside the match writes to agents
     khala/<run>/<side>/<agent>/image/<place>     the bytes of a picture of the newest observation, by its place in it
@@ -90,6 +91,11 @@ def run_key(run: str, topic: Topic) -> str:
     if topic not in RUN_TOPICS:
         raise WrongKey(f"{topic} belongs to an agent, not to the run")
     return f"{ROOT}/{check_name(run, 'run')}/{topic}"
+
+
+def host_key(run: str) -> str:
+    """Return the key of the liveliness token of the host; one that goes on for another has the same."""
+    return f"{ROOT}/{check_name(run, 'run')}/host"
 
 
 def agent_key(run: str, side: str, agent: str, topic: Topic) -> str:

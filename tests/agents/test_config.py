@@ -208,6 +208,13 @@ BAD_POLICIES = [
     ("lost_agent:decide", "policy lost_agent:decide: there is no module 'not_installed'"),
     ("my_agent:decide_not", "policy my_agent:decide_not: the module my_agent has no 'decide_not'"),
     ("my_agent:number", "policy my_agent:number: it is no function and has no method `decide`"),
+    (
+        "os:system",
+        (
+            "policy os:system: it takes (command): a function of a policy takes (briefing, observation), and a policy "
+            "that decides with a context is a subclass of khala_agents.policy.Policy"
+        ),
+    ),
     ("broken_agent:decide", "policy broken_agent:decide: importing it failed: RuntimeError: half written"),
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -79,6 +80,32 @@ async def test_an_object_is_prepared_and_closed_if_it_can_be(briefing: Callable[
 def test_what_cannot_decide_is_no_policy() -> None:
     with pytest.raises(TypeError, match="it is no function and has no method `decide`"):
         as_policy(3)
+
+
+class OfContext:
+    def decide(self, context: Context) -> str:
+        return context.observation.text
+
+
+class OfText:
+    decide = "Attack"
+
+
+@pytest.mark.parametrize(
+    ("thing", "begins"),
+    [
+        (os.system, r"it takes \(command\): a function of a policy takes \(briefing, observation\)"),
+        (OfContext(), r"its `decide` takes \(context\): .* is a subclass of khala_agents.policy.Policy"),
+        (OfText(), r"its `decide` is no function: write decide\(briefing, observation\)"),
+    ],
+)
+def test_what_takes_something_else_is_refused_with_what_is_expected(thing: object, begins: str) -> None:
+    with pytest.raises(TypeError, match=begins):
+        as_policy(thing)
+
+
+def test_a_function_with_more_parameters_that_have_defaults_is_a_policy() -> None:
+    assert isinstance(as_policy(lambda *seen, style="calm": f"{seen} {style}"), FunctionPolicy)
 
 
 async def test_a_context_knows_how_much_time_is_left(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala import games, local_bus
-from khala.advise import Adviser, Advising, run_advise, told
+from khala.advise import Adviser, Advising, MatchGone, run_advise, told
 from khala.hosting import game_of
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
@@ -31,12 +31,12 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
-from khala_protocol.keys import Topic, agent_key, run_key
+from khala_protocol.keys import Topic, agent_key, host_key, run_key
 from khala_protocol.messages import Advice, Casualties, Message, Report, Result, Run
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Coroutine, Iterator
     from pathlib import Path
 
     from khala_protocol.messages import Briefing, Observation
@@ -129,24 +129,50 @@ async def test_a_run_that_is_not_there_is_a_sentence() -> None:
         await advising.play(nothing(), find_s=0.01)
 
 
+async def test_a_match_whose_host_stays_away_is_gone_and_one_whose_host_goes_on_is_not() -> None:
+    broker, shown = MemoryBroker(), asyncio.Queue[Run | Report | Result]()
+    lost, resumed = broker.session(), broker.session()
+
+    async def advise(away_s: float) -> None:
+        advising = Advising(broker.session(), Adviser(RUN, "blue", "Ada"), show=shown.put_nowait, complain=print)
+        await advising.play(nothing(), find_s=away_s)
+
+    await lost.announce(host_key(RUN))
+    await (await lost.publisher(run_key(RUN, Topic.RUN), Delivery.STATE)).put(encode(run_card()))
+    async with asyncio.TaskGroup() as group:
+        hasty = group.create_task(_error_of(advise(0.01)))
+        group.create_task(advise(60))
+        assert [await shown.get(), await shown.get()] == [run_card()] * 2
+        lost.kill()
+        assert str(await hasty).startswith(
+            "the match 'advised' is gone: its host went away without a result, and was not back within 0.01 s; "
+        )
+        await resumed.announce(host_key(RUN))
+        results = await resumed.publisher(run_key(RUN, Topic.RESULT), Delivery.STATE)
+        for side in ("blue", "red"):
+            await results.put(encode(drawn().but(side=side)))
+
+
+async def _error_of(advising: Coroutine[None, None, None]) -> MatchGone:
+    with pytest.raises(MatchGone) as gone:
+        await advising
+    return gone.value
+
+
 async def test_of_all_matches_on_this_machine_the_one_of_the_name_is_found(
     short: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Another one is newer: of `khala serve`, for example."""
     monkeypatch.setattr("tempfile.tempdir", short)
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
-    card, nothing_lost = run_card(), Casualties(units=0, value=0)
+    card = run_card()
     card = card.but(agents=card.agents[:2])  # of one side
-    ended = Result(
-        run=RUN, episode=0, outcome="draw", cause="time limit", steps=1, game_loop=8, game_s=0.4, wall_s=0.1,
-        killed=nothing_lost, lost=nothing_lost, kd=None,
-    )  # fmt: skip
     async with AsyncExitStack() as stack:
         for played in (True, False):
             listen = stack.enter_context(local_bus.local_endpoint())
             bus = await open_bus(BusConfig(mode="router", listen=(listen,)))
             stack.push_async_callback(bus.close)
-            for topic, message in ((Topic.RUN, card), (Topic.RESULT, ended)) if played else ():
+            for topic, message in ((Topic.RUN, card), (Topic.RESULT, drawn())) if played else ():
                 await (await bus.publisher(run_key(RUN, topic), Delivery.STATE)).put(encode(message))
             if not played:
                 os.utime(listen.partition("/")[2], (2**31, 2**31))
@@ -201,6 +227,14 @@ def run_card() -> Run:
         "executor": "raw", "clock": {}, "agents": seats, "catalogue_sha256": "", "versions": {}, "advisers": ("Ada",),
     }  # fmt: skip
     return Run.model_validate(fields)
+
+
+def drawn() -> Result:
+    nothing_lost = Casualties(units=0, value=0)
+    return Result(
+        run=RUN, episode=0, outcome="draw", cause="time limit", steps=1, game_loop=8, game_s=0.4, wall_s=0.1,
+        killed=nothing_lost, lost=nothing_lost, kd=None,
+    )  # fmt: skip
 
 
 async def nothing() -> AsyncIterator[str]:

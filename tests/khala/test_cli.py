@@ -370,6 +370,17 @@ def test_keys_are_made_shown_and_examined(capsys: pytest.CaptureFixture[str], tm
     assert found["certificate host"]["advice"].startswith("chmod 600 ")
 
 
+def test_keys_that_are_made_again_say_what_they_replace(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for _ in range(2):
+        with pytest.raises(SystemExit):
+            main(["keys", "init", str(tmp_path), "--host", "10.0.0.5", "--days", "7"])
+    once, again = (said.splitlines() for said in capsys.readouterr().err.split(f"made {tmp_path}/host\n", 1))
+    assert once == [f"made {tmp_path}/router, which listens at 10.0.0.5"]
+    assert [line.partition("; ")[2].rpartition(" ")[0] for line in again] == [
+        "copies of the one before are good until"
+    ] * 2
+
+
 def test_every_task_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
     _, out = tell(capsys, "tasks", "--json")
     names = {task["name"] for task in json.loads(out)["tasks"]}

@@ -80,6 +80,16 @@ async def test_an_adviser_reads_what_is_for_all_and_writes_its_advice(sessions: 
     assert await heard(adviser, host) == {f"{ADA}/advice"}
 
 
+async def test_an_adviser_sees_that_the_host_is_there_and_an_agent_cannot_stand_in_for_it(sessions: Sessions) -> None:
+    adviser, host, agent = await sessions("adviser:blue/Ada"), await sessions("host"), await sessions("agent:blue/A")
+    tokens = await adviser.watch("khala/r/host")
+    await agent.announce("khala/r/host")
+    token = await host.announce("khala/r/host")
+    assert await take(tokens, 1) == [Liveness("khala/r/host", alive=True)]
+    await token.close()
+    assert await take(tokens, 1) == [Liveness("khala/r/host", alive=False)]
+
+
 async def test_an_agent_that_is_in_no_task_reads_and_writes_nothing(sessions: Sessions) -> None:
     other, host = await sessions("agent:blue/Other"), await sessions("host")
     assert await heard(host, other) == set()

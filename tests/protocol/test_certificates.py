@@ -76,6 +76,21 @@ def test_an_authority_stays_and_others_are_made_again(keys: Path) -> None:
     assert [name for name in after if after[name] == before[name]] == ["authority"]
 
 
+def test_given_again_without_hosts_the_router_keeps_its_addresses(keys: Path) -> None:
+    make_authority(keys)
+    (router,) = (one for one in certificates(keys) if one.name == "router")
+    assert router.hosts == ("router.example", "10.0.0.5", "::1")
+
+
+@pytest.mark.parametrize("lost", ["ca", "ca/key.pem"])
+def test_no_new_authority_is_made_where_certificates_of_another_one_are(keys: Path, lost: str) -> None:
+    (keys / lost).rename(keys.parent / "elsewhere")
+    before = {path: path.read_bytes() for path in keys.rglob("*.pem")}
+    with pytest.raises(ConfigError, match=r"and not the key of their authority, ca/key\.pem: put it back, or make new"):
+        make_authority(keys)
+    assert {path: path.read_bytes() for path in keys.rglob("*.pem")} == before
+
+
 def test_without_hosts_the_router_is_found_at_this_machine(tmp_path: Path) -> None:
     make_authority(tmp_path)
     (router,) = (one for one in certificates(tmp_path) if one.name == "router")
@@ -107,7 +122,10 @@ def test_an_expired_certificate_is_refused_with_the_command_for_a_new_one(
     assert str(error.value) == (
         f"the certificate of agent:red/A expired on {agent.ends:%Y-%m-%d} ({files.certificate}): {remedy}"
     )
-    later -= timedelta(days=100)
+    later += timedelta(days=3650)
+    with pytest.raises(BusError, match=r"the certificate of authority expired .*: `khala keys init DIR` in a new dir"):
+        check(BusConfig(tls=files))
+    later -= timedelta(days=3750)
     with pytest.raises(BusError, match=r"is valid from .* on: is the clock here right"):
         check(BusConfig(tls=files))
 

@@ -19,6 +19,7 @@ from khala_protocol.keys import (
     check_name,
     every_agent,
     everything,
+    host_key,
     image_key,
     images_of,
     parse,
@@ -74,6 +75,7 @@ def test_what_is_parsed_is_built_back_and_all_else_is_refused(key: str) -> None:
         (run_key("r1", Topic.REPORT), "khala/r1/report"),
         (run_key("r1", Topic.RESULT), "khala/r1/result"),
         (agent_key("r1", "p1", "CombatGroup1", Topic.REPLY), "khala/r1/p1/CombatGroup1/reply"),
+        (host_key("r1"), "khala/r1/host"),
         (alive_key("r1", "p1", "A", "7f.2"), "khala/r1/p1/A/alive/7f.2"),
         (every_agent("r1", Topic.REPLY), "khala/r1/*/*/reply"),
         (every_agent("r1", Topic.ALIVE), "khala/r1/*/*/alive/*"),
@@ -92,6 +94,7 @@ def test_no_name_can_widen_an_expression(name: str) -> None:
     for build in (
         lambda: check_name(name),
         lambda: run_key(name, Topic.RUN),
+        lambda: host_key(name),
         lambda: agent_key(name, "p1", "A", Topic.REPLY),
         lambda: agent_key("r", name, "A", Topic.REPLY),
         lambda: agent_key("r", "p1", name, Topic.REPLY),

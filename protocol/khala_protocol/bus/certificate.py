@@ -73,7 +73,9 @@ class Certificate:
 
     @property
     def remedy(self) -> str:
-        """The command that makes a new one, where the authority is."""
+        """The command that makes a new one, where the authority is; an authority itself stays as it is for good."""
+        if self.name == "authority":
+            return f"{command_for(self.name)} in a new directory makes another, and all certificates must be made there"
         return f"{command_for(self.name, self.path.parent.name)} makes a new one where the authority is"
 
 

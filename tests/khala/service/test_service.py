@@ -30,7 +30,7 @@ from khala_protocol.recording import Recorder
 from khala_protocol.service import MAX_ORDER_BYTES, MatchCard, Stop, Submit
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+    from collections.abc import AsyncIterator, Callable
 
     from khala.service.worker import Job
     from khala_protocol.bus import Bus
@@ -197,7 +197,14 @@ async def test_each_side_may_have_its_own_model_and_half_of_the_budget(stage: St
             await client.submit(stage.bus, wanted.but(run="other", number=client.new_number(), sides=sides))
 
 
-async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage) -> None:
+async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[object] = []
+
+    async def to_thread(function: Callable[[], object]) -> object:
+        read.append(function)  # no real thread: the clock would jump ahead of it
+        return function()
+
+    monkeypatch.setattr(asyncio, "to_thread", to_thread)
     config = new("2s3z_pair", "first", Path("nowhere"), seed=7, episodes=1, assemble_s=60.0)
     card = run_card(config.model_copy(update={"game": "Khala simulator"}), GameIdentity("", "", "", ""))
     wanted = order("first").but(match={}, resume=True)
@@ -210,6 +217,7 @@ async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage) -> None:
     job = stage.playing["first"].job
     assert job is not None
     assert (job.resume, job.config.seed, job.directory) == (True, 7, stage.out / "first")
+    assert len(read) == 2
     stage.playing["first"].end("done")
     (stage.out / "first").rename(stage.out / "second")
     with pytest.raises(Refused, match="is of the run 'first'"):
