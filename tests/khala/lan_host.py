@@ -4,6 +4,7 @@ It is PySC2's own code, but for two things. It is imported with the shuffle of a
 and it says what to observe when it joins, which PySC2 says only with a window.
 """
 
+import signal
 from typing import Any
 
 from absl import app
@@ -24,5 +25,6 @@ def join_with_options(controller: RemoteController, request: Any) -> Any:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background of a shell ignores
     RemoteController.join_game = join_with_options
     app.run(play_vs_agent.main)
