@@ -215,7 +215,7 @@ class Watch:
 
     async def _cards(self, cards: Subscription[Sample]) -> None:
         async for _ in cards:
-            self.card_s, self.asked_s, self.over_s = time.monotonic(), 0.0, 0.0
+            self.card_s = time.monotonic()
 
     async def _asked(self, observations: Subscription[Sample]) -> None:
         async for _ in observations:
@@ -244,6 +244,7 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
             step, killed_s = watch.step, time.monotonic()
             host.kill()
             host.wait()
+            watch.asked_s = watch.over_s = 0.0
             if case.restart:
                 for agent in stage.agents:
                     agent.kill()
