@@ -53,7 +53,7 @@ from khala_protocol.recording import Recorder
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 
-    from khala_protocol.bus import Bus
+    from khala_protocol.bus import Bus, Publisher
     from khala_protocol.messages import Briefing
 
 RUN, BLUE, RED = "siege", "blue", "red"
@@ -318,11 +318,12 @@ class Seen:
 class Siege:
     """A match under attack; see the module. Made by `siege`."""
 
-    def __init__(self, host: Bus, turn: Turn, endpoint: str, keys: Path) -> None:
+    def __init__(self, host: Bus, reports: Publisher, turn: Turn, endpoint: str, keys: Path) -> None:
         self.endpoint, self.keys = endpoint, keys
         self.seen = Seen()
         self._turn = turn
         self._host = host
+        self._reports = reports
         self._step = 0
 
     def look(self) -> Seen:
@@ -343,6 +344,7 @@ class Siege:
             self.seen.forged += sum(FORGED.decode() in (answer.text or "") for answer in honest.values())
             self.seen.slowest_ms = max(self.seen.slowest_ms, took_ms)
             self._step += 1
+            await self._reports.put(b"secret")  # with which the recording has room for another step
             await asyncio.sleep(PAUSE_S)
 
     def _questions(self) -> Iterator[Question]:
@@ -377,10 +379,9 @@ class Siege:
     async def secrets(self, bus: Bus) -> None:
         """Publish what only the host may read."""
         exchange = await bus.publisher(f"{VICTIM}/exchange", Delivery.LOG)
-        report = await self._host.publisher(f"{ROOT}/report", Delivery.LOG)
         roaches = await self._host.publisher(agent_key(RUN, RED, "Roaches", Topic.OBSERVATION), Delivery.STATE)
         while True:
-            for publisher in (exchange, report, roaches):
+            for publisher in (exchange, roaches):
                 await publisher.put(b"secret")
             await asyncio.sleep(0.05)
 
@@ -423,7 +424,8 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         for name in players:
             await announcer.brief(briefing(task, task.agents[0].model_copy(update={"name": name}), RUN, 0))
         await roster.assemble(seats, 20)
-        match = Siege(host, turn, endpoint, keys)
+        reports = await bus.publisher(f"{ROOT}/report", Delivery.LOG)
+        match = Siege(host, reports, turn, endpoint, keys)
         for key in (f"{VICTIM}/**", f"{ROOT}/{RED}/**", f"{ROOT}/junk/**", f"{OWN}/reply"):
             running(match.tap(host, key))
         for key in STATES:
