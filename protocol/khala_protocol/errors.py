@@ -3,6 +3,7 @@
     KhalaError
     ├── ConfigError          the user's: a file, an option, an environment variable
     ├── BusError             the link's: no router, refused, closed
+    │   ├── NoRouter         nothing that could be joined is there
     │   └── BusClosed        the bus was closed, here or by the other side
     ├── PeerError            the other side's: a message that this protocol does not allow
     │   ├── MalformedMessage
@@ -58,9 +59,9 @@ class NoRouter(BusError):
         found: what is there instead, without advice.
     """
 
-    def __init__(self, found: str) -> None:
-        super().__init__(f"{found}: start one there with `khala router`, or connect elsewhere")
-        self.found = found
+    def __init__(self, text: str, *, found: str = "") -> None:
+        super().__init__(text)
+        self.found = found or text
 
 
 class BusClosed(BusError):

@@ -82,7 +82,9 @@ async def open_bus(config: BusConfig) -> ZenohBus:
     except zenoh.ZError as error:
         said = str(error)
         if "Unable to connect" in said:
-            raise NoRouter(await why_not_connected(config)) from None
+            found = await why_not_connected(config)
+            advice = "start one there with `khala router`, or connect elsewhere"
+            raise NoRouter(f"{found}: {advice}", found=found) from None
         raise BusError(why_not_listening(config, said) if config.listen_on else plain(said)) from None
     return ZenohBus(session, config)
 
