@@ -535,7 +535,7 @@ class Briefing(Wire):
     kind: Literal["briefing"] = "briefing"
     agent: str
     side: str
-    episode: int = Field(ge=0)
+    episode: Count
     episodes: int = Field(default=1, ge=1)
     """Of the run; after the result of the last one there is nothing to do."""
     role: str
@@ -558,9 +558,9 @@ class Observation(Wire):
     kind: Literal["observation"] = "observation"
     agent: str
     side: str
-    episode: int = Field(ge=0)
-    step: int = Field(ge=0)
-    game_loop: int = Field(ge=0)
+    episode: Count
+    step: Count
+    game_loop: Count
     answer_within_s: float | None
     """Seconds until the host goes on without this agent, counted from the arrival: clocks differ between machines."""
     text: str
@@ -584,8 +584,8 @@ class Reply(Wire):
     kind: Literal["reply"] = "reply"
     agent: str
     side: str
-    episode: int = Field(ge=0)
-    step: int = Field(ge=0)
+    episode: Count
+    step: Count
     text: str
     """The reply as the model gave it. The host reads from it the agent's orders, messages and subscriptions."""
     status: Literal["ok", "fallback"] = "ok"
@@ -624,8 +624,8 @@ class Message(Wire):
     agent: str
     """The sender."""
     side: str
-    episode: int = Field(ge=0)
-    step: int = Field(ge=0)
+    episode: Count
+    step: Count
     recipient: str
     """An agent or a channel."""
     text: str
@@ -648,8 +648,8 @@ class ModelCall(Wire):
     kind: Literal["exchange"] = "exchange"
     agent: str
     side: str
-    episode: int = Field(ge=0)
-    step: int = Field(ge=0)
+    episode: Count
+    step: Count
     attempt: int = Field(ge=1)
     model: str
     endpoint: str
@@ -748,9 +748,9 @@ class Report(Wire):
     kind: Literal["report"] = "report"
     side: str = "blue"
     """Whose agents these are; in a match of two sides each has a report of each step."""
-    episode: int = Field(ge=0)
-    step: int = Field(ge=0)
-    game_loop: int = Field(ge=0)
+    episode: Count
+    step: Count
+    game_loop: Count
     agents: tuple[AgentReport, ...]
     messages: tuple[Received, ...] = ()
     """What the mailbox took in this step, in the order of the agents; the next observations have what it could
@@ -779,7 +779,7 @@ class Result(Wire):
 
     kind: Literal["result"] = "result"
     side: str = "blue"
-    episode: int = Field(ge=0)
+    episode: Count
     outcome: Ending
     cause: str
     """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`, `agents gone`; against a guest also
@@ -793,7 +793,7 @@ class Result(Wire):
     """Number of decisions of the agents."""
     env_steps: int = 0
     """Number of `SC2Env.step` calls for them: one each with the raw executor, many with the screen executor."""
-    game_loop: int
+    game_loop: Count
     game_s: float
     wall_s: float
     killed: Casualties
