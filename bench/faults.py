@@ -25,7 +25,6 @@ import random
 import re
 import resource
 import signal
-import socket
 import statistics
 import sys
 import tempfile
@@ -304,16 +303,7 @@ class Arena:
                 what = ["agent", name, "--run", RUN, "--connect", link, "--policy", self.agent]
         self.running[name] = self.processes.start(name, *what)
         if name == "router":
-            await self._until_listening()
-
-    async def _until_listening(self) -> None:
-        async with asyncio.timeout(30):
-            while True:
-                with contextlib.suppress(OSError):
-                    _, writer = await asyncio.open_connection("127.0.0.1", self.port)
-                    writer.transport.abort()
-                    return
-                await asyncio.sleep(0.005)
+            await until_listening(self.port)
 
     async def follow(self, bus: Bus) -> None:
         """Look at reports until cancelled."""
@@ -591,7 +581,7 @@ def full_disk(processes: Processes, rule: str) -> bool:
     endpoint = f"tcp/127.0.0.1:{port}"
     host = processes.start("full", "host", str(task), "--run", "full", "--listen", endpoint, "--out", str(out))
     resource.prlimit(host.pid, resource.RLIMIT_FSIZE, (30_000, 30_000))
-    _until_listens(port)
+    asyncio.run(until_listening(port))
     agent = processes.start("full-agent", "agent", *AGENTS, "--run", "full", "--connect", endpoint,
                             "--policy", "bench.faults:decide")  # fmt: skip
     code = host.wait(FULL_DISK_S)
@@ -600,11 +590,19 @@ def full_disk(processes: Processes, rule: str) -> bool:
     return said and (code == 0 if rule == "go_on" else code not in {0, 3})
 
 
-def _until_listens(port: int) -> None:
-    for _ in range(300):
-        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
-            return
-        time.sleep(0.1)
+async def until_listening(port: int) -> None:
+    """Return when somebody listens there.
+
+    Raises:
+        TimeoutError: nobody does within 30 s.
+    """
+    async with asyncio.timeout(30):
+        while True:
+            with contextlib.suppress(OSError):
+                _, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.transport.abort()
+                return
+            await asyncio.sleep(0.005)
 
 
 def table(verdict: Verdict) -> Table:

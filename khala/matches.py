@@ -109,7 +109,7 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
 
 def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
     """Return the match of a recording, or of the newest one in the directory of a run, and what was played of it."""
-    past = unfinished(Recording.open(newest_recording(_run_at(path, out))))
+    past = unfinished(newest_recording(_run_at(path, out)))
     changes = {"record": free_recording(out / past.config.run), "assemble_s": assemble_s}
     return past.config.model_copy(update=changes), past
 
@@ -123,15 +123,16 @@ def _run_at(path: Path, out: Path) -> Path:
     raise ConfigError(f"there is no {path}, and no {out / path}: give a run, its directory, or a .mcap file")
 
 
-def newest_recording(path: Path) -> Path:
+def newest_recording(path: Path) -> Recording:
     """Return the recording at a path, or the newest one with a run card in the directory of a run."""
     if not path.is_dir():
-        return path
+        return Recording.open(path)
     found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
     if not found:
         raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
-    begun = (path for path in reversed(found) if Recording.open(path).run is not None)
-    return next(begun, found[-1])
+    opened = map(Recording.open, reversed(found))  # a scan each: only as many as it takes
+    newest = next(opened)
+    return next((one for one in itertools.chain([newest], opened) if one.run is not None), newest)
 
 
 def free_recording(directory: Path) -> Path:
