@@ -11,6 +11,15 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+LONG_S = 600.0
+"""What a long test may take unless it says otherwise: several times what it takes, for slow machines."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONG_S))
+
 
 class _JumpingSelector(selectors.DefaultSelector):
     """Never waits: where a loop would, the clock jumps ahead. Only threads are waited for, for real."""

@@ -231,7 +231,6 @@ asyncio.run(spy(*sys.argv[1:]))
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # seven processes begin, one after the other
 async def test_the_sides_of_a_duel_play_from_two_machines_and_read_nothing_of_each_other(
     machines: tuple[Machine, Machine, Machine],
 ) -> None:

@@ -27,7 +27,6 @@ async def test_the_tokens_of_a_match_and_not_the_time_they_took_decide_it(tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 @pytest.mark.parametrize("seed", [2, 3])
 async def test_a_match_repeats_under_every_rule_that_waits_and_replays_under_all(seed: int, tmp_path: Path) -> None:
     rows = await measure("2s3z_pair", [seed], tmp_path)
@@ -46,7 +45,6 @@ async def test_in_real_time_the_wall_clock_decides_and_the_recording_replays(tmp
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(200)
 async def test_agents_of_every_pace_play_in_one_match(tmp_path: Path) -> None:
     figures = await measure_pace((0.1, 0.4, 1.0, 3.0), 30, tmp_path, speed=2)
     decisions = [agent.decisions for agent in figures.agents]

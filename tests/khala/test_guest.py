@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 pytestmark = [
     pytest.mark.game,
     pytest.mark.slow,
-    pytest.mark.timeout(300),
     pytest.mark.skipif(not importlib.util.find_spec("sc2"), reason="burnysc2 is not installed: run `make install`"),
 ]
 

@@ -20,7 +20,7 @@ from khala_orchestrator.config import MatchConfig, change, load_task
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-pytestmark = [pytest.mark.game, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.game, pytest.mark.slow]
 
 HOST = Path(__file__).with_name("lan_host.py")
 

@@ -16,7 +16,7 @@ BOTS = ROOT / "tests" / "simulator" / "live" / "python_sc2_bots.py"
 UV = shutil.which("uv") or str(ROOT / ".uv" / "bin" / "uv")
 GAME_PARTS = {"numpy", "opencv-python-headless", "protobuf", "pygame", "pysc2", "scipy", "sk-video"}
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.slow
 
 BOTH_IMPORTS = """
 import agents

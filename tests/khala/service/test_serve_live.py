@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Wire
     from khala_protocol.service import MatchCard
 
-pytestmark = [pytest.mark.game, pytest.mark.slow, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.game, pytest.mark.slow]
 
 WITHIN_S = 90.0
 """Of two cores that other tests use as well."""

@@ -77,7 +77,6 @@ def test_random_orders_of_every_kind_break_nothing_and_end_the_same_in_two_proce
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", PLAYGROUNDS)
 def test_two_thousand_loops_of_random_orders_end_the_same_in_two_processes(name: str) -> None:
     assert by_lot(name, 2000, "1") == by_lot(name, 2000, "2")

@@ -61,7 +61,6 @@ SLOW = [
     "tests.replay_obs_test.ReplayObsTest.test_replay_observations_match",
     "tests.observer_test.TestObserver.test_observer",
 ]
-LONG = [pytest.mark.slow, pytest.mark.timeout(600)]
 WITHOUT_A_GAME = {"tests.dummy_observation_test"}
 
 
@@ -81,7 +80,7 @@ def test_every_game_test_of_pysc2_is_listed_once() -> None:
     assert sorted([*SHORT, *SLOW]) == sorted(_all_tests())
 
 
-@pytest.mark.parametrize("name", [*SHORT, *(pytest.param(name, marks=LONG) for name in SLOW)])
+@pytest.mark.parametrize("name", [*SHORT, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 @pytest.mark.filterwarnings("ignore")  # of PySC2 and what it imports
 def test_pysc2_says_ok(name: str, sc2: Path, no_process_left: None) -> None:
     suite = unittest.defaultTestLoader.loadTestsFromName(f"pysc2.{name}")
