@@ -131,7 +131,7 @@ async def test_a_recording_reads_the_modules_that_are_allowed(foreign: Recording
     assert any('"text":"seen' in found.sent for found in differences)
 
 
-def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_played_again(
+async def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_played_again(
     recording: Recording, tmp_path: Path
 ) -> None:
     task = change(load_task("simple64_terran"), opponent="guest:rm -r x").model_dump(mode="json")

@@ -84,8 +84,9 @@ def test_many_openings_and_a_far_end_take_linear_time(seed: int) -> None:
     [
         ("x" * MAX_REPLY_CHARACTERS + "<Stop()>", "the reply is longer than 65536 characters"),
         ("<Stop()>" * 1_001, "the reply has more than 1000 calls"),
+        ("x\n" * 4_000 + "<Stop()>", "the reply has more than 4000 lines"),
     ],
-    ids=["characters", "calls"],
+    ids=["characters", "calls", "lines"],
 )
 def test_what_is_not_read_of_a_reply_is_reported(text: str, message: str) -> None:
     fault = parse(text).faults[-1]

@@ -12,7 +12,7 @@
 `parse` tolerates what models write and is exact in what it reports: text with only one possible meaning is read as
 that, any other text that looks like a call is a `Rejection` with its place and a sentence that the model can act on,
 and affects nothing else. Nothing raises, the time is linear in the length of the text (a reply is read up to
-`MAX_REPLY_CHARACTERS`), and a call that is cut off is never guessed at.
+`MAX_REPLY_CHARACTERS`, and up to 4 000 lines and 1 000 calls), and a call that is cut off is never guessed at.
 
 This package knows no unit, no action and no game: the bridge decides whether a name, a tag or a team exists.
 These are the rules of tolerance, in addition to those of headings (H, `khala_protocol.speech.headings`) and arguments

@@ -58,6 +58,8 @@ if TYPE_CHECKING:
 MAX_REPLY_CHARACTERS = 65_536
 """The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
 
+MAX_LINES = 4_000
+"""Number of lines that are read, without empty ones: 33 000 of them, as many as fit, would take a third of a second."""
 
 MAX_FOUND = 1_000
 """Number of calls, messages and faults that are read: 9 000 of them, as many as fit, would take a third of a second."""
@@ -69,7 +71,7 @@ def parse(text: str) -> Speech:
     try:
         walk.run()
     except _TooManyError as error:
-        return _incomplete(walk, text, error.start, f"the reply has more than {MAX_FOUND} calls")
+        return _incomplete(walk, text, error.start, f"the reply has more than {error}")
     if len(text) > MAX_REPLY_CHARACTERS:
         said = f"the reply is longer than {MAX_REPLY_CHARACTERS} characters"
         return _incomplete(walk, text, MAX_REPLY_CHARACTERS, said)
@@ -77,7 +79,8 @@ def parse(text: str) -> Speech:
 
 
 class _TooManyError(Exception):
-    def __init__(self, start: int) -> None:
+    def __init__(self, what: str, start: int) -> None:
+        super().__init__(what)
         self.start = start
 
 
@@ -121,6 +124,7 @@ class _Walk:
         self._text = text
         self._plain = to_ascii(text)
         self._messages = MessageReader(self._plain)
+        self._lines = 0
         self._found = 0
         self._start_over()
 
@@ -173,6 +177,9 @@ class _Walk:
         return self._angle(mark.start())
 
     def _line(self, at: int) -> int:
+        self._lines += 1
+        if self._lines > MAX_LINES:
+            raise _TooManyError(f"{MAX_LINES} lines", at)
         if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
             return len(self._plain)
         at = self._headings(at, line_start=True)
@@ -369,7 +376,7 @@ class _Walk:
     def _count(self, start: int) -> None:
         self._found += 1
         if self._found > MAX_FOUND:
-            raise _TooManyError(start)
+            raise _TooManyError(f"{MAX_FOUND} calls", start)
 
     def _section_at(self, start: int) -> ReplySection:
         """Return the section at this place."""
