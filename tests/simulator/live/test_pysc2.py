@@ -31,13 +31,13 @@ def focus(timestep: Any) -> sc.Action:
     return command(3674, tags(timestep, features.PlayerRelative.SELF), target=enemies[0]) if enemies else sc.Action()
 
 
-def test_the_first_observation_is_there_within_a_second_and_a_half(make_env: MakeEnv) -> None:
+def test_the_first_observation_is_there_soon(make_env: MakeEnv) -> None:
     started_s = time.monotonic()
     timestep = make_env().reset()[0]
     duration_s = time.monotonic() - started_s
     assert timestep.first()
     assert len(timestep.observation.feature_units) == 10
-    assert duration_s < 3.0  # 1.1 s on an idle machine; PySC2 itself waits 1 s before its second try
+    assert duration_s < 10.0  # 1.1 s on an idle machine, of which PySC2 waits 1 s; 4.5 s on a busy slow one
 
 
 def test_a_battle_is_played_to_its_end_by_raw_actions(make_env: MakeEnv, no_process_left: None) -> None:
