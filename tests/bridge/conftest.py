@@ -99,7 +99,7 @@ def snapshot() -> Callable[..., Snapshot]:
     return make_snapshot
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def task() -> Callable[..., TaskConfig]:
     """Return a shipped task by name, or the standard task of a map, with the given changes."""
 

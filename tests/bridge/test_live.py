@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -82,8 +83,9 @@ def sc2path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return install(tmp_path_factory.mktemp("sc2"))
 
 
-@pytest.fixture
-def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
+@contextlib.contextmanager
+def starting(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
+    """Start battles, and close them all at the end."""
     games: list[PySC2Game] = []
 
     def begin(executor: str, name: str = "2s3z") -> Battle:
@@ -94,6 +96,19 @@ def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
     yield begin
     for game in games:
         game.close()
+
+
+@pytest.fixture
+def start(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Play]:
+    with starting(sc2path, task) as begin:
+        yield begin
+
+
+@pytest.fixture(scope="module")
+def finished(sc2path: Path, task: Callable[..., TaskConfig]) -> Iterator[Battle]:
+    """Yield a battle that was played to its end."""
+    with starting(sc2path, task) as begin:
+        yield begin("raw").to_the_end()
 
 
 BATTLES = [name for name, spec in known_maps().items() if spec.file.startswith("llm_smac/")]
@@ -131,8 +146,8 @@ def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name:
 
 
 @pytest.mark.parametrize("executor", ["raw", "screen"])
-def test_a_battle_is_played_to_its_end(executor: str, start: Play) -> None:
-    battle = start(executor).to_the_end()
+def test_a_battle_is_played_to_its_end(executor: str, start: Play, finished: Battle) -> None:
+    battle = finished if executor == "raw" else start(executor).to_the_end()
     assert battle.now.outcome in ("win", "loss")  # five against five do not last until the time is up
     assert len(battle.turns) > 10
     assert set(battle.reasons) <= {"refused_by_game"}
@@ -159,13 +174,12 @@ def _orders(battle: Battle) -> dict[int, list[tuple[int, int]]]:
     return {u.tag: [(o.ability_id, o.target_unit_tag) for o in u.orders] for u in battle.now.own}
 
 
-def test_the_same_seed_and_replies_give_the_same_observations(start: Play) -> None:
-    first, second = (start("raw").to_the_end() for _ in range(2))
-    assert first.texts == second.texts
+def test_the_same_seed_and_replies_give_the_same_observations(start: Play, finished: Battle) -> None:
+    assert start("raw").to_the_end().texts == finished.texts
 
 
-def test_an_episode_that_is_over_is_not_played_on_but_reset(start: Play) -> None:
-    battle = start("raw").to_the_end()
+def test_an_episode_that_is_over_is_not_played_on_but_reset(finished: Battle) -> None:
+    battle = finished
     with pytest.raises(GameError, match="the episode is over: the game has to be reset before it is played on"):
         battle.game.act([battle.executor.plan([], battle.now, 8)])
     (fresh,) = battle.game.reset()

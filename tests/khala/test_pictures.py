@@ -111,8 +111,8 @@ async def play(connect: Connect, path: Path) -> Looking:
             for step in range(len(STEPS)):
                 answers = await turn.ask([question(step)])
                 assert answers.by_seat[SEAT].status == "ok"
-        stop.set()
-        await worker
+            stop.set()
+            await worker  # Zenoh undeclares a publisher for 10 s, with the GIL, while its reader is in this process
     return policy
 
 

@@ -19,18 +19,18 @@ SHORT = [
     "tests.general_actions_test.TestGeneralActions.test_general_actions",
     "tests.render_test.TestRender.test_render",
     "tests.step_mul_override_test.StepMulOverrideTest.test_respects_override",
-    "tests.multi_player_test.TestMultiplayer.test_multi_player",
+    "tests.obs_test.ObsTest.test_camera_movement_delay",
     "tests.obs_spec_test.TestObservationSpec.test_observation_matches_obs_spec",
-    "tests.obs_test.ObsTest.test_show_cloaked",
 ]
-"""One for each part of the API that PySC2 tests by itself."""
+"""One for each part of the API that PySC2 tests by itself, but games over LAN, which `test_python_sc2` plays."""
 SLOW = [
     "tests.protocol_error_test.TestProtocolError.test_replay_a_replay",
     "tests.debug_test.DebugTest.test_multi_player",
     "tests.versions_test.TestVersions.test_version_numbers",
     "tests.versions_test.TestVersions.test_versions_create_game",
     "tests.step_mul_override_test.StepMulOverrideTest.test_returns_game_loop_zero_on_first_step_despite_override",
-    "tests.obs_test.ObsTest.test_camera_movement_delay",
+    "tests.multi_player_test.TestMultiplayer.test_multi_player",
+    "tests.obs_test.ObsTest.test_show_cloaked",
     "tests.obs_test.ObsTest.test_action_delay",
     "tests.obs_test.ObsTest.test_fog",
     "tests.obs_test.ObsTest.test_pos",
