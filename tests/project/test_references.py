@@ -108,11 +108,17 @@ def exists(path: str, mentioned_in: Path) -> bool:
         return True
     pattern = re.sub(r"<[^>]*>", "*", path).rstrip("/")
     places = (ROOT, mentioned_in.parent, *around(mentioned_in))
-    if any(next(place.glob(pattern), None) is not None for place in places):
+    if any(leads(place, pattern) for place in places):
         return True
     return "/" not in pattern and any(
         fnmatch(file.name, pattern) for file in files() for place in around(mentioned_in) if file.is_relative_to(place)
     )
+
+
+@functools.cache
+def leads(place: Path, pattern: str) -> bool:
+    """True if a path with or without `*` leads somewhere."""
+    return next(place.glob(pattern), None) is not None if "*" in pattern else (place / pattern).exists()
 
 
 def around(file: Path) -> list[Path]:

@@ -575,9 +575,9 @@ def seconds(text: str) -> float:
 @pytest.mark.parametrize("prefix", ["", pytest.param("<MessageTo(A, '", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("piece", HARD)
 def test_time_grows_with_the_length_and_no_faster(piece: str, prefix: str) -> None:
-    short = min(seconds(prefix + piece * (5_000 // len(piece))) for _ in range(3))
-    long = min(seconds(prefix + piece * (20_000 // len(piece))) for _ in range(3))
-    assert long < 8 * short + 0.02  # 4 if it is linear, 16 if it is quadratic
+    short, long = (prefix + piece * (size // len(piece)) for size in (5_000, 20_000))
+    # 4 if it is linear, 16 if it is quadratic; noise lengthens it now and then
+    assert any(seconds(long) < 8 * seconds(short) + 0.02 for _ in range(5))
 
 
 @pytest.mark.parametrize(

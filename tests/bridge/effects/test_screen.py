@@ -38,8 +38,9 @@ def test_both_executors_do_the_same(group: list[Case], stage_of: Stages, subtest
 
 
 def do_the_same(case: Case, stage_of: Stages) -> None:
-    raw = perform(case, stage_of(case), RawExecutor())
-    screen = perform(case, stage_of(case, layers=True), ScreenExecutor(), said=raw.text)
+    stage = stage_of(case, layers=True)
+    raw = perform(case, stage, RawExecutor())
+    screen = perform(case, stage, ScreenExecutor(), said=raw.text)
     if why := reason(case.action.name, BY_SCREEN):
         assert screen.words == frozenset(), f"it has an effect, though {why}: it has to leave the table"
     else:

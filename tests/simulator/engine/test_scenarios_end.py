@@ -72,7 +72,13 @@ ENDS = [
     ),
     ("pvz_task6_level1", [(1, "HighTemplar", 0), (1, "Stalker", 0), (1, "Sentry", 0), (1, "Archon", 0)], 160, DEFEAT),
     ("pvz_task8_level1", [(2, "Drone", 6), (2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)], 160, VICTORY),
-    ("pvz_task8_level1", [(2, "Drone", 7), (2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)], 1920, TIE),
+    pytest.param(
+        "pvz_task8_level1",
+        [(2, "Drone", 7), (2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)],
+        1920,
+        TIE,
+        marks=pytest.mark.slow,
+    ),
 ]
 
 

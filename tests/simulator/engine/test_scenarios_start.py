@@ -168,9 +168,12 @@ ONE_OF_A_FAMILY = {
 }
 
 
-@pytest.mark.parametrize(
+EVERY_MAP = pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[] if n in ONE_OF_A_FAMILY else [pytest.mark.slow]) for n in map_names()]
 )
+
+
+@EVERY_MAP
 def test_every_map_plays_300_loops_without_orders(name: str) -> None:
     world = new_game(load_map(name), seed=3)
     advance(world, 300)
@@ -182,13 +185,12 @@ def test_every_map_plays_300_loops_without_orders(name: str) -> None:
     assert np.isfinite(world.life[world.live]).all()
 
 
-def test_nobody_begins_inside_a_wall(subtests: pytest.Subtests) -> None:
-    for name in map_names():
-        with subtests.test(name):
-            world = begun(name)
-            ground = [s for s in world.live.tolist() if not world.walled[s] and world.layer[s] == Layer.WALK]
-            cells = world.pos[ground].astype(np.int64)
-            assert world.map.terrain.walk[cells[:, 1], cells[:, 0]].all()
+@EVERY_MAP
+def test_nobody_begins_inside_a_wall(name: str) -> None:
+    world = begun(name)
+    ground = [s for s in world.live.tolist() if not world.walled[s] and world.layer[s] == Layer.WALK]
+    cells = world.pos[ground].astype(np.int64)
+    assert world.map.terrain.walk[cells[:, 1], cells[:, 0]].all()
 
 
 def test_energies_and_facings_are_those_of_the_map() -> None:

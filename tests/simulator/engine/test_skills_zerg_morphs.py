@@ -38,7 +38,7 @@ def rules(does: str, *, named: str = "") -> list[Any]:
             fits = ability.effect == does and ability.name.startswith(named) and users
             if fits and catalog.unit(users[0]).race == "zerg":
                 same = version != VERSIONS[0] and any(a == ability and a.numbers == ability.numbers for a in usual)
-                marks = [pytest.mark.slow] if same else []
+                marks = [pytest.mark.slow] if same or ability.name == "Morph Hive" else []  # 3 s, and as a Lair
                 found.append(pytest.param(version, ability, id=f"{version}-{ability.name}", marks=marks))
     return found
 
