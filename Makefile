@@ -47,8 +47,8 @@ test: install ## Lint, types, contracts and every short test
 pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the others
 	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
 
-slow: install ## All long tests: whole tables, those of PySC2, random agents, long games, every scenario
-	$(RUN)pytest $(PARALLEL) -m slow
+slow: install ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
+	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
 cover: install ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*

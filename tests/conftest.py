@@ -1,4 +1,4 @@
-"""A clock that jumps, for every test that waits."""
+"""A clock that jumps, for every test that waits; how long a test may take, and how many examples it tries."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ import selectors
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 LONG_S = 600.0
 """What a long test may take unless it says otherwise: several times what it takes, for slow machines."""
+
+settings.register_profile("short", max_examples=30, deadline=None)
+settings.register_profile("long", max_examples=300, deadline=None)  # of `make slow`
+settings.load_profile("short")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -76,7 +76,8 @@ def in_code(file: Path, source: str) -> Iterator[Mention]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield Mention(file, node.body[0].lineno if node.body else 1, ast.get_docstring(node) or "")
     for number, line in enumerate(source.splitlines(), start=1):
-        yield Mention(file, number, line.partition("#")[2])
+        if "#" in line:
+            yield Mention(file, number, line.partition("#")[2])
 
 
 @functools.cache
@@ -110,9 +111,13 @@ def exists(path: str, mentioned_in: Path) -> bool:
     places = (ROOT, mentioned_in.parent, *around(mentioned_in))
     if any(leads(place, pattern) for place in places):
         return True
-    return "/" not in pattern and any(
-        fnmatch(file.name, pattern) for file in files() for place in around(mentioned_in) if file.is_relative_to(place)
-    )
+    return "/" not in pattern and any(fnmatch(name, pattern) for place in around(mentioned_in) for name in below(place))
+
+
+@functools.cache
+def below(place: Path) -> frozenset[str]:
+    """The names of the files in a folder and in those below it."""
+    return frozenset(file.name for file in files() if file.is_relative_to(place))
 
 
 @functools.cache

@@ -92,7 +92,7 @@ MESSAGE_BYTES = (
 
 @pytest.mark.parametrize("model", MESSAGE_TYPES, ids=lambda model: model.__name__)
 def test_every_message_comes_back_as_it_was(model: type[Wire]) -> None:
-    @settings(deadline=None, max_examples=40, suppress_health_check=list(HealthCheck))
+    @settings(suppress_health_check=list(HealthCheck))
     @given(built(model))
     def comes_back(message: Wire) -> None:
         payload = encode(message)

@@ -40,7 +40,7 @@ def within(pages: Any) -> Any:
     return functools.cache(lambda agent, budget: pages(**{agent: budget})[agent])
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(agent=st.sampled_from(sorted(AGENTS)), budget=st.integers(SMALLEST, 2500))
 def test_a_page_is_within_its_budget_or_the_declared_minimum(
     agent: str, budget: int, within: Any, full: dict[str, str], shortest: dict[str, str]
@@ -51,7 +51,7 @@ def test_a_page_is_within_its_budget_or_the_declared_minimum(
     assert text == full[agent] or tokens(full[agent]) + ROUNDING > budget
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(agent=st.sampled_from(sorted(AGENTS)), budget=st.integers(SMALLEST, 2500))
 def test_no_line_is_cut_and_none_is_made_up(agent: str, budget: int, within: Any, full: dict[str, str]) -> None:
     known = {*full[agent].splitlines()}

@@ -630,7 +630,7 @@ ui_actions = st.one_of(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(deadline=None)
 @given(st.lists(st.lists(raw_actions | spatial_actions | ui_actions, max_size=5), min_size=1, max_size=6))
 def test_no_action_breaks_a_game(rounds: list[list[sc.Action]]) -> None:
     client = Client()

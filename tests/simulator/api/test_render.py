@@ -98,7 +98,7 @@ def test_the_same_moment_is_painted_the_same(make_table: Any) -> None:
     assert (one.overview() == other.overview()).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(deadline=None)
 @given(
     screen=st.tuples(st.integers(1, 90), st.integers(1, 90)),
     minimap=st.tuples(st.integers(1, 40), st.integers(1, 40)),
