@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import selectors
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(LONG_S))
+
+
+def pytest_collection_finish() -> None:
+    """Leave the 400 000 objects of the tests themselves out of every later garbage collection: 0.25 s each."""
+    gc.collect()
+    gc.freeze()
 
 
 class _JumpingSelector(selectors.DefaultSelector):

@@ -85,9 +85,9 @@ class Processes:
 @pytest.mark.game
 def test_a_killed_match_leaves_no_process_and_only_its_host_had_the_key(tmp_path: Path) -> None:
     processes = Processes(tmp_path)
-    with processes.playing("run", "2s3z_pair", "--latency", "0.05") as host:
+    with processes.playing("run", "2s3z", "--latency", "0.05") as host:
         found = processes.environs()
-        assert len(found) == 5  # host, game, endpoint, two agents
+        assert len(found) == 4  # host, game, endpoint, agent
         assert [pid for pid, text in found.items() if KEY.encode() in text] == [host.pid]
         host.kill()
         host.wait()

@@ -294,7 +294,7 @@ def test_an_agent_that_cannot_begin_ends_the_match_with_its_own_words(tmp_path: 
 def test_a_signal_ends_everything_and_leaves_a_readable_recording(
     tmp_path: Path, sent: signal.Signals, code: int
 ) -> None:
-    command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.05", "--run", "cut"]
+    command = [sys.executable, "-m", "khala", "run", "2s3z", "--latency", "0.05", "--run", "cut"]
     environ = os.environ | {"KHALA_CACHE": str(tmp_path / "cache")}
     with subprocess.Popen(command, cwd=tmp_path, env=environ, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import typer.main
 import yaml
+from check_jsonschema import main as check_jsonschema
+from click.testing import CliRunner
 
 from khala.cli import app
 from khala.doctor import KEYS
@@ -38,10 +39,9 @@ every_service = pytest.mark.parametrize("service", SERVICES)
 
 def complaints(*files: Path) -> str:
     """Return the complaints of the compose specification's schema about files; empty if nothing is wrong."""
-    checker = (sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec")
-    done = subprocess.run([*checker, *files], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert not done.stderr
-    return done.stdout if done.returncode else ""
+    with contextlib.chdir(ROOT):
+        done = CliRunner().invoke(check_jsonschema, ["--builtin-schema", "vendor.compose-spec", *map(str, files)])
+    return done.stdout if done.exit_code else ""
 
 
 def test_compose_files_are_what_the_specification_wants() -> None:

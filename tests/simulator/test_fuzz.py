@@ -113,7 +113,10 @@ STARTS = {state.name: partial(prepare, state) for state in Status if state is no
 
 
 @pytest.mark.parametrize("start", STARTS.values(), ids=STARTS)
-@settings(max_examples=settings.default.max_examples // 3, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(
+    max_examples=settings.default.max_examples // 3,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
 @given(data=st.data())
 def test_no_request_breaks_a_session(start: Callable[[], Client], data: st.DataObject) -> None:
     client = start()
@@ -151,7 +154,10 @@ async def begin_over_lan() -> list[Session]:
     return sessions
 
 
-@settings(max_examples=settings.default.max_examples // 5, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(
+    max_examples=settings.default.max_examples // 5,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
 @given(data=st.data())
 def test_no_request_breaks_a_game_over_lan(data: st.DataObject) -> None:
     async def play(sessions: list[Session]) -> None:

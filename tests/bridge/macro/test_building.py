@@ -77,7 +77,7 @@ def test_the_game_accepts_the_place_that_is_found(rich: Callable[..., Game], nam
     assert min(math.dist(place, (hall.pos.x, hall.pos.y)) for hall in land.own_halls) < 16
 
 
-@pytest.mark.parametrize("race", RACES)
+@pytest.mark.parametrize("race", [r if r != "zerg" else pytest.param(r, marks=pytest.mark.slow) for r in RACES])
 @pytest.mark.parametrize("name", ["Simple64", pytest.param("Flat64", marks=pytest.mark.slow)])
 def test_a_whole_base_can_be_built_and_nobody_is_walled_in(
     make_game: Callable[..., Game], name: str, race: str

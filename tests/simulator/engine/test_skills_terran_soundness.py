@@ -76,7 +76,7 @@ def played(make_field: Any, version: str, seed: int) -> Any:
     return world
 
 
-@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("version", [pytest.param(VERSIONS[0], marks=pytest.mark.slow), *VERSIONS[1:]])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_random_orders_leave_the_world_sound(make_field: Any, version: str, seed: int) -> None:
     assert played(make_field, version, seed).loop == LOOPS

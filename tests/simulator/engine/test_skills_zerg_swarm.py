@@ -52,7 +52,9 @@ def those(field: Any, name: str) -> list[int]:
 # larvae ---------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("hall", [larvae.HALLS[0], *(pytest.param(h, marks=pytest.mark.slow) for h in larvae.HALLS[1:])])
+@pytest.mark.parametrize(
+    "hall", [larvae.HALLS[0], *(pytest.param(h, marks=pytest.mark.slow) for h in larvae.HALLS[1:])]
+)
 def test_a_town_hall_hatches_up_to_three_larvae(field: Any, hall: str) -> None:
     field.play(2)
     slot = field.put(hall, 1, 32.5, 32.5)

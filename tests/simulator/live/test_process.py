@@ -68,7 +68,9 @@ async def test_the_data_version_of_the_command_line_is_told(launch: Launch, port
         assert (await ask(ws, ping=sc.RequestPing())).ping.data_version == "B89B5D6FA7CBF6452E721311BFBC6CB2"
 
 
-@pytest.mark.parametrize("how", ["quit", "SIGTERM", "SIGTERM in a step", "SIGTERM in a LAN wait"])
+@pytest.mark.parametrize(
+    "how", ["quit", pytest.param("SIGTERM", marks=pytest.mark.slow), "SIGTERM in a step", "SIGTERM in a LAN wait"]
+)
 async def test_the_process_ends_at_once(launch: Launch, port: int, how: str) -> None:
     process = launch(port)
     async with connect(port) as ws:
@@ -123,7 +125,7 @@ def lan_join(port: int) -> sc.RequestJoinGame:
     return sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0), server_ports=ports)
 
 
-@pytest.mark.parametrize("killed", ["host", "guest"])
+@pytest.mark.parametrize("killed", ["host", pytest.param("guest", marks=pytest.mark.slow)])
 async def test_a_kill_ends_the_game_over_lan_and_not_the_other_process(launch: Launch, killed: str) -> None:
     ports = [free_port() for _ in range(3)]
     processes = [launch(number) for number in ports[:2]]

@@ -84,9 +84,7 @@ def quiet() -> None:
     logging.set_verbosity(logging.ERROR)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in ("RandomTask6", "Simple64") else [pytest.mark.slow]) for n in MAPS]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n == "Simple64" else [pytest.mark.slow]) for n in MAPS])
 @pytest.mark.filterwarnings("ignore")  # of PySC2
 def test_a_random_agent_meets_no_fault(
     name: str, make_env: Callable[..., Any], capfd: pytest.CaptureFixture[str]
