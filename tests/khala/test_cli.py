@@ -165,7 +165,7 @@ def test_what_the_user_can_mend_is_one_sentence_and_no_traceback(
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """Return where a match of four steps was played, by a model whose key is in the environment, and what it printed."""
+    """Return where four steps were played, by a model whose key is in the environment, and what was printed."""
     place = tmp_path_factory.mktemp("played")
     llm = [sys.executable, "-m", "khala", "llm", "--port", "0", "--latency", "0", "--json"]
     with subprocess.Popen(llm, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as endpoint:

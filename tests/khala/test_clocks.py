@@ -21,7 +21,7 @@ SPEED = 8.0
 
 
 async def test_the_tokens_of_a_match_and_not_the_time_they_took_decide_it(tmp_path: Path) -> None:
-    (row,) = await measure("2s3z_pair", [1], tmp_path, rules=("token",), max_steps=6)
+    (row,) = await measure("2s3z_pair", [1], tmp_path, rules=("token",), max_steps=4)
     assert row.violations() == []
     assert min(row.played[-1].ages_loops) > 0
 
@@ -35,7 +35,7 @@ async def test_a_match_repeats_under_every_rule_that_waits_and_replays_under_all
 
 
 async def test_in_real_time_the_wall_clock_decides_and_the_recording_replays(tmp_path: Path) -> None:
-    task = change(load_task("2s3z_pair"), rule="realtime", speed=SPEED, max_steps=24)
+    task = change(load_task("2s3z_pair"), rule="realtime", speed=SPEED, max_steps=12)
     played = await play(MatchConfig(task=task, run="real"), tmp_path / "real.mcap", 0.3)
     assert played.differences == 0
     assert min(played.ages_loops) > 0

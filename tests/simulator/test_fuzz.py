@@ -31,6 +31,7 @@ SCALARS: dict[int, st.SearchStrategy[Any]] = {
     FieldDescriptor.CPPTYPE_BOOL: st.booleans(),
 }  # fmt: skip
 PATHS = st.sampled_from(["", "2s3z", "llm_smac/2s3z.SC2Map", "../x", "\0", "x" * 300, "/"])
+SLOW = [HealthCheck.too_slow, HealthCheck.filter_too_much]
 LONG = 200
 """Loops in one step at most: the fuzzing is about requests, not about patience."""
 
@@ -113,10 +114,7 @@ STARTS = {state.name: partial(prepare, state) for state in Status if state is no
 
 
 @pytest.mark.parametrize("start", STARTS.values(), ids=STARTS)
-@settings(
-    max_examples=settings.default.max_examples // 3,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
+@settings(max_examples=settings().max_examples // 3, suppress_health_check=SLOW)
 @given(data=st.data())
 def test_no_request_breaks_a_session(start: Callable[[], Client], data: st.DataObject) -> None:
     client = start()
@@ -154,10 +152,7 @@ async def begin_over_lan() -> list[Session]:
     return sessions
 
 
-@settings(
-    max_examples=settings.default.max_examples // 5,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
+@settings(max_examples=settings().max_examples // 5, suppress_health_check=SLOW)
 @given(data=st.data())
 def test_no_request_breaks_a_game_over_lan(data: st.DataObject) -> None:
     async def play(sessions: list[Session]) -> None:

@@ -118,7 +118,7 @@ PLAYS = {
 @pytest.fixture(scope="module")
 def game(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PySC2Game]:
     sc2path = install(tmp_path_factory.mktemp("sc2"))
-    game = PySC2Game(GameConfig(sc2path=sc2path, map=known_maps()["Simple64"], seed=3, limit_loops=2000))
+    game = PySC2Game(GameConfig(sc2path=sc2path, map=known_maps()["Simple64"], seed=3, limit_loops=600))
     yield game
     game.close()
 
@@ -163,7 +163,7 @@ def test_what_units_can_do_is_asked_once_an_observation_and_not_after_the_end(ga
     assert now.abilities is not None
     assert now.abilities.keys() == {unit.tag for unit in now.own}
     while not now.ended:
-        (turn,) = game.act([RawExecutor().plan([], now, 500)])
+        (turn,) = game.act([RawExecutor().plan([], now, 200)])
         now = turn.snapshot
     assert now.abilities is None
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 RACES = ("protoss", "terran", "zerg")
 SIDE = 64
-EXAMPLES = settings.default.max_examples // 3
+EXAMPLES = settings().max_examples // 3
 """Of each promise and race."""
 FIRST, STEP = 0x100040001, 0x40000
 FOE, FIELD, GEYSER, PYLON = 0x200040001, 0x200080001, 0x2000C0001, 0x200100001
