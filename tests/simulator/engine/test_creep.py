@@ -36,7 +36,7 @@ def mask(version: str, unit: str, stage: str) -> int:
     return sum(text.count("o") for text in rows)
 
 
-@pytest.fixture(params=VERSIONS)
+@pytest.fixture(params=[VERSIONS[0], pytest.param(VERSIONS[1], marks=pytest.mark.slow)])
 def ground(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any:
     """Return level ground of each version, wide enough for all of a town hall's creep."""
     return make_field(FLAT, version=request.param)

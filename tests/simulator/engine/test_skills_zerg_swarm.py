@@ -26,7 +26,7 @@ INJECT, LOCUSTS, SWOOP, EXPLODE, BUILDINGS_ON, BUILDINGS_OFF = 251, 2704, 2387, 
 CHANGELING, CONTAMINATE, SPRAY, HOLD_FIRE, FREE_FIRE = 181, 1825, 2324, 2550, 2552
 
 
-@pytest.fixture(params=VERSIONS)
+@pytest.fixture(params=[VERSIONS[0], pytest.param(VERSIONS[1], marks=pytest.mark.slow)])
 def field(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any:
     return make_field(FLAT, version=request.param)
 

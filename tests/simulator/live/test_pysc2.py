@@ -40,6 +40,7 @@ def test_the_first_observation_is_there_soon(make_env: MakeEnv) -> None:
     assert duration_s < 10.0  # 1.1 s on an idle machine, of which PySC2 waits 1 s; 4.5 s on a busy slow one
 
 
+@pytest.mark.slow
 def test_a_battle_is_played_to_its_end_by_raw_actions(make_env: MakeEnv, no_process_left: None) -> None:
     env = make_env()
     timestep = env.reset()[0]
