@@ -25,9 +25,12 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """Return the kind of an action: one action of each function, subject, rule and target stands for the others."""
+    """Return the kind of an action: one of each function, subject and target, with and without rule, stands for all.
+
+    What each rule does is in `tests/bridge/macro`.
+    """
     action = cases()[name].action
-    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule, action.target_kind
+    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind
 
 
 def stands_for_others(name: str) -> bool:
