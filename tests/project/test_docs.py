@@ -29,6 +29,7 @@ from khala_agents.config import AgentsFile, ModelConfig
 from khala_agents.policy import Context, Policy, as_policy
 from khala_bridge.catalogue import catalogue
 from khala_bridge.errors import CatalogueError
+from khala_bridge.observe.text import SECTIONS
 from khala_bridge.task.config import TaskConfig
 from khala_protocol import speech
 from khala_protocol.codec import decode
@@ -108,7 +109,10 @@ def scene() -> tuple[Briefing, Observation]:
 
 @pytest.mark.parametrize("block", blocks("python"))
 @pytest.mark.usefixtures("place")
-async def test_a_block_of_python_runs(block: Block, scene: tuple[Briefing, Observation]) -> None:
+async def test_a_block_of_python_runs(
+    block: Block, scene: tuple[Briefing, Observation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("khala_bridge.observe.text.page.SECTIONS", dict(SECTIONS))
     namespace = run(block)
     for name, thing in namespace.items():
         if name == "decide":
