@@ -130,9 +130,10 @@ def newest_recording(path: Path) -> Recording:
     found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
     if not found:
         raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
-    opened = map(Recording.open, reversed(found))  # a scan each: only as many as it takes
-    newest = next(opened)
-    return next((one for one in itertools.chain([newest], opened) if one.run is not None), newest)
+    for file in reversed(found):
+        if (recording := Recording.open(file)).run is not None:
+            return recording
+    return Recording.open(found[-1])
 
 
 def free_recording(directory: Path) -> Path:

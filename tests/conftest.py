@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import importlib
 import selectors
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 LONG_S = 600.0
 """What a long test may take unless it says otherwise: several times what it takes, for slow machines."""
 
+# No deadlines: a busy machine is no fault of what is tested.
 settings.register_profile("short", max_examples=30, deadline=None)
 settings.register_profile("long", max_examples=300, deadline=None)  # of `make slow`
 settings.load_profile("short")
@@ -32,6 +34,13 @@ def pytest_collection_finish() -> None:
     """Leave the 400 000 objects of the tests themselves out of every later garbage collection: 0.25 s each."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget the sections of observations that a test registers."""
+    page = importlib.import_module("khala_bridge.observe.text.page")
+    monkeypatch.setattr(page, "SECTIONS", dict(page.SECTIONS))
 
 
 class _JumpingSelector(selectors.DefaultSelector):

@@ -29,7 +29,6 @@ from khala_agents.config import AgentsFile, ModelConfig
 from khala_agents.policy import Context, Policy, as_policy
 from khala_bridge.catalogue import catalogue
 from khala_bridge.errors import CatalogueError
-from khala_bridge.observe.text import SECTIONS
 from khala_bridge.task.config import TaskConfig
 from khala_protocol import speech
 from khala_protocol.codec import decode
@@ -108,11 +107,8 @@ def scene() -> tuple[Briefing, Observation]:
 
 
 @pytest.mark.parametrize("block", blocks("python"))
-@pytest.mark.usefixtures("place")
-async def test_a_block_of_python_runs(
-    block: Block, scene: tuple[Briefing, Observation], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("khala_bridge.observe.text.page.SECTIONS", dict(SECTIONS))
+@pytest.mark.usefixtures("place", "own_sections")
+async def test_a_block_of_python_runs(block: Block, scene: tuple[Briefing, Observation]) -> None:
     namespace = run(block)
     for name, thing in namespace.items():
         if name == "decide":

@@ -188,7 +188,6 @@ def test_a_message_of_another_kind_than_expected_is_refused() -> None:
         decode_as(Reply, MESSAGE_BYTES)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=200) | JSON.map(json.dumps).map(str.encode))
 def test_no_bytes_raise_anything_else(payload: bytes) -> None:
     with pytest.raises((MalformedMessage, WrongVersion)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import zenoh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_protocol.errors import WrongKey
@@ -35,7 +35,6 @@ BAD_NAMES = [
 ]
 
 
-@settings(deadline=None)
 @given(NAMES, NAMES, NAMES, NAMES, st.integers(0, 9999))
 def test_what_is_built_is_parsed_back(run: str, side: str, agent: str, instance: str, place: int) -> None:
     for topic in RUN_TOPICS:
@@ -46,7 +45,6 @@ def test_what_is_built_is_parsed_back(run: str, side: str, agent: str, instance:
     assert parse(image_key(run, side, agent, place)) == Address(run, Topic.IMAGE, side, agent, str(place))
 
 
-@settings(deadline=None)
 @given(st.text() | st.lists(NAMES | st.sampled_from(["khala", *Topic]), max_size=7).map("/".join))
 def test_what_is_parsed_is_built_back_and_all_else_is_refused(key: str) -> None:
     try:
@@ -110,7 +108,6 @@ def test_no_name_can_widen_an_expression(name: str) -> None:
             build()
 
 
-@settings(deadline=None)
 @given(NAMES, NAMES, NAMES, NAMES)
 def test_expressions_match_what_they_say_and_nothing_else(run: str, other: str, side: str, agent: str) -> None:
     """Check expressions by the bus's own rules."""

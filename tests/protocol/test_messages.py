@@ -6,7 +6,7 @@ import inspect
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -126,7 +126,6 @@ def test_units_in_fields_are_said_in_their_names() -> None:
     assert {"answer_within_s", "game_loop"} <= set(Observation.model_fields)
 
 
-@settings(deadline=None)
 @given(USAGES, USAGES, USAGES)
 def test_usage_adds_up_in_any_order(one: Usage, two: Usage, three: Usage) -> None:
     assert one + two == two + one

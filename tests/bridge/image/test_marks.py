@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_bridge.knowledge import knowledge
@@ -27,7 +27,6 @@ def test_a_mark_is_the_part_of_the_tag_before_its_last_four_digits(tags: list[in
     assert list(marks_of(tags).values()) == marks
 
 
-@settings(deadline=None)
 @given(st.sets(st.integers(0, 2**12 - 1), max_size=80), st.integers(0, 2**16 - 1))
 def test_units_of_a_game_have_different_marks_that_stand_in_their_tags(numbers: set[int], used: int) -> None:
     tags = [(0x4000 | number) << 18 | used for number in numbers]  # as the game makes them

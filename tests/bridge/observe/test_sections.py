@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.observe import Observer
-from khala_bridge.observe.text import SECTIONS, Page, find_sections, section, shorter
+from khala_bridge.observe.text import Page, find_sections, section, shorter
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala_bridge.task.config import TaskConfig
-
-
-@pytest.fixture
-def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Restore the registered sections after the test."""
-    monkeypatch.setattr("khala_bridge.observe.text.page.SECTIONS", dict(SECTIONS))
 
 
 @pytest.fixture

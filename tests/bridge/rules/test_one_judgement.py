@@ -313,7 +313,7 @@ def meaning(sentence: str) -> tuple[str, ...]:
 
 def over_states() -> Callable[[Any], Any]:
     relaxed = settings(
-        max_examples=EXAMPLES, deadline=None, derandomize=True, phases=(Phase.generate, Phase.shrink),
+        max_examples=EXAMPLES, derandomize=True, phases=(Phase.generate, Phase.shrink),
         suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
     )  # fmt: skip
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, raw_pb2, spatial_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
@@ -630,7 +630,6 @@ ui_actions = st.one_of(
 )
 
 
-@settings(deadline=None)
 @given(st.lists(st.lists(raw_actions | spatial_actions | ui_actions, max_size=5), min_size=1, max_size=6))
 def test_no_action_breaks_a_game(rounds: list[list[sc.Action]]) -> None:
     client = Client()

@@ -130,7 +130,7 @@ def test_what_is_done_after_a_promise_takes_effect_after_it() -> None:
     assert [entry.loop for entry in lockstep.commit(9).entries] == [8]
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.sampled_from(["act", "step", "hear"]), st.integers(0, 1), st.integers(1, 9)), max_size=60))
 def test_however_messages_are_delayed_the_worlds_are_one(moves: list[tuple[str, int, int]]) -> None:
     sides = [Lockstep(game(), number, [1, 2]) for number in (1, 2)]

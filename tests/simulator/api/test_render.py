@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from s2clientprotocol import common_pb2, raw_pb2, spatial_pb2
@@ -98,7 +98,6 @@ def test_the_same_moment_is_painted_the_same(make_table: Any) -> None:
     assert (one.overview() == other.overview()).all()
 
 
-@settings(deadline=None)
 @given(
     screen=st.tuples(st.integers(1, 90), st.integers(1, 90)),
     minimap=st.tuples(st.integers(1, 40), st.integers(1, 40)),

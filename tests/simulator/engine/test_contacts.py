@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_simulator.abilities import commands
@@ -18,7 +18,6 @@ SIXTEENTHS = st.integers(0, 480).map(lambda n: n / 16)  # so that differences ar
 POINTS = st.lists(st.tuples(SIXTEENTHS, SIXTEENTHS), min_size=1, max_size=60)
 
 
-@settings(deadline=None)
 @given(points=POINTS, reach=st.integers(1, 80).map(lambda n: n / 16))
 def test_all_pairs_within_reach_are_found_once(points: list[tuple[float, float]], reach: float) -> None:
     at = np.array(points, dtype=np.float64)

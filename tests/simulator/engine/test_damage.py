@@ -3,7 +3,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_simulator.abilities import commands
@@ -122,7 +122,6 @@ def test_armor_upgrades_count_for_units_that_already_stand_there(field: Any) -> 
     assert world.life[victim] == 35 - (8 - 1)
 
 
-@settings(deadline=None)
 @given(
     life=st.floats(0.5, 500),
     shields=st.floats(0, 500),

@@ -91,7 +91,7 @@ def test_games_on_one_terrain_share_what_was_found() -> None:
     assert pathfinding.surface(Ground(terrain), Layer.WALK) is pathfinding.surface(Ground(terrain), Layer.WALK)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(x=st.floats(0.5, 31.5), y=st.floats(0.5, 31.5), to_x=st.floats(0.5, 31.5), to_y=st.floats(0.5, 31.5))
 def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
     x: float, y: float, to_x: float, to_y: float
@@ -123,7 +123,7 @@ def shortest(grid: np.ndarray[tuple[int, int], np.dtype[np.bool_]], goal: int) -
     return far
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10_000), width=st.integers(2, 9), height=st.integers(2, 9))
 def test_ways_that_are_found_bit_by_bit_are_the_shortest_ones(seed: int, width: int, height: int) -> None:
     rng = np.random.default_rng(seed)

@@ -49,7 +49,7 @@ command = st.tuples(
 )
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     terrain=st.sampled_from(["braxis_ledge", "char_pit", "braxis_strip"]),
     names=st.lists(
