@@ -57,18 +57,18 @@ def kinds(catalog: Catalog) -> tuple[Bools, Bools, Bools]:
 
 @lru_cache(maxsize=4)
 def _outlines(catalog: Catalog) -> Floats:
-    """Return (3, rows) of each type's footprint: half its width, half its height, and |x| + |y| at its corners."""
+    """Return (4, rows) of each type: half its footprint's width and height, |x| + |y| at its corners, its radius."""
     return np.array([_outline(catalog, unit) for unit in catalog.units]).T
 
 
-def _outline(catalog: Catalog, unit: UnitType) -> tuple[float, float, float]:
+def _outline(catalog: Catalog, unit: UnitType) -> tuple[float, float, float, float]:
     footprint = catalog.footprints.get(unit.footprint)
     if footprint is None or not footprint.cells:
-        return unit.radius, unit.radius, unit.radius * 2.0
+        return unit.radius, unit.radius, unit.radius * 2.0, unit.radius_shown
     width, height = footprint.size
     corner = max(dx + dy + 2 for dx, dy in footprint.cells)
     odd = (width % 2 + height % 2) / 2.0
-    return width / 2.0, height / 2.0, corner - odd
+    return width / 2.0, height / 2.0, corner - odd, unit.radius_shown
 
 
 @lru_cache(maxsize=4)
@@ -117,13 +117,16 @@ def _nearest(world: World, slot: int, candidates: Ints) -> int:
 
 
 def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
-    """Return (k,) distance between centres at which workers touch their resource or town hall from where they are."""
-    half_x, half_y, diagonal = _outlines(world.catalog)[:, world.type[targets]]
+    """Return (k,) distance between centres at which workers touch their resource or town hall from where they are.
+
+    Edges touch at the radius that clients see; before a corner of the walls that stands farther out, at the walls.
+    """
+    half_x, half_y, diagonal, radius = _outlines(world.catalog)[:, world.type[targets]]
     offset = np.abs(world.pos[targets] - world.pos[slots])
     distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-9)
     across, along = np.maximum(offset.T / distance, 1e-9)
-    edge = np.minimum(np.minimum(half_x / across, half_y / along), diagonal / (across + along))
-    reach: Floats = edge + world.radius[slots] + MECHANICS.harvest_gap
+    walls = np.minimum(np.minimum(half_x / across, half_y / along), diagonal / (across + along))
+    reach: Floats = np.maximum(walls + MECHANICS.harvest_gap, radius) + world.radius[slots]
     return reach
 
 
@@ -190,6 +193,7 @@ def leave(world: World, slot: int) -> None:
     patch = int(world.patch[slot])
     if patch != NOBODY and world.occupant[patch] == slot:
         world.occupant[patch] = NOBODY
+        world.work_until[patch] = world.loop + MECHANICS.harvest_handover
     if world.carrier[slot] != NOBODY and world.carrier[slot] == patch:
         x, y = _door(world, slot, patch)
         world.unstow(slot, (x, y))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
 AT_RESOURCE, LEAVING = int(Phase.AT_RESOURCE), int(Phase.LEAVING)
 NO_KILLER: Final = -1
-REMEMBERED_LOOPS: Final = 160  # how long deliveries count for the rate of collection
+REMEMBERED_LOOPS: Final = 240  # how long deliveries count for the rate of collection
 RETRY_LOOPS: Final = 8  # how often a worker before a taken field looks for another one
 
 
@@ -82,7 +82,8 @@ def _numbers(world: World, slot: int) -> dict[str, float]:
 
 
 def _has_room(world: World, slot: int, patch: int) -> bool:
-    return bool(world.occupant[patch] == NOBODY or _numbers(world, slot).get("shares_patch"))
+    free = world.occupant[patch] == NOBODY and world.work_until[patch] <= world.loop
+    return bool(free or _numbers(world, slot).get("shares_patch"))
 
 
 def _begin(world: World, slot: int, patch: int) -> None:

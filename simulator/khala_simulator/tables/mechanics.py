@@ -67,6 +67,7 @@ class Mechanics:
     harvest_gap: float
     harvest_search: float
     harvest_leaving: float
+    harvest_handover: int
     creep_cells_per_step: int
     creep_decay_loops: float
     off_creep_damage: float
@@ -86,6 +87,7 @@ class Mechanics:
     larva_home: float
     broodling_random_loops: float
     swoop_speed_n: float
+    tumor_throw_speed: float
 
 
 def entries() -> tuple[Constant, ...]:

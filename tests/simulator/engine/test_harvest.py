@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pytest
 
 from khala_simulator.abilities import casting, commands
-from khala_simulator.combat import buffs
-from khala_simulator.economy import harvesting
+from khala_simulator.combat import buffs, lifecycle
+from khala_simulator.economy import harvesting, melee_start
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tick import advance, new_game
@@ -18,10 +19,12 @@ from khala_simulator.world.players import PlayerSetup
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from khala_simulator.world.world import World
     from tests.simulator.engine.conftest import Field
 
 WORKERS = {"Probe": "Nexus", "SCV": "CommandCenter", "Drone": "Hatchery"}
-RECORDED_RATE = (671, 699)  # minerals per minute of 12 workers, as two recorded games (4.0) report it
+TERRANS = (PlayerSetup(1, "terran", "agent"), PlayerSetup(2, "terran", "agent"))
+MINUTE = 1344
 
 
 class Base:
@@ -202,14 +205,108 @@ def test_what_can_be_gathered(field: Field, worker: str, target: str, owner: int
     assert casting.aim_refusal(field.world, Cast(slot, field.world.catalog.ability(298), resource)) is refusal
 
 
-def test_twelve_workers_earn_what_recorded_games_show() -> None:
+@pytest.fixture(scope="module")
+def opening() -> dict[int, float]:
+    """Return what the twelve workers of a melee game have delivered at some loops, on average of both players."""
     world = new_game(load_map("Simple64"), (PlayerSetup(1, "protoss", "agent"), PlayerSetup(2, "terran", "agent")))
-    advance(world, 320)
-    before = [player.score.collected[0] for player in world.players[1:]]
-    advance(world, 4032)  # three minutes
-    low, high = RECORDED_RATE
-    for player, start in zip(world.players[1:], before, strict=True):
-        rate = (player.score.collected[0] - start) / 3
-        assert low * 0.93 <= rate <= high * 1.07
-    fields = harvesting.assigned(world)
-    assert fields.max() == 2  # two to a field at most
+    collected = {0: 0.0}
+    for loop in (160, 320, 480, 640, 1344):
+        advance(world, loop - world.loop)
+        collected[loop] = sum(player.score.collected[0] for player in world.players[1:]) / 2.0
+    assert harvesting.assigned(world).max() == 2  # two to a field at most
+    return collected
+
+
+@pytest.mark.parametrize(("loop", "low", "high"), [(160, 25, 45), (320, 115, 120), (480, 190, 205), (640, 270, 295)])
+def test_an_opening_earns_what_recorded_games_show(
+    opening: dict[int, float], loop: int, low: float, high: float
+) -> None:
+    assert low <= opening[loop] <= high
+
+
+def test_twelve_workers_earn_57_to_58_each_a_minute(opening: dict[int, float]) -> None:
+    rate = (opening[1344] - opening[320]) / (1344 - 320) * MINUTE / 12
+    assert 57.0 * 0.97 <= rate <= 58.0 * 1.03
+
+
+def line(world: World, count: int, kind: str = "SCV") -> list[int]:
+    """Put ``count`` workers before the fields of each player of a melee game, and no others; return all of them."""
+    for slot in (s for s in world.live.tolist() if world.unit_type(s).worker):
+        world.remove(slot)
+    made = []
+    for player in world.players[1:]:
+        assert player.start is not None
+        fields = melee_start.mineral_fields(world, player.start)
+        for rank in range(count):
+            field = int(fields[rank % len(fields)])
+            x, y = ((world.pos[field] + player.start) / 2.0).tolist()
+            made.append(lifecycle.spawn(world, world.catalog.unit(kind), player.id, (x, y)))
+            commands.gather(world, made[-1:], world.tag_of(field))
+    return made
+
+
+def a_minute(world: World) -> float:
+    advance(world, MINUTE // 2)
+    before = sum(player.score.collected[0] for player in world.players[1:])
+    advance(world, MINUTE)
+    return (sum(player.score.collected[0] for player in world.players[1:]) - before) / 2.0
+
+
+@pytest.mark.parametrize(
+    ("count", "published", "within"),
+    [(16, 944, 0.02), pytest.param(24, 1144, 0.03, marks=pytest.mark.slow)],
+)
+def test_a_line_earns_what_is_published(count: int, published: float, within: float) -> None:
+    world = new_game(load_map("Simple64"), TERRANS)
+    line(world, count)
+    assert a_minute(world) == pytest.approx(published, rel=within)
+
+
+@pytest.mark.slow
+def test_a_trip_takes_two_walks_from_rest_to_rest_and_the_time_at_the_field() -> None:
+    world = new_game(load_map("Simple64"), TERRANS)
+    workers = line(world, 8)
+    arrivals: dict[int, list[int]] = {slot: [] for slot in workers}
+    before = world.harvest[workers]
+    for _ in range(500):
+        advance(world)
+        for slot, phase, last in zip(workers, world.harvest[workers], before, strict=True):
+            if phase == harvesting.Phase.AT_RESOURCE != last:
+                arrivals[slot].append(world.loop)
+        before = world.harvest[workers]
+    for slot, loops in arrivals.items():
+        start = world.players[int(world.owner[slot])].start
+        assert start is not None
+        way = math.dist(world.pos[world.patch[slot]].tolist(), start) - (2.75 + 1.125 + 2 * 0.375)
+        expected = 45 + 8 + 4.0 * math.sqrt(way / (2.5 / 16**2))
+        assert loops[-1] - loops[-2] == pytest.approx(expected, abs=5)
+
+
+@pytest.mark.slow
+def test_a_mule_brings_200_to_250_in_its_life() -> None:
+    world = new_game(load_map("Simple64"), TERRANS)
+    line(world, 8, "MULE")
+    advance(world, 1440)
+    brought = sum(player.score.collected[0] for player in world.players[1:]) / 16.0
+    assert 200.0 <= brought <= 250.0
+
+
+def test_a_geyser_gives_three_workers_at_most_160_a_minute(field: Field) -> None:
+    base = Base(field, "Probe", "Assimilator")
+    workers = [base.worker, *(field.put("Probe", 1, 54.5, 50.5 + side) for side in (-1.0, 1.0))]
+    commands.gather(field.world, workers, field.world.tag_of(base.resource))
+    field.play(MINUTE // 4)
+    before = field.world.players[1].vespene
+    field.play(MINUTE)
+    assert field.world.players[1].vespene - before == pytest.approx(160, rel=0.03)
+
+
+def test_a_field_is_free_two_loops_after_its_worker_is_done(base: Base) -> None:
+    second = base.field.put("Probe", 1, 54.5, 50.0)
+    commands.gather(base.world, [base.worker, second], base.world.tag_of(base.resource))
+    at = int(harvesting.Phase.AT_RESOURCE)
+    both = [base.worker, second]
+    base.first(lambda: bool((base.world.harvest[both] == at).any()))
+    done = base.first(lambda: not (base.world.harvest[both] == at).any())
+    next_one = base.first(lambda: bool((base.world.harvest[both] == at).any()))
+    assert next_one - done == 2
