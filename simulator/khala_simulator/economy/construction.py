@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 STRUCTURE_FACING: Final = 4.7124
 START_SHARE: Final = 0.1  # of life and shields that a structure has when it is begun
+SEEN_LATER: Final = 1.0  # an order that takes effect at once does so a loop before its product is first seen
 NO_KILLER: Final = -1
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 WHOLE: Final = 1.0 - 1e-9
 FOLLOW: Final = int(OrderKind.FOLLOW)
-BESIDE: Final = 1.5  # from edge to edge: how far from its site a builder still works on it
+BESIDE: Final = 2.0  # from edge to edge: a builder works on its site from as far as it places one on a geyser
 
 
 def run(world: World) -> None:

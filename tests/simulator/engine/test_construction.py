@@ -230,6 +230,32 @@ def test_a_tech_lab_is_built_at_the_side_and_lets_marauders_be_trained(field: Fi
     assert casting.refusal(field.world, barracks, marauder) is ActionResult.SUCCESS
 
 
+@pytest.mark.parametrize(
+    ("ability", "name", "loops"), [(TECHLAB, "BarracksTechLab", 400), (REACTOR, "BarracksReactor", 800)]
+)
+def test_an_add_on_takes_its_time_from_the_loop_in_which_it_is_first_seen(
+    field: Field, ability: int, name: str, loops: int
+) -> None:
+    barracks = field.put("Barracks", 1, 20.5, 20.5)
+    order(field, barracks, ability)
+    field.play(1)
+    site = find(field, name)
+    field.play(loops - 1)
+    assert field.world.build_progress[site] < 1.0
+    field.play(1)
+    assert field.world.build_progress[site] == 1.0
+
+
+def test_a_refinery_takes_as_long_as_its_extractor(field: Field) -> None:
+    geyser, scv = field.put("VespeneGeyser", 0, 30.5, 30.5), field.put("SCV", 1, 20.5, 20.5)
+    order(field, scv, BUILD["Refinery"], target=field.world.tag_of(geyser))
+    site = placed(field, "Refinery")
+    field.play(480 - 1)
+    assert field.world.build_progress[site] < 1.0
+    field.play(1)
+    assert field.world.build_progress[site] == 1.0
+
+
 def test_an_add_on_can_be_called_off(field: Field) -> None:
     barracks = field.put("Barracks", 1, 30.5, 30.5)
     order(field, barracks, REACTOR)

@@ -333,12 +333,15 @@ def test_a_tumor_grows_burrows_and_plants_one_other(make_field: Callable[..., An
         field.play(1)
     assert burrow.loops <= world.loop - grown <= burrow.loops + burrow.random_loops + 3
     assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is ActionResult.COOLDOWN
-    field.play(int(plant.numbers["first_use_after_loops"]) + 1)
+    field.play(grown + int(plant.numbers["first_use_after_loops"]) - 1 - world.loop)
+    assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is ActionResult.COOLDOWN
+    field.play(1)
     far = 34.5 + plant.range + float(world.radius[tumor]) + 0.6
     assert field.why_not(tumor, PLANT, point=(far, 32.5)) is ActionResult.TARGET_IS_OUT_OF_RANGE
     assert field.order(tumor, PLANT, point=(far - 1.0, 32.5))
     field.play(2)
-    assert world.catalog.unit("CreepTumor").row in world.type[world.live]
+    (child,) = world.live[world.type[world.live] == world.catalog.unit("CreepTumor").row].tolist()
+    assert 266 <= world.build_loops[child] <= 281  # recorded games
     field.play(2000)
     assert field.why_not(tumor, PLANT, point=(40.5, 32.5)) is ActionResult.COOLDOWN
 

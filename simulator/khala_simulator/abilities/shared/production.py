@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from khala_simulator.abilities.shared import morphs
 from khala_simulator.abilities.skill import Skill
 from khala_simulator.combat import lifecycle
-from khala_simulator.economy import production
+from khala_simulator.economy import construction, production
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.world import NO_TAG, NOBODY, Rally
 
@@ -31,11 +31,12 @@ WORKERS: Final = 3690  # the general ability that sets a rally point for workers
 
 def _train(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
     """Put a unit into the queue of a structure, or into an egg."""
-    slot = min(slots, key=lambda s: (_length(world, s), s))
+    slot, loops = min(slots, key=lambda s: (_length(world, s), s)), ability.loops
     if world.unit_type(slot).name in COCOONS:
         lifecycle.become(world, slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
         world.life[slot] = world.life_max[slot]
-    production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
+        loops += construction.SEEN_LATER
+    production.enqueue(world, slot, ability, makes=ability.unit, loops=loops)
     return [slot]
 
 

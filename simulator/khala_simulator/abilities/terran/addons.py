@@ -31,9 +31,10 @@ def _build(world: World, slots: list[int], ability: Ability, _: int, __: Point |
     """Begin an add-on at the side of one structure."""
     slot = slots[0]
     owner = int(world.owner[slot])
-    job = production.enqueue(world, slot, ability, makes=ability.unit, loops=ability.loops)
+    loops = ability.loops + construction.SEEN_LATER
+    job = production.enqueue(world, slot, ability, makes=ability.unit, loops=loops)
     unit, paid = world.catalog.unit(ability.unit), job.paid
-    made = construction.begin(world, unit, owner, place_of(world, slot), loops=ability.loops, paid=paid)
+    made = construction.begin(world, unit, owner, place_of(world, slot), loops=loops, paid=paid)
     job.kind, job.site, job.paid = "addon", world.tag_of(made), (0.0, 0.0)
     return [slot]
 

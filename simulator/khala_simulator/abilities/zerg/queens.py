@@ -10,6 +10,7 @@ from khala_simulator.abilities.skill import Skill, number, place_of
 from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.economy import building_sites, construction
 from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.orders import Order, OrderKind
 
 if TYPE_CHECKING:
@@ -54,7 +55,10 @@ def _plant(world: World, cast: Cast) -> None:
     """Plant a creep tumor, which grows by itself and then burrows."""
     slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
     place = building_sites.centre(world, unit, place_of(world, cast))
-    construction.begin(world, unit, int(world.owner[slot]), place, loops=cast.ability.loops, paid=(0.0, 0.0))
+    loops = cast.ability.loops
+    if cast.ability.id == PLANT:
+        loops += math.dist(world.pos[slot].tolist(), place) / MECHANICS.tumor_throw_speed
+    construction.begin(world, unit, int(world.owner[slot]), place, loops=loops, paid=(0.0, 0.0))
     if cast.ability.id == PLANT:
         world.timers.setdefault(slot, {})[cast.ability.timer] = math.inf  # a tumor plants one other in its life
 
@@ -73,11 +77,12 @@ def _burrow_when_grown(world: World, slots: list[int]) -> None:
 
 
 def _burrow_tumor(world: World, cast: Cast) -> None:
-    """Burrow, and be able to plant another tumor after a while."""
+    """Burrow a finished tumor, which can plant another one after a while."""
     slot = cast.slot
+    finished = float(world.cast_begun[slot]) - 1.0  # it began to burrow in the loop after
     lifecycle.become(world, slot, world.catalog.unit(cast.ability.unit))
     plant = world.catalog.ability(PLANT)
-    world.timers.setdefault(slot, {})[plant.timer] = world.loop + number(plant, "first_use_after_loops")
+    world.timers.setdefault(slot, {})[plant.timer] = finished + number(plant, "first_use_after_loops")
 
 
 SKILLS: Final = {
