@@ -2,18 +2,20 @@
 
 Where the workers stand is a rule that was measured on 96 recorded starts: of the 24 cells around the town hall those
 twelve that are nearest to the middle of its mineral fields (all twelve right in 87 starts, eleven in the other nine).
-All begin with an order for the same field, and the camera is at their mean. Above: ``systems.staging``. Below:
-``world``.
+All begin with an order for the same field, to which the town hall sends new workers as well. They face anywhere, and
+the camera is at their mean. Above: ``systems.staging``. Below: ``world``.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from khala_simulator.combat import lifecycle
 from khala_simulator.world.players import NEUTRAL, GameResult
+from khala_simulator.world.world import Rally
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -33,7 +35,6 @@ HALL_AND_WORKER: Final = {
     "zerg": ("Hatchery", "Drone"),
 }
 LARVAE: Final = ((-1.0, -3.25), (0.0, -3.25), (1.0, -3.25))  # offsets from the Hatchery
-OVERLORD: Final = (0.0, 4.0)
 
 
 def start(world: World) -> Iterator[tuple[list[int], int]]:
@@ -56,21 +57,29 @@ def _found_base(world: World, player: int, place: tuple[float, float]) -> Iterat
     owner = world.players[player]
     owner.start = place
     hall, worker = (world.catalog.unit(name) for name in HALL_AND_WORKER[owner.race])
-    lifecycle.spawn(world, hall, player, place, STRUCTURE_FACING)
+    home = lifecycle.spawn(world, hall, player, place, STRUCTURE_FACING)
     fields = mineral_fields(world, place)
-    ring = worker_places(place, world.pos[fields].mean(axis=0) if len(fields) else np.array(place))
-    workers = [lifecycle.spawn(world, worker, player, (x, y)) for x, y in ring.tolist()]
+    middle = world.pos[fields].mean(axis=0) if len(fields) else np.array(place)
+    ring = worker_places(place, middle)
+    facings = world.rng.uniform(0.0, 2.0 * math.pi, len(ring)).tolist()
+    workers = [
+        lifecycle.spawn(world, worker, player, (x, y), f) for (x, y), f in zip(ring.tolist(), facings, strict=True)
+    ]
     x, y = ring.mean(axis=0).tolist()
     owner.camera = (x, y)
     if owner.race == "zerg":
-        _hatch(world, player, place)
+        _hatch(world, player, place, middle)
     if len(fields):
-        yield workers, world.tag_of(int(fields[min(FIRST_FIELD, len(fields)) - 1]))
+        first = int(fields[min(FIRST_FIELD, len(fields)) - 1])
+        x, y = world.pos[first].tolist()
+        world.rallies[home] = {"workers": Rally((x, y), world.tag_of(first))}
+        yield workers, world.tag_of(first)
 
 
-def _hatch(world: World, player: int, place: tuple[float, float]) -> None:
-    """Place the first Overlord and Larvae; their exact places are an estimate."""
-    for name, offsets in (("Larva", LARVAE), ("Overlord", (OVERLORD,))):
+def _hatch(world: World, player: int, place: tuple[float, float], minerals: Floats) -> None:
+    """Place the first Larvae, and the Overlord at the corner of the workers' ring away from the ``minerals``."""
+    away = np.where(minerals > place, -1.0, 1.0) * RING
+    for name, offsets in (("Larva", LARVAE), ("Overlord", (tuple(away.tolist()),))):
         for dx, dy in offsets:
             lifecycle.spawn(world, world.catalog.unit(name), player, (place[0] + dx, place[1] + dy))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from khala_simulator.abilities import casting
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import MapError, map_from
 from khala_simulator.maps.places import PlaceGrid, Region, Span
@@ -296,6 +297,30 @@ def test_a_melee_start_gives_a_town_hall_workers_and_a_camera() -> None:
     assert (offset.max(axis=1) == 3).all()
     assert owner.camera == pytest.approx(tuple(world.pos[workers].mean(axis=0)))
     assert owner.camera[0] < 10.5  # towards the minerals
+    assert len({tuple(facing) for facing in world.heading[workers].tolist()}) == 12
+    (hall,) = (s for s in world.units_of(owner.id).tolist() if world.unit_type(s).structure)
+    assert {world.tag_of(s) for s in world.order_target[workers].tolist()} == {world.rallies[hall]["workers"].target}
+
+
+def test_the_first_overlord_is_at_the_corner_of_the_ring_away_from_the_minerals() -> None:
+    world = world_of(MELEE, seed=3)
+    zerg = world.players[2]
+    (overlord,) = (s for s in world.units_of(2).tolist() if world.unit_type(s).name == "Overlord")
+    minerals = np.array([4.3, 38.3])
+    assert zerg.start is not None
+    away = np.where(minerals > np.array(zerg.start), -3.0, 3.0)
+    assert world.pos[overlord].tolist() == (np.array(zerg.start) + away).tolist()
+
+
+def test_a_new_worker_goes_to_the_first_field() -> None:
+    world = world_of(MELEE, seed=3)
+    player = next(player for player in world.players[1:] if player.start == (10.5, 36.5))
+    (hall,) = (s for s in world.units_of(player.id).tolist() if world.unit_type(s).structure)
+    (job,) = casting.use(world, [hall], world.catalog.ability(524))
+    assert job == hall
+    advance(world, 272)
+    newest = max(world.units_of(player.id).tolist(), key=lambda s: int(world.born_loop[s]))
+    assert world.order_target[newest] == world.slot_of(world.rallies[hall]["workers"].target)
 
 
 def test_places_of_a_melee_game_are_given_by_chance() -> None:
