@@ -19,14 +19,18 @@ WIDEST_AIM_DEG = 180.0
 
 
 def weapon_for(world: World, slot: int, target: int) -> int:
-    """Return the row of the weapon that a unit can aim at ``target`` now, or -1."""
-    on_ground = bool(world.plane_bits[target] & GROUND_PLANE)
-    row = int(world.ground_weapon[slot]) if on_ground else -1
-    if row < 0 and (not on_ground or world.plane_bits[target] != GROUND_PLANE):
-        row = int(world.air_weapon[slot])
-    if row >= 0 and world.catalog.weapons[row].excluding in world.unit_type(target).attributes:
-        return -1
-    return row
+    """Return the row of the weapon that a unit can aim at ``target`` now, or -1.
+
+    A Colossus is on the ground and in the air: the better of the weapons that fit is aimed at it.
+    """
+    planes, victim = int(world.plane_bits[target]), world.unit_type(target)
+    ground = int(world.ground_weapon[slot]) if planes & GROUND_PLANE else -1
+    air = int(world.air_weapon[slot]) if planes != GROUND_PLANE else -1
+    weapons = world.catalog.weapons
+    row = max(ground, air)
+    if min(ground, air) >= 0 and ground != air:
+        row = max((ground, air), key=lambda each: weapons[each].rate_against(victim))
+    return -1 if row >= 0 and weapons[row].excluding in victim.attributes else row
 
 
 def engage(world: World, slot: int, target: int) -> bool:

@@ -136,6 +136,11 @@ class Weapon:
         """Return whether it can be aimed at a unit on ``plane`` ("ground" or "air")."""
         return self.targets in ("any", plane)
 
+    def rate_against(self, unit: UnitType) -> float:
+        """Return the damage per loop to a unit of a type, before upgrades."""
+        bonus = max((amount for name, amount in self.shown_bonus if name in unit.attributes), default=0.0)
+        return self.shown_attacks * max(self.shown_damage + bonus - unit.armor, 0.0) / self.period_loops
+
     @property
     def is_beam(self) -> bool:
         """Whether it goes on by itself once it has begun, tick after tick."""

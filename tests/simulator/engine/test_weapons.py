@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from khala_simulator.abilities import commands
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 PERIODS = [  # attacker, target, distance between centres, period in loops as 16 x the catalog's normal seconds
     ("Zealot", "SpineCrawler", 1.4, 1.2 * 16),
@@ -220,3 +223,15 @@ def test_a_sieged_tank_does_not_fire_at_what_is_nearer_than_its_least_range(
     bodies = sum(float(field.world.catalog.unit(name).radius) for name in ("SiegeTankSieged", "SpineCrawler"))
     tank, _ = duel(field, "SiegeTankSieged", "SpineCrawler", bodies + gap)
     assert bool(starts_of(field, tank, 100)) == fires
+
+
+@pytest.mark.parametrize(("name", "damage"), [("Tempest", 52.0), ("Queen", 9.0)])
+def test_the_better_of_two_weapons_hits_a_colossus(make_field: Callable[..., Any], name: str, damage: float) -> None:
+    field = make_field()
+    attacker, colossus = field.put(name, 1, 16.0, 16.0), field.still("Colossus", 2, 20.0, 16.0)
+    commands.attack_unit(field.world, [attacker], field.world.tag_of(colossus))
+    whole = field.world.shields[colossus]
+    for _ in field.loops(100):
+        if field.world.shields[colossus] < whole:
+            break
+    assert whole - field.world.shields[colossus] == damage
