@@ -2,8 +2,9 @@
 
 Where the map has a score of its own, or scores gathered resources, that is the score, and its type is Curriculum.
 
-The names are the API's. How the game computes its own total was never published; here it is the value of the player's
-units and structures plus that of their kills, which is an estimate. Values are the catalog's `score_make`.
+The names are the API's. How the game computes its own total was never published; here it is what the player has in the
+bank, the value of its units and structures, and that of its kills, which is an estimate. Values are the catalog's
+`score_make`. A Terran or Protoss starts with 1050, as in the game.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
     from khala_simulator.world.players import Player, Spent, Vitals
     from khala_simulator.world.world import World
 
-RATE_LOOPS = 160
-"""Loops over which the rates of collection are measured, as recorded games show."""
+RATE_LOOPS = 240
+"""Loops over which the rates of collection are measured: in recorded games they are multiples of 28, 5 per 240 loops,
+from loop 320 on, and at loop 160 multiples of 42, 5 per 160."""
 FASTER_LOOPS = 22.4
 TOWN_HALL_MINERALS = 300
 """From this price on, a structure that provides supply is a town hall: Pylons, depots and extractors cost less."""
@@ -48,7 +50,8 @@ class Holdings:
         idle = (world.order_kind[slots] == OrderKind.IDLE.value) & types.worker[rows]
         self.idle_workers = int(idle.sum())
         self.food = supply.used(world, player), supply.cap(world, player)
-        self.lately = [60.0 * FASTER_LOOPS / RATE_LOOPS * sum(amounts) for amounts in self._recent(world.loop)]
+        loops = max(min(world.loop, RATE_LOOPS), 1)
+        self.lately = [60.0 * FASTER_LOOPS / loops * sum(amounts) for amounts in self._recent(world.loop)]
 
     def _recent(self, loop: int) -> tuple[list[float], list[float]]:
         """Return the minerals and vespene delivered in the last loops."""
@@ -111,7 +114,9 @@ class Holdings:
             given = counted.curriculum if self.kind == "curriculum" else sum(counted.collected)
             return score_pb2.Score(score_type=score_pb2.Score.Curriculum, score=int(given), score_details=details)
         total = (
-            details.total_value_units
+            int(self.player.minerals)
+            + int(self.player.vespene)
+            + details.total_value_units
             + details.total_value_structures
             + details.killed_value_units
             + details.killed_value_structures

@@ -171,6 +171,21 @@ def test_the_score_follows_what_is_made_and_killed() -> None:
     assert after.total_damage_taken.life > 0
 
 
+def test_a_protoss_starts_with_a_score_of_1050_and_fields_as_wide_as_the_game_reports_them() -> None:
+    seen = Client().play("Simple64").observation
+    assert seen.score.score == 12 * 50 + 400 + 50
+    assert {unit.radius for unit in seen.raw_data.units if unit.mineral_contents} == {1.125}
+
+
+@pytest.mark.parametrize(("loop", "window"), [(160, 160), (320, 240)])
+def test_the_rate_of_collection_is_that_of_the_last_240_loops(loop: int, window: int) -> None:
+    client = Client()
+    client.play("Simple64")
+    before = client.step(loop - window).observation.score.score_details.collected_minerals if loop > window else 0.0
+    details = client.step(window).observation.score.score_details
+    assert details.collection_rate_minerals == pytest.approx((details.collected_minerals - before) * 1344 / window)
+
+
 def test_an_attack_raises_one_alarm() -> None:
     client = Client()
     client.play("3s_vs_3z")
