@@ -128,7 +128,7 @@ def fields(name: str, minutes: int) -> Rows:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
-    parser.add_argument("--map", default="Melee/Simple64", help="a melee map")
+    parser.add_argument("--map", default="Simple64", help="a melee map")
     parser.add_argument("--minutes", type=int, default=3, help="game minutes of each measurement")
     options = parser.parse_args()
     parts = lines(options.map, options.minutes), opening(options.map), fields(options.map, options.minutes)
