@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.players import PlayerSetup
 
 SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
+    death.bury,  # what a debug command killed since the last loop
     opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
     acquire.choose_targets,  # units choose their targets
@@ -56,6 +57,7 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     power.run,  # which structures have power
     construction.run,  # what is being built
     casts.carry_on,  # abilities are prepared, take effect, go on
+    death.bury,  # what an ability killed at once: it makes, mines and hits nothing more
     production.run,  # queues of structures and eggs
     harvest.run,  # workers take, deliver and come again
     passives.run,  # what units do by their nature

@@ -172,7 +172,7 @@ def debug_set_value(world: World, tag: int, *, life: float | None = None, shield
                     energy: float | None = None) -> None:  # fmt: skip
     """Set a unit's life, shields or energy, within what its type can have; unknown tags are ignored."""
     slot = world.slot_of(tag)
-    if slot == NOBODY:
+    if slot == NOBODY or world.life[slot] <= 0.0:
         return
     at = (int(world.owner[slot]), int(world.type[slot]))
     if life is not None:
@@ -211,7 +211,8 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
         for slot in np.flatnonzero(world.alive & (world.owner == player)).tolist():
             before = float(world.life_max[slot])
             refresh(world, slot)
-            world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
+            if world.life[slot] > 0.0:
+                world.life[slot] += max(float(world.life_max[slot]) - before, 0.0)
 
 
 # what a unit can do ---------------------------------------------------------------------------------------------------

@@ -156,7 +156,8 @@ def distance(world: World, slot: int, point: Point) -> float:
 
 def nearest_hurt(world: World, slot: int, reach: float, attribute: int) -> list[int]:
     """Return the owner's other damaged units with an attribute (bit), within reach of a unit, the nearest first."""
-    hurt = world.live[world.life[world.live] < world.life_max[world.live]]
+    life = world.life[world.live]
+    hurt = world.live[(life > 0.0) & (life < world.life_max[world.live])]
     friends = hurt[world.owner[hurt] == world.owner[slot]]
     if not friends.size:
         return []

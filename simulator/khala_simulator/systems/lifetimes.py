@@ -16,7 +16,7 @@ def run_out(world: World) -> None:
     if not world.mortal:
         return
     n = world.top
-    over = which((world.expires[:n] > 0) & (world.expires[:n] <= world.loop))
+    over = which((world.expires[:n] > 0) & (world.expires[:n] <= world.loop) & (world.life[:n] > 0.0))
     if over.size:
         world.life[over] = 0.0
         world.attacker[over] = NOBODY

@@ -163,6 +163,7 @@ class World(UnitColumns, WorldCaches):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
+        self.in_reach[self.target == slot] = False
         for column in (
             self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
             self.occupant,
@@ -190,6 +191,7 @@ class World(UnitColumns, WorldCaches):
         self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
         self.wants[slot] = self.in_reach[slot] = False
         self.visible[:, slot] = False
+        self.in_reach[self.target == slot] = False
         for column in (self.target, self.order_target):
             column[column == slot] = NOBODY
         self.target[slot] = NOBODY

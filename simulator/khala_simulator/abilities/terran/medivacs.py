@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities.shared.basics import on_self
 from khala_simulator.abilities.skill import Skill, gap, nearest_hurt, number
+from khala_simulator.combat.healing import heal, is_hurt
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.stats import ATTRIBUTES
@@ -29,7 +30,7 @@ def _can_heal(world: World, cast: Cast) -> ActionResult:
     slot, target = cast.slot, cast.target
     if target == NOBODY:
         return ActionResult.MUST_TARGET_UNIT
-    if world.life[target] >= world.life_max[target] - DONE or _is_healed(world, cast):
+    if not is_hurt(world, target) or _is_healed(world, cast):
         return ActionResult.REQUIRES_HEAL_TARGET
     return ActionResult.SUCCESS if world.energy[slot] > 0.0 else ActionResult.NOT_ENOUGH_ENERGY
 
@@ -51,13 +52,10 @@ def _heal(world: World, cast: Cast) -> bool:
         resume(world, slot)
         return True
     price = number(cast, "energy_per_life")
-    missing = float(world.life_max[target] - world.life[target])
     rate = number(cast, "life_per_s_normal") / LOOPS_PER_NORMAL_SECOND
-    healed = min(rate, missing, float(world.energy[slot]) / price)
-    world.life[target] += healed
+    healed = heal(world, target, min(rate, float(world.energy[slot]) / price))
     world.energy[slot] -= healed * price
-    world.players[int(world.owner[slot])].score.healed.life += healed
-    return missing - healed > DONE and bool(world.energy[slot] > DONE)
+    return is_hurt(world, target) and bool(world.energy[slot] > DONE)
 
 
 def resume(world: World, slot: int) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.skill import Skill, distance, nearest_hurt, number, touching
 from khala_simulator.abilities.terran.medivacs import resume
+from khala_simulator.combat.healing import heal, is_hurt
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.stats import ATTRIBUTES
 from khala_simulator.world.columns import NOBODY
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from khala_simulator.world.casts import Cast, Point
     from khala_simulator.world.world import World
 
-DONE: Final = 1e-9
 REPAIRS: Final = ("repair", "mule_repair")
 MECHANICAL: Final = 1 << ATTRIBUTES.index("mechanical")
 
@@ -31,7 +31,7 @@ def _can_repair(world: World, cast: Cast) -> ActionResult:
     target = cast.target
     if target == NOBODY:
         return ActionResult.MUST_TARGET_UNIT
-    if world.life[target] >= world.life_max[target] - DONE or _loops(world, target) <= 0.0:
+    if not is_hurt(world, target) or _loops(world, target) <= 0.0:
         return ActionResult.REQUIRES_REPAIR_TARGET
     return _unaffordable(world, cast)
 
@@ -62,7 +62,7 @@ def _price(world: World, cast: Cast) -> tuple[float, float]:
 def _mend(world: World, cast: Cast) -> bool:
     """Repair for one loop; follow a unit that moves away, stop when it has full life or the resources are used up."""
     slot, target = cast.slot, cast.target
-    if target == NOBODY or not world.targetable[target] or world.life[target] >= world.life_max[target] - DONE:
+    if target == NOBODY or not world.targetable[target] or not is_hurt(world, target):
         return False
     x, y = world.pos[target].tolist()
     if distance(world, slot, (x, y)) > touching(world, slot, target) + 2.0 * cast.ability.slop:
@@ -70,17 +70,14 @@ def _mend(world: World, cast: Cast) -> bool:
         return True
     if _unaffordable(world, cast) is not ActionResult.SUCCESS:
         return False
-    missing = float(world.life_max[target] - world.life[target])
     whole = float(world.life_max[target]) / _loops(world, target)
-    mended = min(whole, missing)
+    mended = heal(world, target, whole)
     player = world.players[int(world.owner[slot])]
     if "free" not in player.cheats:
         minerals, vespene = _price(world, cast)
         player.minerals -= minerals * mended / whole
         player.vespene -= vespene * mended / whole
-    world.life[target] += mended
-    player.score.healed.life += mended
-    return missing - mended > DONE
+    return is_hurt(world, target)
 
 
 def _begin(world: World, cast: Cast) -> None:
@@ -97,7 +94,7 @@ def _repair_by_click(world: World, slots: list[int], target: int, _: Point | Non
     """Send workers that right-click on a damaged machine or structure of their own to repair it."""
     if target == NOBODY or "mechanical" not in world.unit_type(target).attributes:
         return []
-    if world.build_progress[target] < 1.0 or world.life[target] >= world.life_max[target] - DONE:
+    if world.build_progress[target] < 1.0 or not is_hurt(world, target):
         return []
     taken: list[int] = []
     for slot in slots:

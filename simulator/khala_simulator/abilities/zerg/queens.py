@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.skill import Skill, number, place_of
 from khala_simulator.combat import buffs, lifecycle
+from khala_simulator.combat.healing import heal, is_hurt
 from khala_simulator.economy import building_sites, construction
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
@@ -28,24 +29,17 @@ PLANT, BURROW = 1733, 1662
 
 def _transfuse(world: World, cast: Cast) -> None:
     """Heal a biological friend at once, and some more over time."""
-    _heal(world, cast.target, number(cast, "instant_life"))
+    heal(world, cast.target, number(cast, "instant_life"))
     buffs.apply(world, cast.target, "Transfusion", source=cast.slot)
 
 
 def _needs_life(world: World, cast: Cast) -> ActionResult:
-    hurt = world.life[cast.target] < world.life_max[cast.target]
-    return ActionResult.SUCCESS if hurt else ActionResult.REQUIRES_HEAL_TARGET
+    return ActionResult.SUCCESS if is_hurt(world, cast.target) else ActionResult.REQUIRES_HEAL_TARGET
 
 
 def _heal_tick(world: World, slot: int, _: np.void) -> None:
     ability = world.catalog.ability(TRANSFUSION)
-    _heal(world, slot, number(ability, "hot_life_total") / number(ability, "hot_duration_loops"))
-
-
-def _heal(world: World, slot: int, amount: float) -> None:
-    before = float(world.life[slot])
-    world.life[slot] = min(before + amount, float(world.life_max[slot]))
-    world.players[int(world.owner[slot])].score.healed.life += float(world.life[slot]) - before
+    heal(world, slot, number(ability, "hot_life_total") / number(ability, "hot_duration_loops"))
 
 
 # creep tumors ---------------------------------------------------------------------------------------------------------
