@@ -25,6 +25,7 @@ from khala_simulator.world.orders import (
     NEEDS_TARGET,
     PATROL,
     SCAN_MOVE,
+    SEEKS_FIGHTS,
     WALKS,
     Order,
     OrderKind,
@@ -303,9 +304,14 @@ def _of_its_own(world: World, slot: int, order: Order) -> Order:
 
 
 def begin(world: World, slot: int, order: Order | None) -> None:
-    """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet."""
+    """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet.
+
+    An order to seek fights leaves a unit in the one that it has found by itself: an attack-move that is given again
+    and again interrupts nothing.
+    """
     order = order or Order(OrderKind.IDLE, 0)
-    target = world.slot_of(order.target)
+    target, opponent = world.slot_of(order.target), int(world.target[slot])
+    fights_on = order.kind in SEEKS_FIGHTS and world.order_kind[slot] in LOOKS_AROUND
     if world.harvest[slot]:
         _end_harvest(world, slot)
     world.order_kind[slot] = order.kind
@@ -314,7 +320,8 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.order_point[slot] = world.pos[slot] if order.point is None else order.point
     world.order_aimed[slot] = order.point is not None
     world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
-    if order.kind is not OrderKind.ATTACK_UNIT or target == NOBODY or not engage(world, slot, target):
+    attacks = order.kind is OrderKind.ATTACK_UNIT and target != NOBODY and engage(world, slot, target)
+    if not (attacks or fights_on):
         disengage(world, slot)
     world.walks[slot] = order.kind in WALKS
     world.looks_around[slot] = order.kind in LOOKS_AROUND
@@ -325,7 +332,8 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     world.channels[slot] = world.bound[slot] = False
     world.scan_now = world.orders_changed = True
     world.guard[slot] = world.pos[slot]
-    world.backswing[slot] = 0.0
+    if opponent == NOBODY or world.target[slot] != opponent:
+        world.backswing[slot] = 0.0
     world.returning[slot] = world.nav_end[slot] = False
     world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
     if order.kind in (OrderKind.GATHER, OrderKind.RETURN):

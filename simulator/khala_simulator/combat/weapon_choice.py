@@ -53,7 +53,7 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     world.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
     world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
     world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
-    world.acquires[slot] = bool(weapons) and not (unit.defensive or unit.passive or unit.uncommandable) and owner != 0
+    world.acquires[slot] = bool(weapons) and not (unit.passive or unit.uncommandable) and owner != 0
     planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
     world.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
     world.defensive[slot], world.flees[slot] = unit.defensive, unit.flees and not unit.passive

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
 
-IDLE = int(OrderKind.IDLE)
+IDLE, ATTACK_MOVE, PATROL = int(OrderKind.IDLE), int(OrderKind.ATTACK_MOVE), int(OrderKind.PATROL)
 PRIORITY_WEIGHT = 1000.0
 THREAT_WEIGHT = 500.0
 TOP_RANK = 20 * PRIORITY_WEIGHT + THREAT_WEIGHT  # an army unit that threatens: nothing is better
@@ -47,6 +47,7 @@ def choose_targets(world: World) -> None:
     n = world.top
     due = world.looks_around[:n] | (world.guns_walking[:n] & world.walks[:n])
     due &= world.acquires[:n]
+    due &= ~_peaceful(world)
     due &= world.scan_loop[:n] <= world.loop
     due &= world.windup[:n] < 0.0
     content = world.in_reach[:n] & (world.target[:n] != NOBODY)
@@ -66,6 +67,14 @@ def choose_targets(world: World) -> None:
         mine = seekers[owner == player]
         if mine.size:
             _seek(world, player, mine)
+
+
+def _peaceful(world: World) -> Bools:
+    """Return whether each unit leaves fighting to others: a worker does, unless it attack-moves or patrols."""
+    n = world.top
+    order = world.order_kind[:n]
+    peaceful: Bools = world.defensive[:n] & (order != ATTACK_MOVE) & (order != PATROL)
+    return peaceful
 
 
 def _give_up(world: World, seekers: Ints) -> None:
@@ -233,4 +242,5 @@ def _friends_near(world: World, victim: int) -> list[int]:
 
 def _free_to_answer(world: World, slot: int) -> bool:
     roams = world.looks_around[slot] and not (world.holds[slot] or world.leashed[slot]) and world.step_max[slot] > 0.0
-    return bool(roams and world.acquires[slot] and world.target[slot] == NOBODY)
+    free = world.acquires[slot] and world.target[slot] == NOBODY
+    return bool(roams and free and not _peaceful(world)[slot])

@@ -161,7 +161,7 @@ class UnitColumns:
     air_scan: Floats = trait(float)
     acquires: Bools = trait(bool)  # it picks fights by itself
     threat_bits: Ints = trait(int)  # planes on which units fear it
-    defensive: Bools = trait(bool)  # no unit fears it while it does not fight
+    defensive: Bools = trait(bool)  # it picks fights only on order, and no unit fears it while it does not fight
     flees: Bools = trait(bool)  # attacked while idle it runs
     targetable: Bools = trait(bool)  # it may be a target at all
     cloaked: Bools = trait(bool)  # seen by detectors only

@@ -29,6 +29,7 @@ class OrderKind(IntEnum):
 
 WALKS: Final = frozenset({OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL})
 LOOKS_AROUND: Final = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.HOLD, OrderKind.PATROL})
+SEEKS_FIGHTS: Final = LOOKS_AROUND - {OrderKind.IDLE}
 NEEDS_TARGET: Final = frozenset({OrderKind.ATTACK_UNIT, OrderKind.FOLLOW})
 
 SMART: Final = 1

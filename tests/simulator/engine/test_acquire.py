@@ -59,6 +59,22 @@ def test_an_attack_move_fights_and_then_goes_on_to_its_point(field: Any) -> None
     assert math.dist(world.pos[stalker], (24, 16)) < 0.1
 
 
+@pytest.mark.parametrize("order", ["attack_move", "patrol", "attack_unit"])
+@pytest.mark.parametrize("weapon", ["Marine", "SiegeTank"])
+def test_an_order_that_is_given_again_and_again_interrupts_no_attack(make_field: Any, order: str, weapon: str) -> None:
+    lives = []
+    for every in (200, 2):
+        field = make_field(seed=3)
+        attacker, foe = field.put(weapon, 1, 10, 16), field.still("Ultralisk", 2, 15, 16)
+        goal = field.world.tag_of(foe) if order == "attack_unit" else (24, 16)
+        for loop in range(200):
+            if loop % every == 0:
+                getattr(commands, order)(field.world, [attacker], goal)
+            field.play(1)
+        lives.append(field.world.life[foe])
+    assert lives[0] == lives[1] < 450
+
+
 def test_a_unit_that_holds_fires_but_does_not_walk(field: Any) -> None:
     world = field.world
     stalker = field.put("Stalker", 1, 10, 16)
@@ -117,6 +133,25 @@ def test_workers_do_not_pick_fights(field: Any) -> None:
     assert commands.attack_unit(world, [probe], world.tag_of(foe)) == [probe]
     field.play(20)
     assert world.target[probe] == foe
+
+
+@pytest.mark.parametrize("give", [commands.attack_move, commands.patrol], ids=["attack-move", "patrol"])
+def test_workers_on_an_attack_move_fight_whom_they_meet(field: Any, give: Any) -> None:
+    world = field.world
+    drones = [field.put("Drone", 1, 10 + i % 4, 14 + i // 4) for i in range(12)]
+    victims = [field.still("SCV", 2, 18, 14 + i) for i in range(6)]
+    give(world, drones, (22, 16))
+    field.until(lambda: not world.alive[victims].all(), most=200)
+    assert world.alive[drones].all()
+
+
+def test_a_worker_on_a_plain_walk_or_at_work_fights_nobody(field: Any) -> None:
+    world = field.world
+    drone, foe = field.put("Drone", 1, 10, 16), field.still("SCV", 2, 14, 16)
+    commands.move(world, [drone], (20, 16))
+    field.play(120)
+    assert world.life[foe] == 45
+    assert world.target[drone] == -1
 
 
 def test_a_unit_under_attack_turns_on_an_attacker_beyond_its_scan_range_and_calls_its_friends(field: Any) -> None:
