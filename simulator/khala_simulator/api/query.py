@@ -13,6 +13,7 @@ from s2clientprotocol import error_pb2, query_pb2
 
 from khala_simulator.abilities.protoss import warpgate
 from khala_simulator.api.abilities import result_of, usable
+from khala_simulator.combat import fog
 from khala_simulator.economy import building_sites
 from khala_simulator.movement import pathfinding
 from khala_simulator.tables.layers import Layer
@@ -51,7 +52,11 @@ def _abilities(seat: PlayerSeat, tag: int, *, ignore_cost: bool) -> query_pb2.Re
 
 
 def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> float:
-    """Return the length of the way on the ground, 0 where there is none; a flying unit's is the straight line."""
+    """Return the length of the way on the ground, 0 where there is none; a flying unit's is the straight line.
+
+    A way that starts inside a structure, as from the start location, counts from the nearest free place beside it.
+    Structures that the player does not know of are no obstacle.
+    """
     world, (ox, oy) = seat.world, seat.origin
     end = (question.end_pos.x + ox, question.end_pos.y + oy)
     start = (question.start_pos.x + ox, question.start_pos.y + oy)
@@ -66,7 +71,12 @@ def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> floa
         return 0.0
     if flying:
         return math.dist(start, end)
-    return pathfinding.surface(world.ground, Layer.WALK).distance(np.array(start), np.array(end))
+    unknown = fog.unknown_to(world, seat.player, np.array(list(world.ground.blocked), dtype=np.int64))
+    surface = pathfinding.surface(world.ground, Layer.WALK, tuple(unknown.tolist()))
+    here, there = np.array(start), np.array(end)
+    inside = world.map.terrain.walk[int(start[1]), int(start[0])] and not surface.flat[surface.cell(here)]
+    beside = surface.nearest_free(here) if inside else None
+    return surface.distance(here if beside is None else surface.centre(np.array(beside)), there)
 
 
 def _on_map(world: World, x: float, y: float) -> bool:

@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 VISIBLE: Final = 2
 
 
+def unknown_to(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return those of some units that a player neither owns nor sees nor remembers; all know the neutral ones."""
+    known = world.visible[player, slots] | (world.owner[slots] == player) | (world.owner[slots] == NEUTRAL)
+    of_unit = world.memories[player].of_unit
+    hidden = [slot for slot in slots[~known].tolist() if int(world.tag[slot]) not in of_unit]
+    return np.array(hidden, dtype=np.int64)
+
+
 def remember(world: World, player: int) -> None:
     """Update a player's memory with the player's sight in this loop."""
     memory = world.memories[player]

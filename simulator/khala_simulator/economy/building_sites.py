@@ -1,7 +1,9 @@
 """Sites: where a structure may stand; builders, the API's query and the computer player ask here.
 
 The rules are those of the placement footprint in the tables: buildable ground, no unit on it, distance to resources,
-creep, power, and gas structures on geysers only. Above: ``skills.construction``, ``skills.addons``, ``api.query``.
+creep, power, and gas structures on geysers only. Who only asks is answered by what the player knows: what is cloaked,
+burrowed or in the fog is in the way of a builder that has arrived, and of no plan. Above: ``skills.construction``,
+``skills.addons``, ``api.query``.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from khala_simulator.combat import fog
 from khala_simulator.economy import power
 from khala_simulator.movement.placement import snapped
 from khala_simulator.tables.action_result import ActionResult
@@ -42,8 +45,11 @@ def centre(world: World, unit: UnitType, point: Point) -> Point:
     return point if footprint is None else snapped(point, footprint.size)
 
 
-def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionResult:
-    """Return why a player can't place a structure at a point, or success, for any builder."""
+def refusal(world: World, player: int, unit: UnitType, point: Point, *, on_site: bool = False) -> ActionResult:
+    """Return why a player can't place a structure at a point, or success, for any builder.
+
+    ``on_site``: by what is there; otherwise by what the player knows of it.
+    """
     footprint = footprint_of(world, unit)
     if footprint is None:
         return ActionResult.NOT_SUPPORTED
@@ -54,8 +60,9 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionRe
     cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
     return (
         _of_ground(world, player, footprint, cells)
+        or _of_units(world, player, cells, on_site=on_site)
         or _of_resources(world, footprint, cells)
-        or _of_creep(world, footprint, cells)
+        or _of_creep(world, player, footprint, cells, on_site=on_site)
         or _of_power(world, player, unit, (x, y))
         or ActionResult.SUCCESS
     )
@@ -72,19 +79,32 @@ def _of_ground(world: World, player: int, footprint: UnitFootprint, cells: Ints)
         return ActionResult.CANT_BUILD_LOCATION_INVALID
     if "Fogged" in footprint.forbids and (world.visibility[player, y, x] < VISIBLE).any():
         return ActionResult.CANT_SEE_BUILD_LOCATION
-    if taken(world)[y, x].any() or _enemies_on(world, player, cells):
-        return ActionResult.CANT_BUILD_ON_THAT
     return None
 
 
-def _enemies_on(world: World, player: int, cells: Ints) -> bool:
-    """Return whether units of others stand in the way; own units make room."""
+def _of_units(world: World, player: int, cells: Ints, *, on_site: bool) -> ActionResult | None:
+    on_it = _enemies_on(world, player, cells)
+    if taken(world)[cells[:, 1], cells[:, 0]].any():
+        on_it = np.concatenate((on_it, _standing_on(world, cells)))
+    hidden = 0 if on_site else len(fog.unknown_to(world, player, on_it))
+    return ActionResult.CANT_BUILD_ON_THAT if len(on_it) > hidden else None
+
+
+def _enemies_on(world: World, player: int, cells: Ints) -> Ints:
+    """Return the units of others that stand in the way; own units make room."""
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
     live = world.live
     others = live[(world.owner[live] != player) & (world.layer_bits[live] != 0) & ~world.walled[live]]
     others = others[world.layer[others] != 2]
-    inside = ((world.pos[others] > low) & (world.pos[others] < high)).all(axis=1)
-    return bool(inside.any())
+    found: Ints = others[((world.pos[others] > low) & (world.pos[others] < high)).all(axis=1)]
+    return found
+
+
+def _standing_on(world: World, cells: Ints) -> Ints:
+    """Return the structures and resources on any of the cells."""
+    wanted = {(x, y) for x, y in cells.tolist()}
+    found = [s for s in world.live.tolist() if any((x, y) in wanted for x, y in world.footprint_cells(s).tolist())]
+    return np.array(found, dtype=np.int64)
 
 
 def taken(world: World) -> Bools:
@@ -118,11 +138,15 @@ def _of_resources(world: World, footprint: UnitFootprint, cells: Ints) -> Action
     return None
 
 
-def _of_creep(world: World, footprint: UnitFootprint, cells: Ints) -> ActionResult | None:
-    on_creep = world.creep[cells[:, 1], cells[:, 0]]
+def _of_creep(
+    world: World, player: int, footprint: UnitFootprint, cells: Ints, *, on_site: bool
+) -> ActionResult | None:
+    x, y = cells[:, 0], cells[:, 1]
+    on_creep = world.creep[y, x]
     if "Creep" in footprint.requires and not on_creep.all():
         return ActionResult.CANT_BUILD_TOO_FAR_FROM_CREEP_SOURCE
-    if "Creep" in footprint.forbids and on_creep.any():
+    seen = on_creep if on_site else on_creep & (world.visibility[player, y, x] == VISIBLE)
+    if "Creep" in footprint.forbids and seen.any():
         return ActionResult.CANT_BUILD_ON_THAT
     return None
 

@@ -331,15 +331,15 @@ def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
     return terrain.walk if layer is Layer.WALK else terrain.glide
 
 
-def surface(ground: Ground, layer: Layer) -> Surface:
-    """Return the surface that units of a layer move on now."""
-    found = ground.surfaces.get(layer)
+def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surface:
+    """Return the surface that units of a layer move on now, as if some structures (slots) were not there."""
+    found = ground.surfaces.get((layer, without))
     if not isinstance(found, Surface):
-        bare = layer is Layer.AIR or not ground.blocked
-        found = _bare_surface(ground.terrain, layer) if bare else Surface(_free_now(ground, layer))
-        ground.surfaces[layer] = found
+        bare = layer is Layer.AIR or len(ground.blocked) == len(without)
+        found = _bare_surface(ground.terrain, layer) if bare else Surface(_free_now(ground, layer, without))
+        ground.surfaces[layer, without] = found
     return found
 
 
-def _free_now(ground: Ground, layer: Layer) -> Grid:
-    return ground.with_structures(_layer_grid(ground.terrain, layer))
+def _free_now(ground: Ground, layer: Layer, without: tuple[int, ...]) -> Grid:
+    return ground.with_structures(_layer_grid(ground.terrain, layer), without)

@@ -32,9 +32,9 @@ class UsageError(Exception):
 # as the whole of it.
 GAME_OVER = "Game has already ended"
 
-_ALWAYS = frozenset({"ping", "quit"})
+_ALWAYS = frozenset({"ping", "quit", "replay_info"})
 _LOBBY = _ALWAYS | {
-    "create_game", "start_replay", "replay_info", "available_maps", "save_map",
+    "create_game", "start_replay", "available_maps", "save_map",
     "join_lan",  # a guest joins the game that another process hosts
 }  # fmt: skip
 _WATCH = _ALWAYS | {"game_info", "data", "observation", "create_game", "start_replay"}

@@ -1,7 +1,8 @@
 """Construction: unfinished structures progress, by themselves or while a builder works on them.
 
 A Terran builder has the order to follow its site, under the id of what it builds, and works when it is beside it; so
-any builder that is sent to an unfinished structure continues it. Life and shields grow evenly with the progress.
+any builder that is sent to an unfinished structure continues it. One without further orders begins to gather from the
+gas structure that it has finished. Life and shields grow evenly with the progress.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 WHOLE: Final = 1.0 - 1e-9
-FOLLOW: Final = int(OrderKind.FOLLOW)
+FOLLOW, IDLE = int(OrderKind.FOLLOW), int(OrderKind.IDLE)
 BESIDE: Final = 2.0  # from edge to edge: a builder works on its site from as far as it places one on a geyser
 
 
@@ -84,3 +85,5 @@ def _grow(world: World, sites: Ints) -> None:
         if builder >= 0:
             world.site[builder] = -1
             commands.begin_next(world, builder)
+            if world.order_kind[builder] == IDLE:
+                commands.gather(world, [builder], world.tag_of(slot))  # if it is a gas structure

@@ -27,3 +27,8 @@ class Cast:
     point: Point | None = None
     begun: int = 0
     was: int = -1
+
+    @property
+    def is_carried_out(self) -> bool:
+        """Whether the caster is at it already, and finds out what its player could not know before."""
+        return self.begun > 0

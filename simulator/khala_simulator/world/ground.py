@@ -8,6 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from khala_simulator.maps.game_map import Grid, Terrain
     from khala_simulator.tables.layers import Layer
     from khala_simulator.world.columns import Ints
@@ -16,14 +18,15 @@ if TYPE_CHECKING:
 class Ground:
     """The terrain with the structures that stand on it now.
 
-    ``surfaces`` stores what ``pathfinding`` computes per layer; it is empty after every change.
+    ``surfaces`` stores what ``pathfinding`` computes for a layer and the structures left out; it is empty after every
+    change.
     """
 
     def __init__(self, terrain: Terrain) -> None:
         self.terrain = terrain
         self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
         self.blocked: dict[int, Ints] = {}  # slot -> (k, 2) cells (x, y) of its structure
-        self.surfaces: dict[Layer, object] = {}
+        self.surfaces: dict[tuple[Layer, tuple[int, ...]], object] = {}
 
     def block(self, slot: int, cells: Ints) -> None:
         """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
@@ -38,11 +41,12 @@ class Ground:
         if self.blocked.pop(slot, None) is not None:
             self._changed()
 
-    def with_structures(self, grid: Grid) -> Grid:
-        """Return a copy of a grid of free cells (h, w) with the cells of the structures taken."""
+    def with_structures(self, grid: Grid, without: Collection[int] = ()) -> Grid:
+        """Return a copy of a grid of free cells (h, w) with the cells taken of all structures but some (slots)."""
         grid = grid.copy()
-        for cells in self.blocked.values():
-            grid[cells[:, 1], cells[:, 0]] = False
+        for slot, cells in self.blocked.items():
+            if slot not in without:
+                grid[cells[:, 1], cells[:, 0]] = False
         return grid
 
     def _changed(self) -> None:

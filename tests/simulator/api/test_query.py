@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from s2clientprotocol import common_pb2, error_pb2, query_pb2, raw_pb2
+from s2clientprotocol import common_pb2, debug_pb2, error_pb2, query_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.process.client import Client, interface
@@ -99,6 +99,76 @@ def test_a_base_may_be_placed_where_nobody_has_looked_yet() -> None:
     assert all(math.dist(unseen, (field.x, field.y)) > 6 for field in fields)
     assert place(client, PYLON, *unseen) != "CantSeeBuildLocation"
     assert place(client, SPINE_CRAWLER, *unseen) == "CantSeeBuildLocation"
+
+
+def put(client: Client, unit_type: int, owner: int, x: float, y: float) -> None:
+    made = debug_pb2.DebugCreateUnit(unit_type=unit_type, owner=owner, pos=common_pb2.Point2D(x=x, y=y), quantity=1)
+    client.debug(debug_pb2.DebugCommand(create_unit=made))
+    client.step(4)
+
+
+ZERGLING, BURROWED_ZERGLING, DARK_TEMPLAR, OBSERVER, BARRACKS = 105, 119, 76, 82, 21
+
+
+@pytest.mark.parametrize(
+    ("unit_type", "owner", "result"),
+    [
+        (ZERGLING, 2, "CantBuildOnThat"), (BURROWED_ZERGLING, 2, "Success"), (DARK_TEMPLAR, 2, "Success"),
+        (DARK_TEMPLAR, 1, "Success"), (BARRACKS, 2, "CantBuildOnThat"),
+    ],
+)  # fmt: skip
+def test_a_place_is_not_refused_for_what_the_player_does_not_see(unit_type: int, owner: int, result: str) -> None:
+    client = Client()
+    client.play("2s3z", interface(screen=0))
+    put(client, unit_type, owner, 9.5, 16.5)
+    assert place(client, PYLON, 9.0, 16.0) == result
+
+
+def foes_ground() -> tuple[Client, tuple[float, float]]:
+    """Return a game with fog, and a place beside the enemy's base on which a structure may stand."""
+    client = Client()
+    client.play("Simple64", interface(screen=0))
+    (foe,) = client.ask(game_info=sc.RequestGameInfo()).game_info.start_raw.start_locations
+    return client, (foe.x - 12.5, foe.y - 0.5) if foe.x > 44 else (foe.x + 12.5, foe.y - 0.5)
+
+
+@pytest.mark.parametrize("unit_type", [BARRACKS, ZERGLING])
+def test_what_the_fog_covers_is_in_the_way_of_no_plan(unit_type: int) -> None:
+    client, (x, y) = foes_ground()
+    put(client, unit_type, 2, x, y)
+    assert place(client, PYLON, x, y) == "Success"
+    put(client, OBSERVER, 1, x, y - 4)  # comes to look
+    assert place(client, PYLON, x, y) == "CantBuildOnThat"
+
+
+def test_a_way_leads_through_structures_that_nobody_has_seen() -> None:
+    client, (x, y) = foes_ground()
+    start, end = (x - 4.0, y), (x + 4.0, y)
+    before = distance(client, start, end)
+    put(client, BARRACKS, 2, x, y)
+    assert distance(client, start, end) == before
+    put(client, OBSERVER, 1, x, y - 4)
+    assert distance(client, start, end) > before
+
+
+def test_a_way_that_starts_inside_the_town_hall_counts_from_beside_it() -> None:
+    client = Client()
+    client.play("Simple64", interface(screen=0))
+    units = client.observe().observation.raw_data.units
+    (hall,) = [unit for unit in units if unit.alliance == raw_pb2.Self and unit.radius > 2]
+    (foe, *_) = client.ask(game_info=sc.RequestGameInfo()).game_info.start_raw.start_locations
+    worker = next(unit for unit in units if unit.alliance == raw_pb2.Self and unit.radius < 1)
+    goal = (foe.x - 6.0, foe.y) if foe.x > 44 else (foe.x + 6.0, foe.y)
+    way = distance(client, (hall.pos.x, hall.pos.y), goal)
+    assert way == pytest.approx(distance(client, worker.tag, goal), abs=6.0)
+    assert way > math.dist((hall.pos.x, hall.pos.y), goal) - 6.0
+
+
+def test_a_way_into_a_structure_or_a_cliff_is_none(client: Client) -> None:
+    cliff = next(
+        (x, y) for x in range(2, 30) for y in range(2, 30) if not distance(client, (x + 0.5, y + 0.5), (9.0, 16.0))
+    )
+    assert distance(client, (9.0, 16.0), (cliff[0] + 0.5, cliff[1] + 0.5)) == 0.0
 
 
 def test_abilities_are_told_of_own_units_only(client: Client) -> None:

@@ -101,6 +101,23 @@ def test_an_scv_stays_until_it_is_done(field: Field) -> None:
     assert field.world.orders_of(scv) == []
 
 
+@pytest.mark.parametrize("name", ["SupplyDepot", "Refinery"])
+@pytest.mark.parametrize("waits", [True, False])
+def test_who_finishes_a_refinery_and_has_nothing_else_to_do_gathers(field: Field, name: str, *, waits: bool) -> None:
+    scv, geyser = field.put("SCV", 1, 20.0, 20.0), field.put("VespeneGeyser", 0, 26.5, 20.5)
+    field.put("CommandCenter", 1, 16.5, 20.5)
+    aim = {"target": field.world.tag_of(geyser)} if name == "Refinery" else {"point": (24.0, 26.0)}
+    order(field, scv, BUILD[name], **aim)
+    built = placed(field, name)
+    if waits:
+        commands.move(field.world, [scv], (20.0, 10.0), queue=True)
+    field.until(lambda: field.world.build_progress[built] >= 1.0)
+    orders = [o.ability for o in field.world.orders_of(scv)]
+    assert orders == ([16] if waits else [295] if name == "Refinery" else [])
+    if orders == [295]:
+        field.until(lambda: field.world.players[1].vespene > 2000.0)
+
+
 def test_nothing_grows_while_nobody_builds_and_another_scv_can_go_on(field: Field) -> None:
     scv, other = field.put("SCV", 1, 20.0, 20.0), field.put("SCV", 1, 18.0, 20.0)
     order(field, scv, BUILD["SupplyDepot"], point=(24.0, 20.0))
@@ -202,6 +219,20 @@ def test_what_stands_in_the_way_when_the_builder_comes_ends_the_order(field: Fie
     assert not has(field, "Pylon")
     assert field.world.players[1].minerals == 2000.0
     assert field.world.mishaps[0].refusal is ActionResult.CANT_BUILD_ON_THAT
+
+
+@pytest.mark.parametrize(
+    ("name", "hidden"), [("ZerglingBurrowed", True), ("DarkTemplar", True), ("Zergling", False)]
+)
+def test_a_builder_finds_out_on_the_site_what_its_player_does_not_see(field: Field, name: str, *, hidden: bool) -> None:
+    probe = field.put("Probe", 1, 20.0, 20.0)
+    field.still(name, 2, 30.0, 20.0)
+    field.play(2)
+    known = order(field, probe, BUILD["Pylon"], point=(30.0, 20.0))
+    assert known == ([probe] if hidden else [])
+    field.play(120)
+    assert not has(field, "Pylon")
+    assert [mishap.refusal for mishap in field.world.mishaps] == [ActionResult.CANT_BUILD_ON_THAT] * hidden
 
 
 def test_a_structure_needs_what_comes_before_it(field: Field) -> None:

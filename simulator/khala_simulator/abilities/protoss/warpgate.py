@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.abilities.skill import Skill
+from khala_simulator.combat import fog
 from khala_simulator.economy import construction, payments, power
 from khala_simulator.movement import pathfinding
 from khala_simulator.tables import prices
@@ -67,11 +68,12 @@ def refusal(world: World, player: int, unit: UnitType, point: Point) -> ActionRe
     """Return why a player can't warp a unit in at a point, or success."""
     if power.best(world, player, point) is None:
         return ActionResult.CANT_BUILD_TOO_FAR_FROM_POWER
-    return ActionResult.SUCCESS if _is_free(world, unit, point) else ActionResult.CANT_WARP_IN_UNITS_THERE
+    known_free = _is_free(world, unit, point, player=player)
+    return ActionResult.SUCCESS if known_free else ActionResult.CANT_WARP_IN_UNITS_THERE
 
 
-def _is_free(world: World, unit: UnitType, point: Point) -> bool:
-    """Return whether a unit's body touches no other body and no wall at a point."""
+def _is_free(world: World, unit: UnitType, point: Point, *, player: int | None = None) -> bool:
+    """Return whether a unit's body touches no wall and no other body at a point; a player asks of the known ones."""
     at = np.array([point])
     surface = pathfinding.surface(world.ground, layer_of(unit))
     if not surface.flat[surface.cell(at)][0]:
@@ -80,7 +82,8 @@ def _is_free(world: World, unit: UnitType, point: Point) -> bool:
     bodies = live[(world.layer[live] != 2) & ~world.walled[live] & (world.separation[live] > 0.0)]
     offset = world.pos[bodies] - at
     apart = (world.separation[bodies] + unit.separation) * 0.98
-    return not bool((offset[:, 0] ** 2 + offset[:, 1] ** 2 < apart**2).any())
+    touched = bodies[offset[:, 0] ** 2 + offset[:, 1] ** 2 < apart**2]
+    return len(touched) == (0 if player is None else len(fog.unknown_to(world, player, touched)))
 
 
 def _hurry(world: World, slots: list[int]) -> None:

@@ -79,7 +79,7 @@ def _can_place(world: World, cast: Cast) -> ActionResult:
         return ActionResult.SUCCESS if free else ActionResult.CANT_BUILD_ON_THAT
     if cast.point is None:
         return ActionResult.CANT_FIND_PLACEMENT_LOCATION
-    return building_sites.refusal(world, owner, unit, cast.point)
+    return building_sites.refusal(world, owner, unit, cast.point, on_site=cast.is_carried_out)
 
 
 def _is_known(world: World, _: int, ability: Ability) -> ActionResult:
@@ -93,6 +93,8 @@ def _summon(world: World, slots: list[int], ability: Ability, _: int, point: Poi
     if unit is None or point is None:
         return []
     owner = int(world.owner[slots[0]])
+    if building_sites.refusal(world, owner, unit, point, on_site=True) is not ActionResult.SUCCESS:
+        return []
     paid = payments.charge(world, owner, prices.cost_of(ability))
     construction.begin(world, unit, owner, building_sites.centre(world, unit, point), loops=ability.loops, paid=paid)
     world.timers.setdefault(slots[0], {})[ability.timer] = world.loop + ability.cooldown_loops

@@ -41,7 +41,8 @@ def _can_lift(world: World, cast: Cast) -> ActionResult:
 def _can_land(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
         return ActionResult.CANT_LAND_LOCATION_INVALID
-    why = building_sites.refusal(world, int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit), cast.point)
+    owner, unit = int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit)
+    why = building_sites.refusal(world, owner, unit, cast.point, on_site=cast.is_carried_out)
     return ActionResult.SUCCESS if why is ActionResult.SUCCESS else ActionResult.CANT_LAND_LOCATION_INVALID
 
 

@@ -30,7 +30,8 @@ def _has_room(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
         return ActionResult.CANT_BUILD_LOCATION_INVALID
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, cast.point)
+    owner = int(world.owner[cast.slot])
+    return building_sites.refusal(world, owner, unit, cast.point, on_site=cast.is_carried_out)
 
 
 def _place_turret(world: World, cast: Cast) -> None:

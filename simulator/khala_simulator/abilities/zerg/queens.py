@@ -60,7 +60,8 @@ def _plant(world: World, cast: Cast) -> None:
 def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
     """Return why there is no room: it takes creep without a structure, and sight for a tumor's own."""
     unit = world.catalog.unit(cast.ability.unit)
-    return building_sites.refusal(world, int(world.owner[cast.slot]), unit, place_of(world, cast))
+    owner = int(world.owner[cast.slot])
+    return building_sites.refusal(world, owner, unit, place_of(world, cast), on_site=cast.is_carried_out)
 
 
 def _burrow_when_grown(world: World, slots: list[int]) -> None:
