@@ -82,7 +82,12 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
 
 
 def new_game(
-    game_map: GameMap, players: Sequence[PlayerSetup] = (), *, seed: int = 0, catalog: Catalog | None = None
+    game_map: GameMap,
+    players: Sequence[PlayerSetup] = (),
+    *,
+    seed: int = 0,
+    catalog: Catalog | None = None,
+    fog: bool = True,
 ) -> World:
     """Return a world at loop 0 in which the map's script has run its start.
 
@@ -91,8 +96,9 @@ def new_game(
         players: The players in the slots; by default as the scenario says.
         seed: The seed of every random draw of the game.
         catalog: The tables of a game version; 4.10 by default.
+        fog: False lifts the fog of the map.
     """
-    world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog)
+    world = World(game_map, players or triggers.players_of(game_map), seed=seed, catalog=catalog, fog=fog)
     triggers.start(world)
     creep.spread(world)
     vision.look(world)

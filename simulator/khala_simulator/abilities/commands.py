@@ -196,10 +196,17 @@ def debug_switch(world: World, player: int, name: str) -> None:
 
 
 def debug_upgrade(world: World, player: int) -> None:
-    """Give a player every upgrade that can be researched."""
+    """Give a player every upgrade that can be researched; of those with levels the next level."""
+    before = {upgrade.name for upgrade in world.catalog.upgrades if upgrade.id in world.players[player].upgrades}
     for ability in world.catalog.abilities:
-        if ability.effect == "research":
+        if ability.effect == "research" and _level_before(ability.upgrade) in {"", *before}:
             grant_upgrade(world, player, world.catalog.upgrade(ability.upgrade).id)
+
+
+def _level_before(upgrade: str) -> str:
+    """Return the name of the level before that of an upgrade, empty for the first one and for those without levels."""
+    name, _, level = upgrade.rpartition("Level")
+    return f"{name}Level{int(level) - 1}" if name and level.isdigit() and int(level) > 1 else ""
 
 
 def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:

@@ -24,7 +24,7 @@ MAX_UNITS = 400
 _RESOURCES = 5000
 _SWITCHES = {
     getattr(debug_pb2, name): name
-    for name in ("control_enemy", "food", "free", "god", "cooldown", "tech_tree", "fast_build")
+    for name in ("show_map", "control_enemy", "food", "free", "god", "cooldown", "tech_tree", "fast_build")
 }
 
 
@@ -82,8 +82,6 @@ def _change_state(world: World, player: int, state: debug_pb2.DebugGameState.Val
         purse.minerals += _RESOURCES
     if state in {debug_pb2.all_resources, debug_pb2.gas}:
         purse.vespene += _RESOURCES
-    if state == debug_pb2.show_map:
-        world.visibility[player] = 2
     if state in _SWITCHES:
         commands.debug_switch(world, player, _SWITCHES[state])
     if state == debug_pb2.upgrade:

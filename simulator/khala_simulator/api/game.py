@@ -78,10 +78,9 @@ class HostedGame:
         self.catalog = load_catalog(version)
         self.types = types_of(version)
         players = _player_setups(setup)
-        self.world: World = new_game(setup.game_map, players, seed=setup.seed, catalog=self.catalog)
-        if setup.disable_fog:
-            self.world.fog = False
-            self.world.visibility[:] = _VISIBLE
+        self.world: World = new_game(
+            setup.game_map, players, seed=setup.seed, catalog=self.catalog, fog=not setup.disable_fog
+        )
         self.world.visibility[OBSERVER] = _VISIBLE
         self.seats: dict[int, PlayerSeat] = {}
         self.log: list[LogEntry] = list(log)

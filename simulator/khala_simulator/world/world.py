@@ -95,7 +95,13 @@ class World(UnitColumns, WorldCaches):
     """
 
     def __init__(
-        self, game_map: GameMap, players: Sequence[PlayerSetup], *, seed: int = 0, catalog: Catalog | None = None
+        self,
+        game_map: GameMap,
+        players: Sequence[PlayerSetup],
+        *,
+        seed: int = 0,
+        catalog: Catalog | None = None,
+        fog: bool = True,
     ) -> None:
         UnitColumns.__init__(self)
         WorldCaches.__init__(self)
@@ -108,7 +114,7 @@ class World(UnitColumns, WorldCaches):
         self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty) for p in players]
         self.stats = Stats(self.catalog, len(self.players))
         self.ground = Ground(game_map.terrain)
-        self.fog: bool = game_map.scenario.visibility.fog
+        self.fog: bool = fog and game_map.scenario.visibility.fog
         self.visibility: NDArray[np.uint8]  # (players, h, w): 0 never seen, 1 seen before, 2 visible
         width, height = game_map.terrain.size
         never = 0 if game_map.scenario.visibility.black_mask else 1

@@ -99,6 +99,52 @@ def test_resources_are_given(client: Client) -> None:
     assert (common.minerals, common.vespene) == (5000, 5000)
 
 
+def seen_share(client: Client) -> float:
+    """Return the share of the map that is in sight."""
+    grid = client.observe().observation.raw_data.map_state.visibility
+    return grid.data.count(2) / len(grid.data)
+
+
+def test_the_shown_map_stays_until_it_is_called_again() -> None:
+    client = Client()
+    client.play("Simple64", options=interface(screen=0))
+    foes = [unit for unit in client.observe().observation.raw_data.units if unit.alliance == raw_pb2.Enemy]
+    assert not foes
+    client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.show_map))
+    for _ in range(3):
+        client.step(50)
+        assert seen_share(client) == 1.0
+    assert [u for u in client.observe().observation.raw_data.units if u.alliance == raw_pb2.Enemy]
+    client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.show_map))
+    client.step(20)
+    assert seen_share(client) < 0.5
+    assert not [u for u in client.observe().observation.raw_data.units if u.alliance == raw_pb2.Enemy and u.health]
+
+
+def test_without_fog_every_neutral_unit_is_there_once() -> None:
+    client = Client()
+    client.create("Simple64", disable_fog=True)
+    client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0)))
+    units = client.observe().observation.raw_data.units
+    neutral = [(unit.pos.x, unit.pos.y) for unit in units if unit.alliance == raw_pb2.Neutral]
+    assert neutral
+    assert len(neutral) == len(set(neutral))
+    assert all(unit.display_type == raw_pb2.Visible for unit in units)
+
+
+def upgrades(client: Client) -> set[int]:
+    return set(client.observe().observation.raw_data.player.upgrade_ids)
+
+
+def test_an_upgrade_is_one_level_at_a_time(client: Client) -> None:
+    weapons, blink = [39, 40, 41], 87  # Protoss ground weapons 1 to 3
+    for level in (1, 2, 3, 3):
+        client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.upgrade))
+        client.step()
+        assert [number for number in weapons if number in upgrades(client)] == weapons[:level]
+        assert blink in upgrades(client)
+
+
 @pytest.mark.parametrize(
     "command_",
     [
