@@ -14,7 +14,8 @@ from docs.pages.markdown import code, codes, head, join, table
 from khala_simulator.abilities.casting import ORDINARY, is_modelled
 from khala_simulator.abilities.registry import DEATHS, PASSIVES, SKILLS
 from khala_simulator.tables import stats
-from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import VERSION_OF_BUILD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -15,11 +15,11 @@ from docs.pages.markdown import code, codes, head, join, prose, table
 from khala_simulator.abilities.casting import is_modelled
 from khala_simulator.api.data import rows as api_rows
 from khala_simulator.maps.game_map import load_map, map_names
-from khala_simulator.process.install import BASE_BUILD
 from khala_simulator.process.requests import HANDLERS
 from khala_simulator.process.status import AFTER, LEGAL, Status
-from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.mechanics import entries
+from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
 from khala_simulator.tick import SYSTEMS
 
 if TYPE_CHECKING:
@@ -77,9 +77,9 @@ def _tables() -> str:
     rows = []
     for build, version in VERSION_OF_BUILD.items():
         catalog = load_catalog(version)
-        played = "yes" if build == BASE_BUILD else ""
+        played = code("khala sc2 install" + (f" --version {version}" if version != DEFAULT_VERSION else ""))
         rows.append((version, build, len(catalog.units), len(catalog.weapons), len(catalog.upgrades), played))
-    return table(("tables of version", "build", "unit types", "weapons", "upgrades", "what clients see"), rows)
+    return table(("tables of version", "build", "unit types", "weapons", "upgrades", "what makes an install of it"), rows)
 
 
 def _system(system: Callable[[World], None]) -> str:

@@ -12,7 +12,8 @@ from typing import Annotated, Any
 
 import typer
 
-from khala_simulator.process.install import BASE_BUILD, InstallError, install, is_installed, link_maps
+from khala_simulator.process.install import InstallError, install, installed_version, link_maps
+from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION
 
 app = typer.Typer(
     help="A headless StarCraft II that PySC2 and python-sc2 start and play as if it were the game.",
@@ -25,11 +26,14 @@ OwnMaps = Annotated[
     Path | None,
     typer.Option("--maps", help="Your own .SC2Map files: a directory of them, or a StarCraft II with a folder Maps."),
 ]
+Version = Annotated[str, typer.Option(help=f"Version of the game: {' or '.join(BUILD_OF_VERSION)}.")]
 Directory = Annotated[Path, typer.Argument(help="Made if it is not there. Never one with a real StarCraft II.")]
 
 
 @app.command("install")
-def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = False) -> None:
+def install_command(
+    directory: Directory, maps: OwnMaps = None, version: Version = DEFAULT_VERSION, as_json: Json = False
+) -> None:
     """Set up DIRECTORY like a StarCraft II install.
 
     Clients find it by the environment variable SC2PATH:
@@ -39,10 +43,11 @@ def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = 
         export SC2PATH=~/khala-sc2
 
     Run it again to repair the install and update its maps; your additions stay. Your own maps are linked: terrain and
-    units are read from the file, their scripts are not run.
+    units are read from the file, their scripts are not run. An install is one version of the game; with another
+    --version it becomes that one.
     """
     try:
-        root = install(directory)
+        root = install(directory, version)
         own = [] if maps is None else link_maps(root, maps)
     except InstallError as error:
         typer.echo(f"Not installed: {error}.", err=True)
@@ -52,14 +57,14 @@ def install_command(directory: Directory, maps: OwnMaps = None, as_json: Json = 
     linked = [entry.path for entry in own if not entry.trouble]
     if as_json:
         left_out = {str(entry.source): entry.trouble for entry in own if entry.trouble}
-        facts = {"path": str(root), "maps": list(map_names()), "linked": linked, "left_out": left_out}
+        facts = {"path": str(root), "version": version, "maps": list(map_names()), "linked": linked, "left_out": left_out}
         typer.echo(json.dumps(facts))
         return
     for entry in own:
         if entry.trouble:
             typer.echo(f"Left out {entry.source}: {entry.trouble}.", err=True)
     and_yours = f" and {len(linked)} of yours" if maps is not None else ""
-    typer.echo(f"Installed {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
+    typer.echo(f"Installed version {version} with {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
 
 
 @app.command()
@@ -69,7 +74,7 @@ def info(as_json: Json = False) -> None:
     if as_json:
         typer.echo(json.dumps(facts))
         return
-    typer.echo(f"StarCraft II 4.10.0 (build {facts['build']}), simulated")
+    typer.echo(f"StarCraft II {facts['version']} (build {facts['build']}), simulated")
     typer.echo(f"SC2PATH: {facts['sc2path'] or 'not set'} ({facts['sc2path_is']})")
     for entry in facts["maps"]:
         typer.echo(f"  {entry['name']:<40} {entry['title']}")
@@ -79,16 +84,18 @@ def _facts() -> dict[str, Any]:
     from khala_simulator.maps.game_map import map_names, map_title  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     path = os.environ.get("SC2PATH")
+    version = None if not path else installed_version(path)
     if not path:
         kind = "run khala sc2 install DIRECTORY first"
-    elif is_installed(path):
+    elif version is not None:
         kind = "this simulator"
     elif Path(path).is_dir():
         kind = "not an install of this simulator"
     else:
         kind = "no such directory"
     maps = [{"name": name, "title": map_title(name)} for name in map_names()]
-    return {"build": BASE_BUILD, "sc2path": path, "sc2path_is": kind, "maps": maps}
+    shown = version or DEFAULT_VERSION
+    return {"version": shown, "build": BUILD_OF_VERSION[shown], "sc2path": path, "sc2path_is": kind, "maps": maps}
 
 
 @app.command()

@@ -17,12 +17,13 @@ def test_install_makes_an_install_and_says_what_to_do_next(tmp_path: Path) -> No
     result = run(app, ["install", str(tmp_path / "game")])
     assert result.exit_code == 0
     assert is_installed(tmp_path / "game")
-    assert result.stdout == f"Installed {len(map_names())} maps. Now: export SC2PATH={tmp_path / 'game'}\n"
+    expected = f"Installed version 4.10 with {len(map_names())} maps. Now: export SC2PATH={tmp_path / 'game'}\n"
+    assert result.stdout == expected
 
 
 def test_install_has_json(tmp_path: Path) -> None:
     result = run(app, ["install", str(tmp_path), "--json"])
-    expected = {"path": str(tmp_path), "maps": list(map_names()), "linked": [], "left_out": {}}
+    expected = {"path": str(tmp_path), "version": "4.10", "maps": list(map_names()), "linked": [], "left_out": {}}
     assert json.loads(result.stdout) == expected
 
 
@@ -33,6 +34,21 @@ def test_an_install_that_fails_is_one_sentence_on_stderr(tmp_path: Path) -> None
     assert result.stdout == ""
     expected = f"Not installed: {tmp_path} holds a real StarCraft II (.build.info); choose another directory.\n"
     assert result.stderr == expected
+
+
+def test_an_install_is_of_the_version_that_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SC2PATH", str(tmp_path))
+    for version, build in (("4.10", 75689), ("5.0.13", 92440), ("4.10", 75689)):
+        assert run(app, ["install", str(tmp_path), "--version", version]).exit_code == 0
+        assert [path.name for path in (tmp_path / "Versions").iterdir()] == [f"Base{build}"]
+        facts = json.loads(run(app, ["info", "--json"]).stdout)
+        assert (facts["version"], facts["build"], facts["sc2path_is"]) == (version, build, "this simulator")
+
+
+def test_a_version_without_tables_is_refused_with_those_that_there_are(tmp_path: Path) -> None:
+    result = run(app, ["install", str(tmp_path), "--version", "5.0.11"])
+    assert result.exit_code == 1
+    assert result.stderr == "Not installed: there are no tables of version 5.0.11, only of 4.10 and 5.0.13.\n"
 
 
 @pytest.mark.parametrize(

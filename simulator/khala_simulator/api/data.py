@@ -31,10 +31,15 @@ def rows(name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(lines, delimiter="\t", quoting=csv.QUOTE_NONE, restval=""))
 
 
+def abilities(version: str) -> list[dict[str, str]]:
+    """Return the rows of the abilities that a version of the game has; the first ids are the same in all."""
+    return rows("abilities") + (rows("abilities_5") if version.startswith("5.") else [])
+
+
 def answer(catalog: Catalog, request: sc2api_pb2.RequestData) -> sc2api_pb2.ResponseData:
     """Return the tables that a request asks for."""
     return sc2api_pb2.ResponseData(
-        abilities=map(_ability, rows("abilities")) if request.ability_id else (),
+        abilities=map(_ability, abilities(catalog.version)) if request.ability_id else (),
         units=_units(catalog) if request.unit_type_id else (),
         upgrades=_upgrades(catalog) if request.upgrade_id else (),
         buffs=map(_buff, rows("buffs")) if request.buff_id else (),
@@ -63,7 +68,10 @@ def _ability(row: dict[str, str]) -> data_pb2.AbilityData:
     if row["footprint_radius"]:
         data.is_building = True
         data.footprint_radius = float(row["footprint_radius"])
-        data.is_instant_placement = "i" in flags
+    if "i" in flags:
+        data.is_instant_placement = True
+    if row["hotkey"]:
+        data.hotkey = row["hotkey"]
     if "a" in flags:
         data.allow_autocast = True
     return data

@@ -24,7 +24,8 @@ from pydantic import (
     model_validator,
 )
 
-from khala_simulator.tables.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection

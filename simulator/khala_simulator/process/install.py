@@ -1,7 +1,7 @@
 """Set up a directory like a StarCraft II install whose game is this simulator.
 
 Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that becomes the process of
-`__main__.py`. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are
+`__main__.py`; the number is the build of the game that it is. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are
 linked, not copied: they stay where they are.
 
 Above: `cli.py`. Below: the list of scenarios.
@@ -17,13 +17,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-BASE_BUILD = 75689
-"""Build of 4.10.0: the newest for Linux that both PySC2 and python-sc2 know."""
+from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION
 
 OWN_FOLDER = "user"
 """Folder below `Maps` for maps without a folder of their own."""
 
-_EXECUTABLE = Path("Versions") / f"Base{BASE_BUILD}" / "SC2_x64"
 _MARK = "# The simulator of Khala stands in for the game here."
 _REAL = (".build.info", "SC2Data", "StarCraft II.exe", "StarCraft II.app", "Support64")
 
@@ -32,18 +30,24 @@ class InstallError(Exception):
     """The directory cannot become an install; the message says why and what to do."""
 
 
-def install(directory: Path | str) -> Path:
-    """Make a directory that clients take for a StarCraft II install, and return its absolute path.
+def install(directory: Path | str, version: str = DEFAULT_VERSION) -> Path:
+    """Make a directory that clients take for an install of one version of StarCraft II; return its absolute path.
 
-    Calling it again repairs and updates the launcher and the maps, and leaves everything else alone.
+    Calling it again repairs and updates the launcher and the maps, and leaves everything else alone; with another
+    version the install becomes one of that version, because clients start the newest that they find.
 
     Raises:
-        InstallError: a real StarCraft II is there, or something cannot be written.
+        InstallError: there are no tables of this version, a real StarCraft II is there, or something cannot be written.
     """
+    if version not in BUILD_OF_VERSION:
+        raise InstallError(f"there are no tables of version {version}, only of {' and '.join(BUILD_OF_VERSION)}")
     root = Path(directory).expanduser().absolute()
     _refuse_real_game(root)
     try:
-        _write_launcher(root / _EXECUTABLE)
+        for other in BUILD_OF_VERSION:
+            if other != version and (launcher := root / _launcher(other)).exists():
+                shutil.rmtree(launcher.parent)
+        _write_launcher(root / _launcher(version))
         _write_maps(root / "Maps")
         (root / "Replays").mkdir(exist_ok=True)
     except OSError as error:
@@ -84,7 +88,17 @@ def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
 
 def is_installed(directory: Path | str) -> bool:
     """Return whether a directory holds an install of the simulator."""
-    return _is_ours(Path(directory).expanduser() / _EXECUTABLE)
+    return installed_version(directory) is not None
+
+
+def installed_version(directory: Path | str) -> str | None:
+    """Return the version of the game that an install of the simulator is, or None where there is no install."""
+    root = Path(directory).expanduser()
+    return next((version for version in BUILD_OF_VERSION if _is_ours(root / _launcher(version))), None)
+
+
+def _launcher(version: str) -> Path:
+    return Path("Versions") / f"Base{BUILD_OF_VERSION[version]}" / "SC2_x64"
 
 
 def _refuse_real_game(root: Path) -> None:

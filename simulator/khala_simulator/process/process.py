@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala_simulator.tables.catalog import VERSION_OF_BUILD
+from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
 
 if TYPE_CHECKING:
     from google.protobuf.message import Message
@@ -68,7 +68,7 @@ class Process:
         self.base_build = base_build
         self.game_version = f"{_PATCH_OF_BUILD.get(base_build, '0.0.0')}.{base_build}"
         self.data_version = data_version or _DATA_OF_BUILD.get(base_build, "")
-        self.tables = VERSION_OF_BUILD.get(base_build, "4.10")
+        self.tables = VERSION_OF_BUILD.get(base_build, DEFAULT_VERSION)
         self.maps: dict[str, bytes] = {}  # saved by the client, under its path
         self.setup: Setup | None = None  # of the game that is created and not yet joined
         self.playing: Playing | None = None

@@ -29,9 +29,9 @@ from khala_simulator.tables.records import (
     Upgrade,
     Weapon,
 )
+from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION, VERSION_OF_BUILD
 
 __all__ = [
-    "DEFAULT_VERSION",
     "LOOPS_PER_NORMAL_SECOND",
     "Ability",
     "Buff",
@@ -47,8 +47,6 @@ __all__ = [
 ]
 
 LOOPS_PER_NORMAL_SECOND: Final = 16
-DEFAULT_VERSION: Final = "4.10"
-VERSION_OF_BUILD: Final = {75689: "4.10", 92440: "5.0.13"}
 
 
 class CatalogError(ValueError):
@@ -133,7 +131,7 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
     return Catalog(
         version=name,
-        build=next(b for b, v in VERSION_OF_BUILD.items() if v == name),
+        build=BUILD_OF_VERSION[name],
         units=units,
         weapons=weapons,
         upgrades=upgrades,

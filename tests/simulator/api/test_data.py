@@ -48,6 +48,24 @@ def test_specific_abilities_name_their_general_one(
     assert ability.target == data_pb2.AbilityData.Target.Value(target)
 
 
+def test_hotkeys_placements_and_autocast_are_the_games(tables: sc2api_pb2.ResponseData) -> None:
+    blink, tech_lab, repair, nexus = (tables.abilities[number] for number in (1442, 3682, 316, 880))
+    assert (blink.hotkey, nexus.hotkey, tables.abilities[4].hotkey) == ("B", "BN", "S")
+    assert (tech_lab.is_instant_placement, tech_lab.footprint_radius) == (True, 3.5)
+    assert (repair.allow_autocast, blink.allow_autocast) == (True, False)
+    assert (nexus.footprint_radius, nexus.is_building, nexus.is_instant_placement) == (2.5, True, False)
+    assert [a.ability_id for a in tables.abilities if a.is_instant_placement and not a.is_building]  # such as rallies
+
+
+def test_the_abilities_of_5_0_13_are_found_by_their_numbers() -> None:
+    catalog = load_catalog("5.0.13")
+    told = data.answer(catalog, sc2api_pb2.RequestData(ability_id=True)).abilities
+    assert [ability.ability_id for ability in told] == list(range(len(told)))
+    assert (told[4107].link_name, told[4107].friendly_name) == ("BatteryOvercharge", "Effect BatteryOvercharge")
+    assert all(told[a.id].link_name == a.link for a in catalog.abilities if a.id > 3796)
+    assert len(data.answer(load_catalog(), sc2api_pb2.RequestData(ability_id=True)).abilities) == 3797
+
+
 def test_a_stalker_is_described_by_the_numbers_of_4_10(tables: sc2api_pb2.ResponseData) -> None:
     stalker = tables.units[74]
     assert (stalker.mineral_cost, stalker.vespene_cost, stalker.food_required) == (125, 50, 2)

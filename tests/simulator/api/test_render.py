@@ -18,7 +18,8 @@ from khala_simulator.api.sight import OBSERVER, Alliance
 from khala_simulator.api.viewer import Viewer
 from khala_simulator.combat import buffs
 from khala_simulator.process.client import Client, command, interface
-from khala_simulator.tables.catalog import VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import VERSION_OF_BUILD
 from khala_simulator.world.area_effects import AreaEffect
 
 Image = NDArray[Any]

@@ -11,7 +11,8 @@ from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.maps.game_map import GameMap, map_from
 from khala_simulator.maps.scenario_file import parse_scenario
 from khala_simulator.tables.action_result import ActionResult
-from khala_simulator.tables.catalog import DEFAULT_VERSION, load_catalog
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import DEFAULT_VERSION
 from khala_simulator.tick import advance
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY

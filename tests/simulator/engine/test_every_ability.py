@@ -21,7 +21,8 @@ from khala_simulator.maps.game_map import load_map
 from khala_simulator.systems import creep
 from khala_simulator.tables.abilities import Aim
 from khala_simulator.tables.action_result import ActionResult
-from khala_simulator.tables.catalog import DEFAULT_VERSION, VERSION_OF_BUILD, load_catalog
+from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
 from khala_simulator.tick import advance
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY

@@ -13,6 +13,8 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tests.simulator.engine.conftest import Field
+
 HEAL, REPAIR, LOAD = 386, 316, 394
 TRAIN_MARINE, TRAIN_DRONE, CANCEL_LAST = 560, 1342, 306
 
@@ -21,11 +23,11 @@ def kill(field: Any, slot: int) -> None:
     commands.debug_kill(field.world, [field.world.tag_of(slot)])
 
 
-def hit(field: Any, attacker: str, victim: int, *, loops: int) -> int:
+def hit(field: Field, attacker: str, victim: int, *, loops: int) -> int:
     """Put a hit under way that falls due after a number of loops; return the attacker."""
     world = field.world
     source = field.still(attacker, 2, 30, 30)
-    weapon = world.catalog.unit(attacker).weapon_against("ground")
+    weapon = world.catalog.unit(attacker).weapons[0]
     world.pending.append(
         1, source=source, owner=2, target=victim, prior=NOBODY, weapon=weapon.row, hit=0, due=world.loop + loops,
         single=True, goal=world.pos[victim], start=world.pos[source],
@@ -140,7 +142,7 @@ def test_a_hit_due_in_the_loop_of_the_hatching_hits_what_hatched(field: Any) -> 
 # cancelled, and finished ----------------------------------------------------------------------------------------------
 
 
-def begun(field: Any) -> int:
+def begun(field: Field) -> int:
     """Return a production structure with one unit that needs one loop more."""
     world = field.world
     world.players[1].minerals = world.players[1].vespene = 500
@@ -229,7 +231,7 @@ def test_two_units_that_hit_each_other_in_one_loop_both_die(field: Any) -> None:
     left, right = field.still("Marine", 1, 16, 16), field.still("Marine", 2, 18, 16)
     world.life[left] = world.life[right] = 1.0
     for one, other in ((left, right), (right, left)):
-        weapon = world.catalog.unit("Marine").weapon_against("ground")
+        weapon = world.catalog.unit("Marine").weapons[0]
         world.pending.append(
             1, source=one, owner=int(world.owner[one]), target=other, prior=NOBODY, weapon=weapon.row, hit=0,
             due=world.loop + 1, single=True, goal=world.pos[other], start=world.pos[one],
