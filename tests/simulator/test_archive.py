@@ -158,17 +158,24 @@ def test_its_start_locations_and_units_make_a_melee_game(whole: bytes) -> None:
     assert not world.ended
 
 
-def test_a_map_that_is_known_by_name_has_its_own_script(whole: bytes) -> None:
-    shipped = load_map("Simple64")
+def test_a_battle_that_is_known_by_name_has_its_own_script() -> None:
+    shipped = load_map("llm_smac/2s3z")
     files = map_files() | {"MapInfo": map_info((2, 3, 38, 30))}
-    other_size = read_archive(archive(files), "Melee/Simple64.SC2Map")
+    other_size = read_archive(archive(files), "llm_smac/2s3z.SC2Map")
     assert other_size.scenario.family == "user"  # of that name, but not that map
     width, height = shipped.terrain.size
     grown = resized(width, height)
-    same_size = read_archive(archive(grown), "Melee/Simple64.SC2Map")
+    same_size = read_archive(archive(grown), "llm_smac/2s3z.SC2Map")
     assert same_size.scenario is shipped.scenario
     assert same_size.terrain.playable == (0, 0, width, height)
     assert same_size.digest != shipped.digest
+
+
+@pytest.mark.parametrize("name", ["Simple64", "Flat32"])
+def test_a_melee_map_of_a_known_name_begins_where_its_file_says(name: str) -> None:
+    shipped = load_map(name)
+    own = read_archive(archive(resized(*shipped.terrain.size)), f"Melee/{name}.SC2Map")
+    assert own.scenario.start_locations == ((10.5, 10.5), (29.5, 22.5)) != shipped.scenario.start_locations
 
 
 def resized(width: int, height: int) -> dict[str, bytes]:

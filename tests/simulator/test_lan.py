@@ -10,7 +10,7 @@ import pytest
 from s2clientprotocol import common_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.process import joining, lockstep
+from khala_simulator.process import joining, lan, lockstep
 from khala_simulator.process.client import Client, ResponseError, command, interface
 from khala_simulator.process.clock import SharedClock
 from khala_simulator.process.lan import HOST
@@ -98,6 +98,11 @@ async def no_link_left() -> AsyncIterator[None]:
         Process.started.pop().session._process.play(None)
     for _ in range(5):  # a link is closed when the event loop has said so to both ends
         await asyncio.sleep(0.001)
+
+
+@pytest.fixture(autouse=True)
+def nobody_waits_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lan, "PARTING_S", 0.05)
 
 
 @pytest.fixture
@@ -364,6 +369,30 @@ async def test_a_player_who_goes_ends_the_game_of_the_other(port: int, who: str,
     results = {r.player_id: r.result for r in (await left.observe()).player_result}
     number = players.index(left) + 1
     assert results == {number: sc.Victory, 3 - number: sc.Defeat}
+
+
+async def test_who_leaves_a_decided_game_first_is_answered_when_the_other_has_left_too(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lan, "PARTING_S", 60.0)
+    host, guest = await begin(port)
+    leaving = asyncio.create_task(host.ask(leave_game=sc.RequestLeaveGame()))
+    assert await is_waiting(leaving)
+    assert (await guest.step(8)).status == sc.ended
+    assert [r.result for r in (await guest.observe()).player_result] == [sc.Defeat, sc.Victory]
+    assert not leaving.done()
+    assert (await guest.ask(leave_game=sc.RequestLeaveGame())).status == sc.launched
+    assert (await leaving).status == sc.launched
+
+
+async def test_a_client_that_vanishes_while_it_leaves_has_left(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lan, "PARTING_S", 60.0)
+    host, guest = await begin(port)
+    leaving = asyncio.create_task(host.ask(leave_game=sc.RequestLeaveGame()))
+    assert await is_waiting(leaving)
+    leaving.cancel()
+    assert (await leaving).status == sc.launched
+    assert (await guest.step(8)).status == sc.ended
 
 
 async def test_the_same_ports_serve_one_game_after_the_other(port: int) -> None:

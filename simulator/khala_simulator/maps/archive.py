@@ -1,7 +1,7 @@
 """A user's own .SC2Map archive as a map that can be played.
 
-Terrain, playable area, start locations and units are read from it. The simulator can't run its script: a map with a
-known name has the script of its scenario, any other one is a plain melee game.
+Terrain, playable area, start locations and units are read from it. The simulator can't run its script: a battle with a
+known name has the script and the units of its scenario, any other map is a plain melee game.
 
 Above: ``map_file``, ``install``. Below: ``terrain_file``, ``maps``.
 """
@@ -56,7 +56,7 @@ def read_archive(data: bytes, path: str) -> GameMap:
             return known
         raise
     digest = content + name.encode()
-    if known is not None and known.terrain.size == terrain.size:
+    if known is not None and not known.scenario.melee and known.terrain.size == terrain.size:
         return game_map(known.scenario, terrain, digest)
     return game_map(_melee(_member(_open(data), OBJECTS), name), terrain, digest)
 

@@ -27,6 +27,9 @@ HOST = "127.0.0.1"
 CHUNK_LOOPS = 22
 """Loops at a time, about a second of the game: in between, the process handles signals, other clients and its peers."""
 
+PARTING_S = 1.0
+"""How long a client that leaves waits for its answer until the others have left, too."""
+
 _HEAD = struct.Struct("<I")
 _MAX_BYTES = 1 << 28  # of one message; the longest holds a map
 _RETRY_S = 0.05
@@ -242,8 +245,27 @@ class Peers:
                 pass
             await clock.sleep_until(due + 1)
 
+    async def farewell(self) -> None:
+        """Leave a game, and wait a little for the others to leave it, if this was the end of it.
+
+        The first client that is answered may kill the games of all, as python-sc2 does; the others want to hear their
+        result before. The game itself takes longer than this to go back to its menu.
+        """
+        if self._keeper is not None:
+            self._keeper.cancel()
+        self._tell(self._lockstep.resign())
+        try:
+            async with asyncio.timeout(PARTING_S if self._lockstep.is_decided else 0.0):
+                while self._lockstep.members:
+                    self._news.clear()
+                    await self._news.wait()
+        except TimeoutError:
+            pass
+        finally:
+            self.close()
+
     def close(self) -> None:
-        """Leave the game."""
+        """Break with the other processes."""
         if self._keeper is not None:
             self._keeper.cancel()
         links, self._links = tuple(self._links), {}

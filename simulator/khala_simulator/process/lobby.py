@@ -6,6 +6,7 @@ Each function takes the process and a request and returns the body of the respon
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 from s2clientprotocol import sc2api_pb2 as sc
@@ -104,8 +105,15 @@ def _check_players(request: sc.RequestCreateGame, game_map: GameMap) -> tuple[sc
     return tuple(players)
 
 
-def leave_game(process: Process, _: sc.RequestLeaveGame) -> sc.ResponseLeaveGame:
+async def leave_game(process: Process, _: sc.RequestLeaveGame) -> sc.ResponseLeaveGame:
     """Leave the game; saved maps stay."""
+    peers = process.playing.peers if process.playing is not None else None
+    try:
+        if peers is not None:
+            await peers.farewell()
+    except asyncio.CancelledError:  # the client is gone; leaving is not undone
+        if (task := asyncio.current_task()) is not None:
+            task.uncancel()
     process.play(None)
     process.setup = None
     return sc.ResponseLeaveGame()

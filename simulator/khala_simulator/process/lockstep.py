@@ -138,6 +138,18 @@ class Lockstep:
         self._drop(member, message.loop)
         return message
 
+    def resign(self) -> Leave:
+        """Take the own client out of the game; return the message for all others, whose worlds are not further yet."""
+        message = Leave(self.me, self._through[self.me])
+        self._drop(self.me, message.loop)
+        return message
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the game ends for the members that are still there: it is over, or one player is left."""
+        players = [member for member in self._through if member <= len(self.game.setup.players)]
+        return self.game.over or len(players) <= 1
+
     def advance(self, loops: int) -> None:
         """Advance the own world by up to so many loops, as far as it may go.
 

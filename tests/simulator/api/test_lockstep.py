@@ -122,6 +122,19 @@ def test_nobody_waits_for_a_member_that_left_and_nobody_listens_to_it() -> None:
     assert lockstep.game.world.loop == 6
 
 
+def test_who_resigns_ends_the_game_where_no_other_world_is_further() -> None:
+    one, other = Lockstep(game(), 1, [1, 2]), Lockstep(game(), 2, [1, 2])
+    other.receive(one.commit(10))
+    other.commit(12)
+    other.advance(100)
+    message = one.resign()
+    assert message == Leave(1, 10)
+    assert (one.members, one.is_decided) == ({2}, True)
+    other.receive(message)
+    other.advance(100)
+    assert (other.game.over, other.game.world.loop) == (True, 10)
+
+
 def test_what_is_done_after_a_promise_takes_effect_after_it() -> None:
     lockstep = Lockstep(game(), 1, [1, 2])
     attack(lockstep, 20.0)

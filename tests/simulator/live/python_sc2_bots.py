@@ -4,7 +4,6 @@ python-sc2 writes its log to the standard output and changes signal handlers; so
 what the bots saw goes to a file as JSON.
 """
 
-import asyncio
 import contextlib
 import json
 import os
@@ -22,7 +21,6 @@ from sc2.observer_ai import ObserverAI
 from sc2.player import Bot, Computer
 
 SEEN: dict[str, Any] = {}
-KNOWS = asyncio.Event()  # the fighter knows how its game ended
 MAPS = Path(os.environ["SC2PATH"]) / "Maps"
 
 
@@ -67,20 +65,9 @@ class Fighter(BotAI):
         """Called by python-sc2."""
         SEEN["destroyed"] = SEEN.get("destroyed", 0) + 1
 
-    async def on_end(self, game_result: Result) -> None:
-        """Called by python-sc2."""
-        KNOWS.set()
-
 
 class Quitter(BotAI):
-    """Walks off and gives up soon; with `waits`, not before the other one knows.
-
-    When the first of two bots is done, python-sc2 kills the game processes of both. In real time the other one learns
-    of its victory only with the next loop.
-    """
-
-    def __init__(self, *, waits: bool = False) -> None:
-        self.waits = waits
+    """Walks off and gives up soon. When the first of two bots is done, python-sc2 kills the game processes of both."""
 
     async def on_step(self, iteration: int) -> None:
         """Called by python-sc2."""
@@ -89,11 +76,6 @@ class Quitter(BotAI):
         if iteration == 20:
             SEEN["quit at"] = self.state.game_loop
             await self.client.leave()
-
-    async def on_end(self, game_result: Result) -> None:
-        """Called by python-sc2."""
-        if self.waits:
-            await asyncio.wait_for(KNOWS.wait(), timeout=20)
 
 
 class Waiter(BotAI):
@@ -146,7 +128,7 @@ def main(game: str, out: Path) -> None:
         case "a quitter":
             result = _play("Melee/Simple64.SC2Map", _bot(Waiter(), "waiter"), _bot(Quitter(), "quitter"))
         case "real time":
-            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "f"), _bot(Quitter(waits=True), "q"), realtime=True)
+            result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "f"), _bot(Quitter(), "q"), realtime=True)
         case "replay":
             with contextlib.suppress(KeyError):  # at the end it looks for the result of a player 0
                 run_replay(Watcher(), str(out.with_suffix(".SC2Replay")), observed_id=1)
