@@ -36,6 +36,8 @@ class Settler(BotAI):
             SEEN["expansions"] = len(self.expansion_locations_list)
             SEEN["path"] = await self.client.query_pathing(scout, goal.towards(self.game_info.map_center, 8))
             SEEN["abilities"] = [a.name for a in (await self.get_available_abilities([scout]))[0]]
+            SEEN["build"] = self.base_build
+            SEEN["overcharge"] = 4107 in self.game_data.abilities
             SEEN["scout"], SEEN["from"] = scout.tag, list(scout.position)
             scout.move(goal)
             await self.chat_send("gl hf")
@@ -47,6 +49,28 @@ class Settler(BotAI):
         SEEN["errors"] = SEEN.get("errors", 0) + len(self.state.action_errors)
         if iteration == 60:
             await self.client.leave()
+
+
+class Expander(BotAI):
+    """Looks at its ramp, founds a second base, and gives up if it shall."""
+
+    def __init__(self, *, leaves: bool = False) -> None:
+        self.leaves = leaves
+
+    async def on_step(self, iteration: int) -> None:
+        """Called by python-sc2."""
+        if iteration == 0:
+            ramp = self.main_base_ramp
+            away = self.start_location.distance_to(ramp.top_center)
+            SEEN.setdefault("ramps", []).append([away, len(ramp.upper), len(ramp.corner_depots)])
+            SEEN.setdefault("expansions", []).append(len(self.expansion_locations_list))
+            await self.client.debug_all_resources()
+        elif self.structures(UnitTypeId.NEXUS).amount > 1:
+            SEEN.setdefault("expanded", set()).add(self.player_id)
+            if self.leaves and len(SEEN["expanded"]) > 1:
+                await self.client.leave()
+        elif self.can_afford(UnitTypeId.NEXUS) and not self.already_pending(UnitTypeId.NEXUS):
+            await self.expand_now()
 
 
 class Fighter(BotAI):
@@ -99,13 +123,16 @@ class Watcher(ObserverAI, BotAI):
         SEEN["units"] = max(SEEN.get("units", 0), len(self.state.observation_raw.units))
 
 
-def _play(path: str, *players: Bot | Computer, realtime: bool = False, replay: str | None = None) -> Any:
+def _play(
+    path: str, *players: Bot | Computer, realtime: bool = False, fog: bool = True, replay: str | None = None
+) -> Any:
     return run_game(
         maps.Map(MAPS / path),
         list(players),
         realtime=realtime,
         random_seed=1,
         save_replay_as=replay,
+        disable_fog=not fog,
         game_time_limit=90,
     )
 
@@ -120,6 +147,9 @@ def main(game: str, out: Path) -> None:
     match game:
         case "melee":
             result = _play("Melee/Simple64.SC2Map", _bot(Settler(), "settler"), computer)
+        case "two bases":
+            result = _play("Melee/Simple64.SC2Map", _bot(Expander(), "1"), _bot(Expander(leaves=True), "2"), fog=False)
+            SEEN["expanded"] = sorted(SEEN["expanded"])
         case "combat":
             replay = str(out.with_suffix(".SC2Replay"))
             result = _play("llm_smac/2s3z.SC2Map", _bot(Fighter(), "fighter"), computer, replay=replay)

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from khala_simulator.process.install import install
+
 pytestmark = [
     pytest.mark.game,
     pytest.mark.skipif(not importlib.util.find_spec("sc2"), reason="burnysc2 is not installed: run `make install`"),
@@ -39,6 +41,23 @@ def test_a_bot_settles_on_a_melee_map(tmp_path: Path) -> None:
     assert seen["errors"] == 0
     walked = sum((a - b) ** 2 for a, b in zip(seen["from"], seen["to"], strict=True)) ** 0.5
     assert 15 < walked < 45  # 60 steps of 4 loops at 2.8 a second
+
+
+@pytest.mark.usefixtures("sc2", "no_process_left")
+def test_bots_know_their_ramps_and_expand_on_either_start_of_a_map_without_fog(tmp_path: Path) -> None:
+    seen = play("two bases", tmp_path)
+    assert seen["result"] == ["Victory", "Defeat"]
+    assert seen["expanded"] == [1, 2]
+    assert seen["expansions"] == [4, 4]
+    assert sorted((upper, depots) for _, upper, depots in seen["ramps"]) == [(2, 2), (5, 2)]
+    assert all(away < 25 for away, _, _ in seen["ramps"])
+
+
+@pytest.mark.slow
+def test_a_bot_plays_version_5_0_13(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SC2PATH", str(install(tmp_path / "sc2", "5.0.13")))
+    seen = play("melee", tmp_path)
+    assert (seen["build"], seen["overcharge"], seen["result"]) == (92440, True, ["Defeat"])
 
 
 @pytest.mark.slow
