@@ -79,7 +79,7 @@ def _tables() -> str:
         catalog = load_catalog(version)
         played = code("khala sc2 install" + (f" --version {version}" if version != DEFAULT_VERSION else ""))
         rows.append((version, build, len(catalog.units), len(catalog.weapons), len(catalog.upgrades), played))
-    return table(("tables of version", "build", "unit types", "weapons", "upgrades", "what makes an install of it"), rows)
+    return table(("tables of version", "build", "unit types", "weapons", "upgrades", "installed by"), rows)
 
 
 def _system(system: Callable[[World], None]) -> str:

@@ -1,8 +1,8 @@
 """Set up a directory like a StarCraft II install whose game is this simulator.
 
 Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that becomes the process of
-`__main__.py`; the number is the build of the game that it is. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are
-linked, not copied: they stay where they are.
+`__main__.py`; the number is the build of the game that it is. It never replaces parts of a real StarCraft II, and keeps
+maps that a user adds. A user's own maps are linked, not copied: they stay where they are.
 
 Above: `cli.py`. Below: the list of scenarios.
 """

@@ -136,7 +136,7 @@ def test_workers_do_not_pick_fights(field: Any) -> None:
 
 
 @pytest.mark.parametrize("give", [commands.attack_move, commands.patrol], ids=["attack-move", "patrol"])
-def test_workers_on_an_attack_move_fight_whom_they_meet(field: Any, give: Any) -> None:
+def test_workers_on_an_attack_move_fight_who_they_meet(field: Any, give: Any) -> None:
     world = field.world
     drones = [field.put("Drone", 1, 10 + i % 4, 14 + i // 4) for i in range(12)]
     victims = [field.still("SCV", 2, 18, 14 + i) for i in range(6)]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 HEAL, REPAIR, LOAD = 386, 316, 394
 TRAIN_MARINE, TRAIN_DRONE, CANCEL_LAST = 560, 1342, 306
+CONSUME, RESEARCH_SPEED = 2073, 1253
 
 
 def kill(field: Any, slot: int) -> None:
@@ -137,6 +138,33 @@ def test_a_hit_due_in_the_loop_of_the_hatching_hits_what_hatched(field: Any) -> 
     assert world.loop == loops + 1
     assert world.unit_type(world.slot_of(tag)).name == "Drone"
     assert world.life[larva] == 40 - 16
+
+
+def consumed(field: Field, last: int = 0) -> tuple[Any, int]:
+    """Play until a Viper has drained the rest of a structure that researches; return the world and how long that took.
+
+    The research needs one loop more when so many loops have passed.
+    """
+    world = field.world
+    world.players[2].minerals = world.players[2].vespene = 500
+    pool, viper = field.put("SpawningPool", 2, 16.5, 16.5), field.still("Viper", 2, 16, 14)
+    world.energy[viper], world.life[pool] = 0.0, 20.0
+    assert field.order(pool, RESEARCH_SPEED)
+    (job,) = world.jobs[pool]
+    assert field.order(viper, CONSUME, pool)
+    for loop in field.loops(200):
+        if not world.alive[pool]:
+            return world, loop
+        if loop == last:
+            job.done = job.loops - 1.0
+    raise AssertionError("the structure lives")
+
+
+def test_what_an_ability_kills_finishes_nothing_in_that_loop(make_field: Callable[[], Field]) -> None:
+    _, loops = consumed(make_field())
+    for last, upgrades in ((loops - 1, 0), (loops - 2, 1)):
+        world, again = consumed(make_field(), last)
+        assert (again, len(world.players[2].upgrades)) == (loops, upgrades)
 
 
 # cancelled, and finished ----------------------------------------------------------------------------------------------
