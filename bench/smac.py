@@ -38,18 +38,18 @@ class Played:
 
     map: str
     agent: str
-    episodes: int
-    won: int
-    reward: float
+    episodes: int = 0
+    won: int = 0
+    reward: float = 0.0
     """Mean of the episodes."""
-    most: float
+    most: float = 0.0
     """Reward of the best one."""
-    steps: float
+    steps: float = 0.0
     """Mean of the episodes."""
-    obs: int
-    state: int
-    actions: int
-    wall_s: float
+    obs: int = 0
+    state: int = 0
+    actions: int = 0
+    wall_s: float = 0.0
     trouble: str = ""
 
 
@@ -110,13 +110,13 @@ def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: ar
     command = [sys.executable, "-m", "bench.smac", str(root), "--one", "--maps", map_name, "--agents", agent]
     command += ["--episodes", str(options.episodes), "--seed", str(options.seed)]
     environment = {**os.environ, "SC2PATH": str(sc2path), "PYTHONPATH": str(root)}
-    limit_s, nothing = START_S + options.patience_s * options.episodes, Played(map_name, agent, 0, *[0] * 8)
+    limit_s = START_S + options.patience_s * options.episodes
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit_s, check=False)
     except subprocess.TimeoutExpired:
-        return dataclasses.replace(nothing, trouble=f"not over after {limit_s:.0f} s")
+        return Played(map_name, agent, trouble=f"not over after {limit_s:.0f} s")
     if done.returncode:
-        return dataclasses.replace(nothing, trouble=(done.stderr.strip().splitlines() or ["it failed"])[-1])
+        return Played(map_name, agent, trouble=(done.stderr.strip().splitlines() or ["it failed"])[-1])
     return Played(**json.loads(done.stdout.splitlines()[-1]))
 
 

@@ -57,9 +57,8 @@ def install_command(
     linked = [entry.path for entry in own if not entry.trouble]
     if as_json:
         left_out = {str(entry.source): entry.trouble for entry in own if entry.trouble}
-        facts = {"path": str(root), "version": version, "maps": list(map_names()), "linked": linked}
-        facts["left_out"] = left_out
-        typer.echo(json.dumps(facts))
+        facts = {"path": str(root), "version": version, "maps": list(map_names())}
+        typer.echo(json.dumps({**facts, "linked": linked, "left_out": left_out}))
         return
     for entry in own:
         if entry.trouble:

@@ -129,7 +129,8 @@ def test_who_resigns_ends_the_game_where_no_other_world_is_further() -> None:
     other.advance(100)
     message = one.resign()
     assert message == Leave(1, 10)
-    assert (one.members, one.is_decided) == ({2}, True)
+    assert one.members == frozenset({2})
+    assert one.is_decided
     other.receive(message)
     other.advance(100)
     assert (other.game.over, other.game.world.loop) == (True, 10)

@@ -40,7 +40,7 @@ def replay(tmp_path: Path) -> Path:
         foe = next((unit.tag for unit in units if unit.alliance == raw_pb2.Enemy), None)
         if own and foe is not None:
             client.act(command(ATTACK, own, target=foe))
-        seen = client.step(8) if client.session.status is not sc.ended else client.observe()
+        seen = client.step(8)
     path = tmp_path / "battle.SC2Replay"
     path.write_bytes(client.ask(save_replay=sc.RequestSaveReplay()).save_replay.data)
     return path
