@@ -38,7 +38,7 @@ def answer(seat: PlayerSeat, request: query_pb2.RequestQuery) -> query_pb2.Respo
 
 def _abilities(seat: PlayerSeat, tag: int, *, ignore_cost: bool) -> query_pb2.ResponseQueryAvailableAbilities:
     answer = query_pb2.ResponseQueryAvailableAbilities(unit_tag=tag)
-    slot = seat.world.slot_of(tag)
+    slot = _known(seat, tag)
     if slot != NOBODY:
         unit = seat.world.unit_type(slot)
         answer.unit_type_id = unit.id
@@ -46,6 +46,13 @@ def _abilities(seat: PlayerSeat, tag: int, *, ignore_cost: bool) -> query_pb2.Re
             for ability in usable(seat.world, slot, free=ignore_cost):
                 answer.abilities.add(ability_id=ability.id, requires_point=ability.requires_point)
     return answer
+
+
+def _known(seat: PlayerSeat, tag: int) -> int:
+    """Return the slot of a unit of which the player knows, or NOBODY."""
+    slot = seat.world.slot_of(tag)
+    hidden = slot != NOBODY and len(fog.unknown_to(seat.world, seat.player, np.array([slot])))
+    return NOBODY if hidden else slot
 
 
 # ways -----------------------------------------------------------------------------------------------------------------
@@ -62,7 +69,7 @@ def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> floa
     start = (question.start_pos.x + ox, question.start_pos.y + oy)
     flying = False
     if question.WhichOneof("start") == "unit_tag":
-        slot = world.slot_of(question.unit_tag)
+        slot = _known(seat, question.unit_tag)
         if slot == NOBODY:
             return 0.0
         start = (float(world.pos[slot, 0]), float(world.pos[slot, 1]))

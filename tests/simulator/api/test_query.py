@@ -184,6 +184,19 @@ def test_abilities_are_told_of_own_units_only(client: Client) -> None:
     assert (nobody.unit_tag, nobody.unit_type_id) == (99, 0)
 
 
+def test_nothing_is_told_of_a_unit_that_the_player_does_not_know() -> None:
+    client, (x, y) = foes_ground()
+    world = client.session._process.table.game.world
+    tag = world.tag_of(int(world.units_of(2)[-1]))
+    question = query_pb2.RequestQueryAvailableAbilities(unit_tag=tag)
+    for known in (False, True):
+        (told,) = client.ask(query=query_pb2.RequestQuery(abilities=[question])).query.abilities
+        assert (told.unit_type_id != 0) == known
+        assert (distance(client, tag, (x, y)) > 0) == known
+        client.debug(debug_pb2.DebugCommand(game_state=debug_pb2.show_map))
+        client.step(4)
+
+
 def test_many_questions_have_as_many_answers(client: Client) -> None:
     question = query_pb2.RequestQueryPathing(
         start_pos=common_pb2.Point2D(x=9, y=16), end_pos=common_pb2.Point2D(x=10, y=16)

@@ -221,9 +221,7 @@ def test_what_stands_in_the_way_when_the_builder_comes_ends_the_order(field: Fie
     assert field.world.mishaps[0].refusal is ActionResult.CANT_BUILD_ON_THAT
 
 
-@pytest.mark.parametrize(
-    ("name", "hidden"), [("ZerglingBurrowed", True), ("DarkTemplar", True), ("Zergling", False)]
-)
+@pytest.mark.parametrize(("name", "hidden"), [("ZerglingBurrowed", True), ("DarkTemplar", True), ("Zergling", False)])
 def test_a_builder_finds_out_on_the_site_what_its_player_does_not_see(field: Field, name: str, *, hidden: bool) -> None:
     probe = field.put("Probe", 1, 20.0, 20.0)
     field.still(name, 2, 30.0, 20.0)
