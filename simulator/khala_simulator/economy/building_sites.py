@@ -1,9 +1,9 @@
 """Sites: where a structure may stand; builders, the API's query and the computer player ask here.
 
 The rules are those of the placement footprint in the tables: buildable ground, no unit on it, distance to resources,
-creep, power, and gas structures on geysers only. Who only asks is answered by what the player knows: what is cloaked,
-burrowed or in the fog is in the way of a builder that has arrived, and of no plan. Above: ``skills.construction``,
-``skills.addons``, ``api.query``.
+creep, power, and gas structures on geysers only. A plan is judged by what the player knows; what is cloaked, burrowed
+or in the fog is only in the way of a builder that has arrived. Above: ``skills.construction``, ``skills.addons``,
+``api.query``.
 """
 
 from __future__ import annotations

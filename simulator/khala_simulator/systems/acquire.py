@@ -243,4 +243,4 @@ def _friends_near(world: World, victim: int) -> list[int]:
 def _free_to_answer(world: World, slot: int) -> bool:
     roams = world.looks_around[slot] and not (world.holds[slot] or world.leashed[slot]) and world.step_max[slot] > 0.0
     free = world.acquires[slot] and world.target[slot] == NOBODY
-    return bool(roams and free and not _peaceful(world)[slot])
+    return bool(roams and free and not (world.defensive[slot] and _peaceful(world)[slot]))
