@@ -229,11 +229,12 @@ def test_gods_take_no_damage(table: Table) -> None:
     assert table.world.shields[foe] < 50.0
 
 
-def test_all_upgrades_come_at_once(table: Table) -> None:
+def test_all_upgrades_come_at_once_and_the_first_of_those_with_levels(table: Table) -> None:
     switch(table, debug_pb2.upgrade)
-    owned = table.world.players[1].upgrades
-    assert table.world.catalog.upgrade("Stimpack").id in owned
-    assert len(owned) == len(set(owned)) > 50
+    names = [table.world.catalog.upgrade(number).name for number in table.world.players[1].upgrades]
+    assert {"Stimpack", "BlinkTech", "TerranInfantryWeaponsLevel1"} <= set(names)
+    assert not [name for name in names if name.endswith(("Level2", "Level3"))]
+    assert len(names) == len(set(names)) > 40
 
 
 def test_enemies_obey_when_a_player_controls_them(table: Table) -> None:

@@ -3,6 +3,7 @@
 The tools define flags of the same names, so one process can't hold two of them. What they found goes to a file as JSON.
 """
 
+import importlib
 import json
 import runpy
 import sys
@@ -62,7 +63,13 @@ def check_apm() -> dict[str, Any]:
 
 
 def play(replay: Path, player: str) -> None:
-    """Watch a replay with `play`, without a window."""
+    """Watch a replay with `play`, without a window.
+
+    In PySC2 4.0.0 a package hides the module of the same name from which it takes a function.
+    """
+    package = importlib.import_module("pysc2.lib.replay")
+    hidden = Path(str(package.__file__)).parent.with_suffix(".py")
+    package.get_replay_version = runpy.run_path(str(hidden))["get_replay_version"]  # type: ignore[attr-defined]  # see above
     sys.argv = ["play", "--norender", f"--replay={replay}", f"--observed_player={player}", "--fps=100000"]
     runpy.run_module("pysc2.bin.play", run_name="__main__")
 

@@ -32,7 +32,7 @@ def run(tool: str, out: Path, *arguments: object) -> str:
 def replay(tmp_path: Path) -> Path:
     """Return the replay of a battle that was fought to its end."""
     client = Client()
-    client.play("llm_smac/2s3z", interface(screen=64))
+    client.play("llm_smac/2s3z.SC2Map", interface(screen=64))
     seen = client.observe()
     while not seen.player_result:
         units = seen.observation.raw_data.units
