@@ -14,7 +14,7 @@ MEASUREMENTS = (
     "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "act",
     "recognition", "macro", "image", "http_client", "recording", "orphans", "strangers", "clocks",
     "pace", "serve",
-    "faults", "resume", "soak", "mining",
+    "faults", "resume", "soak", "mining", "crowds",
 )  # fmt: skip
 
 
