@@ -10,7 +10,7 @@ import numpy as np
 from khala_simulator.combat.targets import disengage, engage, measure_reach, weapon_for
 from khala_simulator.combat.weapon_choice import weapon_traits
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
-from khala_simulator.tables.layers import layer_of
+from khala_simulator.tables.layers import ONE_CELL, Layer, inner_body, layer_of
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import AIR_PLANE, ATTRIBUTES, INSTANT_ACCELERATION_N, bit_set
 from khala_simulator.world.columns import NOBODY
@@ -50,9 +50,9 @@ def body_traits(world: World, slot: int) -> None:
     at = (int(world.owner[slot]), unit.row)
     world.radius[slot] = unit.radius
     world.separation[slot] = unit.separation
-    world.clearance[slot] = min(unit.separation if unit.inner is None else unit.inner, MECHANICS.body_clearance)
     world.lightness[slot] = ORDINARY_PUSH / unit.push
-    world.layer[slot] = layer_of(unit)
+    layer = world.layer[slot] = layer_of(unit)
+    world.clearance[slot] = min(inner_body(unit) - ONE_CELL * (layer is Layer.WIDE), MECHANICS.body_clearance)
     world.layer_bits[slot] = 0 if world.harvest[slot] or unit.underfoot else world.stats.layer_bits[unit.row]
     world.plane_bits[slot] = world.stats.plane_bits[unit.row]
     world.step_max[slot] = world.stats.step[at]

@@ -36,10 +36,14 @@ NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1)
 
 
 class Surface:
-    """Free cells of one layer, with shortest ways to any cell."""
+    """Free cells of one layer, with shortest ways to any cell.
 
-    def __init__(self, free: Grid) -> None:
+    The cells of a surface with a ``shift`` lie so much lower on both axes than those of the terrain.
+    """
+
+    def __init__(self, free: Grid, shift: float = 0.0) -> None:
         self.free = free
+        self.shift = shift
         self.height, self.width = free.shape
         self._last = np.array([self.width - 1, self.height - 1])
         self.flat: Bools = free.ravel()
@@ -82,7 +86,7 @@ class Surface:
 
     def cell(self, points: Floats) -> Ints:
         """Return the cells under points (..., 2); points outside count as the nearest cell inside."""
-        at = points.astype(np.int64)
+        at = (points + self.shift).astype(np.int64)
         np.maximum(at, 0, out=at)
         np.minimum(at, self._last, out=at)
         result: Ints = at[..., 1] * self.width + at[..., 0]
@@ -90,7 +94,8 @@ class Surface:
 
     def centre(self, cells: Ints) -> Floats:
         """Return the centres (..., 2) of cells."""
-        return np.stack([cells % self.width + 0.5, cells // self.width + 0.5], axis=-1)
+        middle = 0.5 - self.shift
+        return np.stack([cells % self.width + middle, cells // self.width + middle], axis=-1)
 
     def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
         """Return the cell of a connected part nearest to ``point``; the side of ``start`` decides near ties."""
@@ -118,8 +123,8 @@ class Surface:
         return result
 
     def _box_is_free(self, start: Floats, end: Floats) -> Bools:
-        low = np.floor(np.minimum(start, end) - SIDE_CLEARANCE).astype(np.int64)
-        high = np.floor(np.maximum(start, end) + SIDE_CLEARANCE).astype(np.int64) + 1
+        low = np.floor(np.minimum(start, end) + (self.shift - SIDE_CLEARANCE)).astype(np.int64)
+        high = np.floor(np.maximum(start, end) + (self.shift + SIDE_CLEARANCE)).astype(np.int64) + 1
         np.maximum(low, 0, out=low)
         np.minimum(high, self._last + 1, out=high)
         s = self._sums
@@ -319,7 +324,7 @@ def _edges(width: int) -> list[list[tuple[int, float]]]:
 @lru_cache(maxsize=64)
 def _bare_surface(terrain: Terrain, layer: Layer) -> Surface:
     """Return the surface of a terrain without structures, shared by all games on it."""
-    return Surface(_layer_grid(terrain, layer))
+    return _surface(_layer_grid(terrain, layer), layer)
 
 
 def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
@@ -328,7 +333,16 @@ def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
         x0, y0, x1, y1 = terrain.playable
         grid[y0:y1, x0:x1] = True
         return grid
-    return terrain.walk if layer is Layer.WALK else terrain.glide
+    return terrain.glide if layer is Layer.GLIDE else terrain.walk
+
+
+def _surface(free: Grid, layer: Layer) -> Surface:
+    """Return the surface of free cells; wide bodies stand on corners at which four free cells meet."""
+    if layer is not Layer.WIDE:
+        return Surface(free)
+    corners = np.zeros_like(free)
+    corners[1:, 1:] = free[1:, 1:] & free[:-1, 1:] & free[1:, :-1] & free[:-1, :-1]
+    return Surface(corners, shift=0.5)
 
 
 def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surface:
@@ -336,7 +350,10 @@ def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surf
     found = ground.surfaces.get((layer, without))
     if not isinstance(found, Surface):
         bare = layer is Layer.AIR or len(ground.blocked) == len(without)
-        found = _bare_surface(ground.terrain, layer) if bare else Surface(_free_now(ground, layer, without))
+        if bare:
+            found = _bare_surface(ground.terrain, layer)
+        else:
+            found = _surface(_free_now(ground, layer, without), layer)
         ground.surfaces[layer, without] = found
     return found
 
