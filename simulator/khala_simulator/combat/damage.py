@@ -7,6 +7,7 @@ armor. The formula's source is in ``data/SOURCES.md``.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -149,20 +150,23 @@ def _splash(world: World, shot: Shot, damage: Damage) -> None:
     offset = world.pos[near] - shot.goal
     edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
     forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
-    for slot, distance, (x, y) in zip(near.tolist(), edge.tolist(), offset.tolist(), strict=True):
+    bodies = zip(near.tolist(), edge.tolist(), world.radius[near].tolist(), offset.tolist(), strict=True)
+    for slot, distance, radius, (x, y) in bodies:
         for ring in hit.area:
-            if distance <= ring.radius and _in_arc(x, y, *forward, ring.arc_deg):
+            if distance <= ring.radius and _in_arc(x, y, radius, *forward, ring.arc_deg):
                 strike(world, shot.source, shot.owner, slot, damage, ring.fraction)
                 break
 
 
-def _in_arc(x: float, y: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
-    """Return whether an offset lies within half an arc of the direction of the shot."""
+def _in_arc(x: float, y: float, radius: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
+    """Return whether a body touches the sector of an arc, at most 180 degrees or all round, in the shot's direction."""
     if arc_deg >= 360.0:
         return True
-    along = x * forward_x + y * forward_y
-    lengths = np.sqrt((x * x + y * y) * (forward_x * forward_x + forward_y * forward_y))
-    return bool(along >= np.cos(np.radians(arc_deg / 2.0)) * lengths - BEHIND)
+    length = math.hypot(forward_x, forward_y)
+    along, across = x * forward_x + y * forward_y, abs(x * forward_y - y * forward_x)
+    cosine, sine = math.cos(math.radians(arc_deg / 2.0)), math.sin(math.radians(arc_deg / 2.0))
+    beyond = across * cosine - along * sine <= (radius + BEHIND) * length  # from the edge of the sector
+    return (beyond and along * cosine + across * sine >= 0.0) or math.hypot(x, y) <= radius
 
 
 def found_by(world: World, search: Search, shot: Shot) -> list[int]:
@@ -184,7 +188,7 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
         for i in order
         if edge[i] <= radius
         and near[i] != shot.prior
-        and _in_arc(float(offset[i, 0]), float(offset[i, 1]), *forward, search.arc_deg)
+        and _in_arc(offset[i, 0], offset[i, 1], float(world.radius[near[i]]), *forward, search.arc_deg)
     ]
     return found[: search.max_count] if search.max_count else found
 

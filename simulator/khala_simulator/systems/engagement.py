@@ -94,6 +94,8 @@ def _close_in(world: World, slots: Ints) -> None:
         near |= swinging & (gap <= reach + world.slop.take(slots))
     near &= gap >= world.reach_min.take(slots)
     near &= world.can_attack.take(slots)
+    if world.fog or world.hiding:
+        near &= world.visible[world.owner.take(slots), target]
     if world.area_effects:
         near &= inside_zone(world, slots, target)
     if kinds.beams:

@@ -23,8 +23,8 @@ def carry_out(world: World) -> None:
 
 
 def _lost(world: World) -> list[int]:
-    """Return slots whose target is dead, or out of their owner's sight; without fog only a change causes that."""
-    if not world.orders_changed and not world.fog:
+    """Return slots whose target is dead or out of their owner's sight; where nothing hides only a change does that."""
+    if not (world.orders_changed or world.fog or world.hiding):
         return []
     world.orders_changed = False
     slots = which(world.needs_target[: world.top])
