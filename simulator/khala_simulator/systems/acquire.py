@@ -114,9 +114,7 @@ def _seen(world: World, slots: Ints) -> Bools:
 
 def _seek(world: World, player: int, seekers: Ints) -> None:
     """Give each seeker of a player the best target it can see, if that is better than what it has."""
-    foes = world.live
-    foes = foes[(world.owner[foes] != player) & (world.owner[foes] != 0)]
-    foes = foes[world.targetable[foes] & world.visible[player, foes]]
+    foes = foes_of(world, player)
     if not foes.size:
         return
     gap, worth = _worth(world, seekers, foes)
@@ -124,7 +122,7 @@ def _seek(world: World, player: int, seekers: Ints) -> None:
     rows = np.arange(len(seekers))
     worth, gap, best = worth[rows, best], gap[rows, best], foes[best]
     now = world.target.take(seekers)
-    world.rank[seekers] = rank_now = np.where(now == NOBODY, OUT_OF_SIGHT, _rank(world, seekers, now))
+    world.rank[seekers] = rank_now = np.where(now == NOBODY, OUT_OF_SIGHT, rank_of(world, seekers, now))
     rise = worth + gap - rank_now
     handy = _reaches(world, seekers, best, gap) | (world.gap.take(seekers) - gap > MECHANICS.switch_gain)
     handy &= ~world.in_reach.take(seekers)
@@ -135,7 +133,15 @@ def _seek(world: World, player: int, seekers: Ints) -> None:
         world.rank[seekers[i]] = worth[i] + gap[i]
 
 
-def _rank(world: World, seekers: Ints, foes: Ints) -> Floats:
+def foes_of(world: World, player: int) -> Ints:
+    """Return the enemies of a player that it sees and can aim at."""
+    foes = world.live
+    foes = foes[(world.owner[foes] != player) & (world.owner[foes] != 0)]
+    seen: Ints = foes[world.targetable[foes] & world.visible[player, foes]]
+    return seen
+
+
+def rank_of(world: World, seekers: Ints, foes: Ints) -> Floats:
     """Return the ranks that come before distance: each foe's priority, and whether it threatens its seeker."""
     rank: Floats = world.priority.take(foes) * PRIORITY_WEIGHT
     rank += THREAT_WEIGHT * ((_threatened_planes(world, foes) & world.plane_bits.take(seekers)) != 0)
@@ -192,7 +198,8 @@ def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
     owner = world.owner[seekers]
     on_ground = (world.plane_bits[foes] & GROUND_PLANE != 0) & (world.ground_weapon[seekers] >= 0)
     weapon = np.where(on_ground, world.ground_weapon[seekers], world.air_weapon[seekers])
-    reaches: Bools = gap <= world.stats.range[owner, weapon] + world.range_add.take(seekers)
+    touch = world.separation.take(seekers) + world.separation[foes] - world.radius.take(seekers) - world.radius[foes]
+    reaches: Bools = gap <= np.maximum(world.stats.range[owner, weapon] + world.range_add.take(seekers), touch)
     return reaches
 
 

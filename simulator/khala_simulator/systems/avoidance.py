@@ -1,9 +1,9 @@
 """Avoidance: how a walker that bodies block finds a heading around them.
 
-A blocked walker looks in a fan of headings around its way, takes the free one that turns it least, and keeps to its
-chosen side until it has made progress for a while. Bodies that stand or come towards it and the terrain count as
-obstacles, ``collision`` handles those that go the same way. The game's own local avoidance is not known; all of this is
-an estimate.
+Melee units go where ``flanking`` leads them. Any other blocked walker looks in a fan of headings around its way, takes
+the free one that turns it least, and keeps to its chosen side until it has made progress for a while. Bodies that stand
+or come towards it and the terrain count as obstacles, ``collision`` handles those that go the same way. The game's own
+local avoidance is not known; all of this is an estimate.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from khala_simulator.movement import pathfinding
 from khala_simulator.movement.contacts import within
 from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some, which
+from khala_simulator.systems import flanking
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
@@ -41,11 +42,17 @@ def find_headings(world: World) -> None:
         return
     if world.loop % MECHANICS.detour_period:
         return
-    turning = which((world.detour[:n] != 0) & world.wants[:n])
-    over = world.detour_end.take(turning) <= world.loop
+    turning = which(world.detour[:n] != 0)
+    over = (world.detour_end.take(turning) <= world.loop) | ~world.wants.take(turning)
     world.detour[turning[over]] = 0
     world.aside[turning[over]] = 0.0
     due = turning[~over]
+    flowing = np.abs(world.detour.take(due)) == flanking.LED
+    # in the middle of the usual step of 8 loops: who gets a new order at every step is led for the rest of it
+    if (world.loop - MECHANICS.detour_period) % MECHANICS.flank_period == 0 and due.size:
+        world.detour[due[flowing]] //= flanking.LED
+        flowing = np.isin(due, flanking.lead(world, due))
+    due = due[~flowing]
     if due.size:
         _look(world, due)
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
 
-OVERLAP_PRESSED = 0.03
+OVERLAP_PRESSED = 0.1
 SAME_POINT = 1e-9
 STIR = 1e3
 EDGE_MARGIN = 1e-6
@@ -222,7 +222,7 @@ def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
     """Return positions (k, 2) kept a body's clearance away from blocked cells; where there is no room they stay."""
     cell = surface.cell(after)
-    corner = np.floor(after)
+    corner = surface.centre(cell) - 0.5
     room = clearance[:, None]
     low, high = surface.walls_low.take(cell, 0), surface.walls_high.take(cell, 0)
     kept = np.minimum(np.maximum(after, corner + low * room), corner + 1.0 - high * room)
@@ -254,7 +254,14 @@ def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
         free = surface.nearest_free(before[i])
         if free is not None:
             after[i] = surface.centre(np.array(free))
+            if surface.shift:  # what is too near to a wall for its body leaves it little by little
+                after[i] = before[i] + _at_most(after[i] - before[i], MECHANICS.push_limit)
     return after
+
+
+def _at_most(vector: Floats, length: float) -> Floats:
+    shortened: Floats = vector * min(1.0, length / max(float(geometry.length(vector)), SAME_POINT))
+    return shortened
 
 
 def _note_blocked(world: World, slots: Ints, before: Floats, after: Floats) -> None:

@@ -56,6 +56,10 @@ class Mechanics:
     detour_after: int
     detour_period: int
     detour_loops: int
+    flank_period: int
+    flank_look: float
+    flank_reach: float
+    flank_squeeze: float
     crowd_share: float
     crowd_near: float
     crowd_patience: int

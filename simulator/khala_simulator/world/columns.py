@@ -124,7 +124,9 @@ class UnitColumns:
     nav_best: Floats = state(float)  # the least distance from there since the way was begun
     nav_best_loop: Ints = state(int)  # and when that was
     blocked: Ints = state(int)  # loops without progress in a row
-    detour: Ints = state(int)  # side on which it goes around bodies, -1 right, 1 left, 0 none
+    detour: Ints = state(
+        int
+    )  # side on which it goes around bodies, -1 right, 1 left, twice that while it follows a flow, 0 none
     detour_end: Ints = state(int)  # loop at which it forgets that side
     aside: Floats = state(float, width=2)  # heading around bodies, zero when the way itself is free
     gap: Floats = state(float)  # distance to its target this loop, edge to edge

@@ -1,0 +1,151 @@
+"""Flow: the ways of a crowd round the bodies that stand, to the free places from which it reaches its targets.
+
+A ``Flow`` is a fine grid over a fight: where a body of one size has room, and how many steps it is from there to the
+nearest place in reach of a target. It is found outwards from those places, a step at a time, on whole grids at once:
+a grid is one integer, a bit for each cell. ``systems.flanking`` follows it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
+
+if TYPE_CHECKING:
+    from khala_simulator.movement.pathfinding import Surface
+    from khala_simulator.numeric.geometry import Floats
+    from khala_simulator.world.columns import Bools, Ints
+
+Bytes = NDArray[np.uint8]
+
+CELL: Final = 0.25
+MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
+DIGITS: Final = 6
+NOWHERE: Final = 2**DIGITS - 1  # more steps than are looked at
+HOPS: Final = 2  # of up to two cells, from the nearest cell with a way to the point that a walker heads for
+NEARER: Final = 1e-3  # what a unit of distance to the goal weighs, where a step weighs 1
+OFFSETS: Final = np.array([(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)])
+AROUND: Final = np.array([(dx, dy) for dy in (-2, -1, 0, 1, 2) for dx in (-2, -1, 0, 1, 2)])
+
+
+class Flow:
+    """A grid around walkers (k, 2); ``stand`` and ``reach`` say what is on it, ``points`` finds the ways."""
+
+    def __init__(self, surface: Surface, walkers: Floats) -> None:
+        low = np.floor((walkers.min(axis=0) - MARGIN) / CELL).astype(np.int64)
+        high = np.floor((walkers.max(axis=0) + MARGIN) / CELL).astype(np.int64) + 1
+        self.low = low
+        self.width, self.height = (high - low).tolist()
+        x = np.floor((np.arange(low[0], high[0]) + 0.5) * CELL + surface.shift).astype(np.int64)
+        y = np.floor((np.arange(low[1], high[1]) + 0.5) * CELL + surface.shift).astype(np.int64)
+        inside = ((y >= 0) & (y < surface.height))[:, None] & ((x >= 0) & (x < surface.width))
+        self.free: Bools = surface.free[np.clip(y, 0, surface.height - 1)[:, None], np.clip(x, 0, surface.width - 1)]
+        self.free &= inside
+        self.free[[0, -1]] = self.free[:, [0, -1]] = False  # so that no step leads round the edge
+        self.wanted: Bools = np.zeros_like(self.free)
+
+    def stand(self, at: Floats, apart: Floats) -> None:
+        """Take the cells nearer than ``apart`` (m,) to bodies at (m, 2)."""
+        self._paint(self.free, at, apart, value=False)
+
+    def reach(self, at: Floats, within: Floats) -> None:
+        """Mark the cells within a distance (m,) of targets at (m, 2) as places to go to."""
+        self._paint(self.wanted, at, within, value=True)
+
+    def _paint(self, grid: Bools, at: Floats, radius: Floats, *, value: bool) -> None:
+        if not len(at):
+            return
+        half = math.ceil(float(radius.max()) / CELL)
+        side = np.arange(-half, half + 1)
+        cells = np.floor(at / CELL).astype(np.int64)
+        x, y = cells[:, 0, None] + side, cells[:, 1, None] + side
+        dx, dy = (x + 0.5) * CELL - at[:, 0, None], (y + 0.5) * CELL - at[:, 1, None]
+        x -= self.low[0]
+        y -= self.low[1]
+        inside = (dx * dx)[:, None, :] + (dy * dy)[:, :, None] < (radius * radius)[:, None, None]
+        inside &= ((x >= 0) & (x < self.width))[:, None, :] & ((y >= 0) & (y < self.height))[:, :, None]
+        number = y[:, :, None] * self.width + x[:, None, :]
+        np.put(grid, number[inside], value)
+
+    def points(self, at: Floats, goal: Floats, width: float) -> tuple[Floats, Bools]:
+        """Return the points (k, 2) that walkers at (k, 2) head for, and which of them have a way.
+
+        Of ways that are equally short each takes the one that leads nearer to its goal (k, 2). Where a walker is about
+        to arrive others of its ``width`` find no room, and go on to the next place.
+        """
+        points, found, arriving = self._ahead(at, goal)
+        first = which(arriving)
+        first = first[_without_overlap(points[first], geometry.length(points[first] - at[first]), width)]
+        rest = np.ones(len(at), dtype=np.bool_)
+        rest[first] = False
+        if first.size and some(rest):
+            self.stand(points[first], np.full(len(first), width))
+            further, also, _ = self._ahead(at[rest], goal[rest])
+            points[which(rest)[also]] = further[also]
+        return points, found
+
+    def _ahead(self, at: Floats, goal: Floats) -> tuple[Floats, Bools, Bools]:
+        """Return the points some steps ahead (k, 2), who has a way, and whose ends there."""
+        cells = np.floor(at / CELL).astype(np.int64) - self.low
+        left = self._spread(cells)
+        cell, steps = self._next(left, cells, goal)
+        found = steps < NOWHERE
+        for _ in range(HOPS):
+            cell, steps = self._next(left, cell, goal)
+        return (cell + self.low + 0.5) * CELL, found, steps == 0
+
+    def _spread(self, cells: Ints) -> Bytes:
+        """Return (cells,) the steps from each cell to a place to go to, ``NOWHERE`` if it was not reached.
+
+        It ends as soon as the walkers' cells (k, 2) are reached. Each digit of the numbers is a grid by itself.
+        """
+        around = cells[:, None, :] + OFFSETS
+        walkers = np.zeros_like(self.free)
+        walkers[around[..., 1], around[..., 0]] = True
+        free, reached, missing = (_bits(g) for g in (self.free, self.free & self.wanted, self.free & walkers))
+        digits, width, step = [0] * DIGITS, self.width, 0
+        while step < NOWHERE - 1 and missing & ~reached:
+            row = reached | reached << 1 | reached >> 1
+            tall = reached if step % 2 else row  # a diagonal every second step: about as long as it looks
+            grown = (row | tall << width | tall >> width) & free
+            fresh = grown & ~reached
+            step += 1
+            for digit in range(DIGITS):
+                if step >> digit & 1:
+                    digits[digit] |= fresh
+            reached |= grown
+            if not fresh:
+                break
+        beyond = ~reached & (1 << self.free.size) - 1
+        size = (self.free.size + 7) // 8
+        packed = b"".join((digit | beyond).to_bytes(size, "little") for digit in digits)
+        grids = np.unpackbits(np.frombuffer(packed, np.uint8).reshape(DIGITS, size), axis=1, bitorder="little")
+        left: Bytes = np.add.reduce(grids << np.arange(DIGITS, dtype=np.uint8)[:, None], axis=0, dtype=np.uint8)
+        return left
+
+    def _next(self, left: Bytes, cells: Ints, goal: Floats) -> tuple[Ints, Bytes]:
+        """Return (k, 2) the cell with the fewest steps left among those around, and how many that are."""
+        around = cells[:, None, :] + AROUND
+        steps = left.take(around[..., 1] * self.width + around[..., 0])
+        centre = (around + self.low + 0.5) * CELL
+        best = np.argmin(steps + NEARER * geometry.length(centre - goal[:, None, :]), axis=1)
+        rows = np.arange(len(cells))
+        return around[rows, best], steps[rows, best]
+
+
+def _without_overlap(points: Floats, left: Floats, width: float) -> Bools:
+    """Return which of the points (k, 2) have none within ``width`` whose walker has less of its way left."""
+    offset = points[:, None, :] - points
+    beaten = offset[..., 0] ** 2 + offset[..., 1] ** 2 < width * width
+    beaten &= left < left[:, None]
+    result: Bools = ~np.logical_or.reduce(beaten, axis=1)
+    return result
+
+
+def _bits(grid: Bools) -> int:
+    return int.from_bytes(np.packbits(grid.ravel(), bitorder="little").tobytes(), "little")
