@@ -218,6 +218,7 @@ def _player_setups(setup: Setup) -> list[PlayerSetup]:
                 control=control,
                 name=asked.player_name if asked is not None else "",
                 difficulty=asked.difficulty if asked is not None else 0,
+                build=asked.ai_build if asked is not None else 0,
             )
         )
     return players

@@ -1,42 +1,57 @@
-"""How hard a computer player plays, by the API's difficulty. All of it is an estimate.
-
-A level says how many workers, production structures and gas structures it wants, how many units it waits for before it
-attacks, and how often it looks at what it has. A computer player has no advantages.
-"""
+"""How strong a computer player is, by the API's difficulty: one row of ``data/opponents/levels.yaml`` each."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from functools import lru_cache
+from importlib import resources
+from typing import Any, Final
+
+import yaml
+
+FASTER_LOOPS: Final = 22.4
+"""Game loops in a second of game time."""
+DEFAULT: Final = 3
+"""The difficulty of a computer player for which none is given: medium."""
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """The aims of a computer player.
+    """What distinguishes a difficulty; the data file says what each column means."""
 
-    ``period_loops`` is how often it thinks, ``peace_loops`` how long it stays at home.
-    """
-
+    name: str
+    think_loops: int
+    actions: float
+    reaction_s: float
+    tempo: float
+    worker_s: float
     workers: int
-    producers: int
-    gas: int
-    wave: int
-    period_loops: int
-    peace_loops: int
-
-
-LEVELS: Final = {
-    1: Level(workers=12, producers=1, gas=0, wave=4, period_loops=224, peace_loops=8064),
-    2: Level(workers=14, producers=1, gas=0, wave=5, period_loops=160, peace_loops=6720),
-    3: Level(workers=16, producers=2, gas=1, wave=8, period_loops=96, peace_loops=5376),
-    4: Level(workers=17, producers=2, gas=1, wave=10, period_loops=64, peace_loops=4704),
-    5: Level(workers=19, producers=3, gas=1, wave=12, period_loops=48, peace_loops=4032),
-    6: Level(workers=20, producers=3, gas=2, wave=14, period_loops=32, peace_loops=4032),
-    7: Level(workers=22, producers=4, gas=2, wave=16, period_loops=32, peace_loops=3360),
-}
-HARDEST: Final = LEVELS[7]
+    bases: int
+    production: float
+    upgrades: int
+    wave: float
+    retreat: float
+    pull: float
+    skills: frozenset[str]
+    vision: bool = False
+    income: float = 1.0
 
 
 def level_of(difficulty: int) -> Level:
-    """Return the level for a difficulty, by default a medium one; the cheating ones do not cheat."""
-    return LEVELS.get(difficulty or 3, HARDEST)
+    """Return the level for a difficulty of the API; 0 and unknown ones are the default."""
+    levels = load_levels()
+    return levels.get(difficulty, levels[DEFAULT])
+
+
+@lru_cache(maxsize=1)
+def load_levels() -> dict[int, Level]:
+    """Return every level by its difficulty."""
+    path = resources.files("khala_simulator.data") / "opponents" / "levels.yaml"
+    rows: dict[int, dict[str, Any]] = yaml.safe_load(path.read_text(encoding="utf-8"))["levels"]
+    return {number: _level(row, rows) for number, row in rows.items()}
+
+
+def _level(row: dict[str, Any], rows: dict[int, dict[str, Any]]) -> Level:
+    whole = {**rows.get(row.get("extends", 0), {}), **row}
+    whole.pop("extends", None)
+    return Level(**{**whole, "skills": frozenset(whole["skills"])})

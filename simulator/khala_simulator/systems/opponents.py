@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_simulator.opponent import melee
+from khala_simulator.opponent import player as computer
 from khala_simulator.opponent.levels import level_of
-from khala_simulator.opponent.plans import PLANS
 
 if TYPE_CHECKING:
     from khala_simulator.world.world import World
+
+RACES = ("protoss", "terran", "zerg")
 
 
 def run(world: World) -> None:
@@ -17,8 +18,8 @@ def run(world: World) -> None:
     if world.opponents is None:
         world.opponents = tuple(_led(world))
     for player in world.opponents:
-        if (world.loop + player) % level_of(world.players[player].difficulty).period_loops == 0:
-            melee.think(world, player)
+        if (world.loop + player) % level_of(world.players[player].difficulty).think_loops == 0:
+            computer.think(world, player)
 
 
 def _led(world: World) -> list[int]:
@@ -26,6 +27,6 @@ def _led(world: World) -> list[int]:
     specs = world.map.scenario.players
     return [
         player.id for player in world.players[1:]
-        if player.control == "computer" and player.race in PLANS and player.id in specs
+        if player.control == "computer" and player.race in RACES and player.id in specs
         and specs[player.id].ai == "melee"
     ]  # fmt: skip

@@ -8,6 +8,10 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from khala_simulator.world.opponent_memory import OpponentMemory
 
 NEUTRAL = 0
 
@@ -64,13 +68,14 @@ class ScoreCounters:
 
 @dataclass(slots=True)
 class PlayerSetup:
-    """The player of a slot: ``control`` is ``agent`` or ``computer``; ``difficulty`` is the API's number or 0."""
+    """The player of a slot: ``control`` is ``agent`` or ``computer``; ``difficulty`` and ``build`` are the API's or 0."""
 
     id: int
     race: str
     control: str
     name: str = ""
     difficulty: int = 0
+    build: int = 0
 
 
 @dataclass(slots=True)
@@ -82,6 +87,7 @@ class Player:
     control: str
     name: str = ""
     difficulty: int = 0
+    build: int = 0
     minerals: float = 0.0
     vespene: float = 0.0
     upgrades: list[int] = field(default_factory=list)
@@ -91,7 +97,7 @@ class Player:
     result: GameResult = GameResult.UNDECIDED
     surrendered: bool = False
     score: ScoreCounters = field(default_factory=ScoreCounters)
-    attacking: bool = False  # a computer player's army is on its way
+    mind: OpponentMemory | None = None  # of a computer player that leads a side
     start: tuple[float, float] | None = None  # where the town hall was put at the start of a melee game
     camera: tuple[float, float] | None = None  # where the camera starts, if not where the map says
 

@@ -111,7 +111,7 @@ class World(UnitColumns, WorldCaches):
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.loop = 0
         self.players: list[Player] = [Player(NEUTRAL, "neutral", "none")]
-        self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty) for p in players]
+        self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
         self.stats = Stats(self.catalog, len(self.players))
         self.ground = Ground(game_map.terrain)
         self.fog: bool = fog and game_map.scenario.visibility.fog

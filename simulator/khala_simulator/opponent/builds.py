@@ -1,0 +1,110 @@
+"""What computer players build, and when: ``data/opponents/<race>.yaml`` as frozen values.
+
+A build is an opening, followed in order, and stages by time that say what is wanted from then on. ``growth`` spends
+the money on it.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib import resources
+from typing import Final, NamedTuple
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+NAMES: Final = {2: "macro", 3: "power", 4: "rush", 5: "timing", 6: "air"}
+"""The API's values of AIBuild; all others leave the choice to the seed."""
+
+
+class Data(BaseModel):
+    """A part of a build file: immutable, with no unknown fields."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Step(NamedTuple):
+    """One step of an opening: with so much supply in use, make this."""
+
+    supply: float
+    what: str
+
+
+class Stage(Data):
+    """What is wanted from a time on; what earlier stages wanted stays wanted, except the army and the workers.
+
+    ``army`` has shares, ``units`` numbers of single units, ``gas`` is the number of gas structures. ``workers`` is a
+    limit below that of the level, 0 for none.
+    """
+
+    from_s: float
+    bases: int
+    gas: int
+    army: dict[str, float]
+    structures: dict[str, int] = {}
+    units: dict[str, int] = {}
+    research: tuple[str, ...] = ()
+    workers: int = 0
+
+
+class Attack(Data):
+    """From when on, and with how much army supply, the first attack begins."""
+
+    from_s: float
+    supply: float
+
+
+class Build(Data):
+    """One way to play a race.
+
+    ``guard`` times the square of the minutes since the opening is the army supply below which the army comes first.
+    """
+
+    opening: tuple[Step, ...]
+    attack: Attack
+    guard: float
+    stages: tuple[Stage, ...]
+
+
+class Race(Data):
+    """The builds of a race, and the names of the types with a role of their own."""
+
+    race: str
+    worker: str
+    hall: str
+    supply: str
+    gas: str
+    producer: str
+    detector: str
+    transport: str
+    builds: dict[str, Build]
+
+
+@lru_cache(maxsize=3)
+def load_race(race: str) -> Race:
+    """Return the builds of a race."""
+    path = resources.files("khala_simulator.data") / "opponents" / f"{race}.yaml"
+    return Race.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+
+
+def name_of(ai_build: int, draw: float) -> str:
+    """Return the build that the API's number asks for, or the one that a ``draw`` in [0, 1) chooses."""
+    names = list(NAMES.values())
+    return NAMES.get(ai_build, names[int(draw * len(names))])
+
+
+def stage_at(race: str, build: str, at_s: float) -> Stage:
+    """Return what a build wants at a time of its own clock."""
+    stages = load_race(race).builds[build].stages
+    return _joined(race, build, sum(stage.from_s <= at_s for stage in stages))
+
+
+@lru_cache(maxsize=128)
+def _joined(race: str, build: str, count: int) -> Stage:
+    reached = load_race(race).builds[build].stages[:count]
+    structures: dict[str, int] = {}
+    research: dict[str, None] = {}
+    for stage in reached:
+        structures |= stage.structures
+        research |= dict.fromkeys(stage.research)
+    return reached[-1].model_copy(update={"structures": structures, "research": tuple(research)})

@@ -1,0 +1,145 @@
+"""The economy: who mines where, supply ahead of what is made, and new workers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.economy import harvesting, supply
+from khala_simulator.opponent import hands, products
+from khala_simulator.opponent.levels import FASTER_LOOPS
+from khala_simulator.opponent.products import Outcome
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.opponent.side import Side
+
+GAS_WORKERS: Final = 3
+MOVED_AT_ONCE: Final = 4
+"""How many workers change to another base in one thought."""
+GAS_ENOUGH: Final = 400.0
+"""With so much vespene unspent and few minerals, gas structures get one worker only."""
+A_HALL: Final = 16
+"""Workers on the minerals of one base."""
+AHEAD_S: Final = 22.0
+"""Supply is made for so many seconds of production ahead; a Pylon takes 18, a Supply Depot 21."""
+
+
+class Staff:
+    """How many workers each town hall and gas structure has, and wants."""
+
+    def __init__(self, side: Side) -> None:
+        found = harvesting.staffing(side.world, side.player)
+        self.halls = {hall: list(found[hall]) for hall in side.halls if hall in found}
+        self.gas = {slot: list(count) for slot, count in found.items() if slot not in self.halls and count[1]}
+
+    @property
+    def places(self) -> int:
+        """How many workers all of them want."""
+        return sum(ideal for _, ideal in self.halls.values()) + GAS_WORKERS * len(self.gas)
+
+
+def mine(side: Side, staff: Staff) -> None:
+    """Send idle workers to work, fill the gas structures, and even the bases out."""
+    world = side.world
+    pulled = set(map(world.slot_of, side.mind.pulled))
+    idle = [w for w in side.workers if world.order_kind[w] == OrderKind.IDLE and w not in pulled]
+    for worker in idle:
+        if not _to_minerals(side, staff, worker):
+            return
+    _fill_gas(side, staff)
+    _even_out(side, staff)
+
+
+def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
+    """Send a worker to the nearest base with room, or to the nearest one."""
+    world = side.world
+    if not staff.halls:
+        return False
+    x, y = side.place(worker)
+    hall = min(
+        staff.halls,
+        key=lambda h: (staff.halls[h][0] >= staff.halls[h][1], float(np.hypot(*(world.pos[h] - (x, y)))), h),
+    )
+    field = harvesting.another_field(world, worker, world.pos[hall])
+    if field == NOBODY:
+        return False
+    staff.halls[hall][0] += 1
+    return hands.gather(side, [worker], world.tag_of(field))
+
+
+def _fill_gas(side: Side, staff: Staff) -> None:
+    world = side.world
+    plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < GAS_ENOUGH / 2
+    wanted = 1 if plenty else GAS_WORKERS
+    for gas, (assigned, _) in sorted(staff.gas.items()):
+        if assigned > wanted and plenty:
+            worker = next((w for w in side.workers if world.patch[w] == gas and not world.load[w]), NOBODY)
+            if worker != NOBODY and world.carrier[worker] == NOBODY:
+                _to_minerals(side, staff, worker)
+        for _ in range(wanted - assigned):
+            worker = products.free_worker(side, side.place(gas))
+            if worker == NOBODY or not hands.gather(side, [worker], world.tag_of(gas)):
+                return
+
+
+def _even_out(side: Side, staff: Staff) -> None:
+    """Send workers from bases with too many to one with too few."""
+    world = side.world
+    room = [h for h, (assigned, ideal) in staff.halls.items() if assigned < ideal]
+    full = [h for h, (assigned, ideal) in staff.halls.items() if assigned > ideal + 1]
+    if not room or not full:
+        return
+    there = room[0]
+    for _ in range(min(MOVED_AT_ONCE, staff.halls[full[0]][0] - staff.halls[full[0]][1])):
+        worker = products.free_worker(side, side.place(full[0]))
+        field = harvesting.another_field(world, worker, world.pos[there]) if worker != NOBODY else NOBODY
+        if field == NOBODY or not hands.gather(side, [worker], world.tag_of(field)):
+            return
+
+
+# supply and workers ---------------------------------------------------------------------------------------------------
+
+
+def keep_supply_ahead(side: Side) -> None:
+    """Make more supply before it runs out."""
+    name = side.race.supply
+    provides = side.world.catalog.unit(name).provides
+    coming = provides * (side.count(name) - len(side.kind(name)))
+    hall = side.world.catalog.unit(side.race.hall).provides
+    coming += hall * len(side.begun.get(side.race.hall, ())) * 0.5
+    planned = any(step.what == name for step in side.build.opening[side.mind.step :])
+    if (planned and side.cap - side.used > 2.0) or side.cap + coming >= supply.LIMIT or side.cap + coming - side.used > _ahead(side):
+        return
+    products.make(side, name)
+
+
+def _ahead(side: Side) -> float:
+    """Return the supply that the side can use up before more is there."""
+    makers = len(side.kind(side.race.producer)) + sum(len(side.kind(n)) for n in ("Factory", "Starport"))
+    makers += sum(len(side.kind(n)) for n in ("RoboticsFacility", "Stargate"))
+    a_second = len(side.halls) / 12.0 + makers * 2.0 / 27.0
+    if side.owner.race == "zerg":
+        a_second = len(side.halls) * (0.13 + min(side.owner.minerals, 800.0) / 4000.0)
+    return 1.0 + AHEAD_S * a_second
+
+
+def train_workers(side: Side, staff: Staff) -> None:
+    """Make workers until the bases are full, as fast as the level can."""
+    world, name = side.world, side.race.worker
+    most = min(side.level.workers, side.stage.workers or side.level.workers, _wanted(side, staff))
+    halls = max(len(side.halls), 1)
+    while side.count(name) < most and world.loop >= side.mind.next_worker:
+        if products.make(side, name) is not Outcome.DONE:
+            return
+        side.mind.next_worker = world.loop + round(side.level.worker_s * FASTER_LOOPS / (1 if halls < 2 else 1.5))
+
+
+def _wanted(side: Side, staff: Staff) -> int:
+    begun = len(side.begun.get(side.race.hall, ()))
+    gas = len(side.begun.get(side.race.gas, ()))
+    return staff.places + A_HALL * begun + GAS_WORKERS * gas + 2
+
+

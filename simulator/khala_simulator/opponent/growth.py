@@ -1,0 +1,200 @@
+"""Growth: what the money is spent on, in the order in which it matters.
+
+What can't be paid yet is put aside, so that what comes later does not eat it up. While the army is too small for what
+is known of the enemy, the army comes first.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.economy import production
+from khala_simulator.opponent import bases, composition, economy, products
+from khala_simulator.opponent.levels import FASTER_LOOPS
+from khala_simulator.opponent.products import Outcome
+from khala_simulator.tables.prices import cost_of
+
+if TYPE_CHECKING:
+    from khala_simulator.opponent.economy import Staff
+    from khala_simulator.opponent.enemy import Enemy
+    from khala_simulator.opponent.side import Side
+
+GUARD_FROM_S: Final = 100.0
+"""Before this, no army is expected."""
+MOST_GUARD: Final = 100.0
+QUEEN: Final = 1.5
+"""What a Queen counts as army supply."""
+PATIENCE_S: Final = 70.0
+"""A step of the opening that is impossible for so long is skipped."""
+WAITED: Final = 300.0
+"""With so many minerals a step of the opening does not wait for its supply: the workers of weak levels come late."""
+RICH: Final = 450.0
+"""With so many minerals unspent there are too few producers."""
+PLENTY_OF_GAS: Final = 250.0
+PRODUCERS_PER_BASE: Final = 4
+FULL_SHARE: Final = 0.8
+"""A side expands when its bases have this share of the workers that they want."""
+ORBITAL: Final = "OrbitalCommand"
+LEVELS: Final = ("Level1", "Level2", "Level3")
+
+
+def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
+    """Spend the money of this thought."""
+    economy.keep_supply_ahead(side)
+    danger = in_danger(side, enemy)
+    if danger:
+        train_army(side, enemy)
+    change_halls(side)
+    economy.train_workers(side, staff)
+    if follow_opening(side):
+        if not danger:
+            expand(side, enemy, staff)
+        build_structures(side)
+        make_units(side)
+        research(side)
+    if not danger:
+        train_army(side, enemy)
+
+
+def in_danger(side: Side, enemy: Enemy) -> bool:
+    """Return whether the army comes before everything else."""
+    own = side.army_supply + _coming(side) + QUEEN * len(side.named("Queen"))
+    minutes = max(0.0, side.clock_s - GUARD_FROM_S) / 60.0
+    expected = min(MOST_GUARD, side.build.guard * minutes**2) * side.level.production
+    known = enemy.army_supply() if "adapt" in side.level.skills or side.level.vision else 0.0
+    attacked = side.mind.threat is not None and side.mind.alarm >= 0
+    return own < max(expected, 0.8 * known) or (attacked and own < 1.5 * known + 4.0)
+
+
+def _coming(side: Side) -> float:
+    units = side.world.catalog
+    return sum(units.unit(n).supply * k for n, k in side.underway.items() if n in units.row_of_name
+               and units.unit(n).army)  # fmt: skip
+
+
+# structures -----------------------------------------------------------------------------------------------------------
+
+
+def follow_opening(side: Side) -> bool:
+    """Make the next step of the opening if its time has come; return True once the opening is over."""
+    mind, opening = side.mind, side.build.opening
+    if mind.step >= len(opening):
+        return True
+    step = opening[mind.step]
+    if side.used < step.supply and side.owner.minerals < WAITED:
+        return False
+    near = None
+    if step.what == side.race.hall:
+        near = mind.bases[1] if len(mind.bases) > 1 else None
+    outcome = products.make(side, step.what, near=near)
+    patient = side.world.loop - mind.step_since < PATIENCE_S * FASTER_LOOPS * side.level.tempo
+    if outcome is Outcome.DONE or (outcome is Outcome.BLOCKED and not patient):
+        mind.step, mind.step_since = mind.step + 1, side.world.loop
+    return mind.step >= len(opening)
+
+
+def change_halls(side: Side) -> None:
+    """Change the kind of a town hall before it trains the next worker, once the build wants that."""
+    steps = [step.what for step in side.build.opening[: side.mind.step + 1]]
+    wanted = max(steps.count(ORBITAL), side.stage.structures.get(ORBITAL, 0))
+    if side.count(ORBITAL) < wanted:
+        products.make(side, ORBITAL)
+
+
+def expand(side: Side, enemy: Enemy, staff: Staff) -> None:
+    """Take another base when the build wants one, and the others are full or the money is too much for them."""
+    have = side.count(side.race.hall)
+    rich = side.owner.minerals > 2 * RICH
+    wanted = min(side.level.bases, max(side.stage.bases, have + 1 if rich else 0))
+    full = len(side.workers) >= FULL_SHARE * staff.places
+    lively = sum(ideal > 4 for _, ideal in staff.halls.values())
+    if (have < wanted and (full or rich)) or (lively < min(have, 2) and have - lively < 2):
+        place = bases.next_place(side, enemy)
+        if place is not None:
+            products.make(side, side.race.hall, near=place)
+
+
+def build_structures(side: Side) -> None:
+    """Make the first structure that is missing; gas first."""
+    gas = min(side.stage.gas, 2 * len(side.halls))
+    short = side.owner.vespene < PLENTY_OF_GAS
+    if short and side.count(side.race.gas) < gas and len(side.workers) >= 14 + 3 * side.count(side.race.gas):
+        products.make(side, side.race.gas)
+    for name, wanted in side.stage.structures.items():
+        if side.count(name) < _scaled(side, name, wanted) and _one_more(side, name):
+            return
+    _more_producers(side)
+
+
+def _one_more(side: Side, name: str) -> bool:
+    """Make one more structure, or what it requires; return False when others need not wait for it."""
+    first = products.lacking(side, name)
+    return products.make(side, first or name) is not Outcome.BLOCKED
+
+
+def _scaled(side: Side, name: str, wanted: int) -> int:
+    """Return how many of a structure a level wants; of each kind at least one."""
+    return max(1, math.ceil(wanted * min(1.0, side.level.production))) if wanted > 1 else wanted
+
+
+def _more_producers(side: Side) -> None:
+    """Build more producers when the money is not spent."""
+    name = side.race.producer
+    most = max(1, math.floor(PRODUCERS_PER_BASE * side.level.production * max(len(side.halls), 1)))
+    if side.owner.minerals < RICH or name == side.race.hall or side.count(name) >= most:
+        return
+    busy = all(len(side.world.jobs.get(s, ())) > 0 or side.world.unit_type(s).name == "WarpGate"
+               for s in side.kind(name))  # fmt: skip
+    if busy:
+        products.make(side, name)
+
+
+def research(side: Side) -> None:
+    """Begin the first upgrade that is missing, as far as the level goes."""
+    known = {side.world.catalog.upgrade(number).name for number in side.owner.upgrades}
+    for name in side.stage.research:
+        tier = next((i + 1 for i, suffix in enumerate(LEVELS) if name.endswith(suffix)), 0)
+        if name in known or side.underway[name] or tier > side.level.upgrades or not side.level.upgrades:
+            continue
+        if products.make(side, name) is Outcome.SHORT:
+            return
+
+
+# units ----------------------------------------------------------------------------------------------------------------
+
+
+def make_units(side: Side) -> None:
+    """Make single units that the build wants, such as Queens and detectors; Queens as many as town halls."""
+    for name, wanted in side.stage.units.items():
+        most = min(wanted, len(side.halls) + 1) if name == "Queen" else wanted
+        if side.count(name) < most and side.level.production > 0.35:
+            products.make(side, name)
+
+
+def train_army(side: Side, enemy: Enemy) -> None:
+    """Make the units that the army lacks most, as many as producers and money allow."""
+    shares = composition.wanted(side, enemy)
+    for _ in range(_free_producers(side)):
+        names = composition.by_need(side, shares)
+        outcomes = (products.make(side, name) for name in names if _worth_waiting(side, name))
+        if next((o for o in outcomes if o is not Outcome.BLOCKED), Outcome.BLOCKED) is not Outcome.DONE:
+            return
+
+
+def _worth_waiting(side: Side, name: str) -> bool:
+    """Return whether a unit can be paid, or will be soon; one without vespene for it does not stop the others."""
+    way = products.ways(side.world.catalog, name)
+    _, vespene = cost_of(way[0]) if way else (0.0, 0.0)
+    return vespene <= max(side.purse.vespene, 0.0) or not vespene
+
+
+def _free_producers(side: Side) -> int:
+    world = side.world
+    larvae = len(side.named("Larva"))
+    slots = [s for name in ("Gateway", "Barracks", "Factory", "Starport", "RoboticsFacility", "Stargate")
+             for s in side.kind(name)]  # fmt: skip
+    free = sum(max(0, production.parallel(world, s) - len(world.jobs.get(s, ()))) for s in slots)
+    return int(np.clip(free + larvae, 0, 12))

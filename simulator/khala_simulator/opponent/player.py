@@ -1,0 +1,68 @@
+"""One thought of a computer player, as a table of contents.
+
+It acts only through the orders that every client has (``hands``) and pays what they cost. What it keeps in mind is the
+player's ``mind``, part of the world's digest; every choice follows from the world and its seed. Above:
+``systems.opponents``. Below: the modules of this package.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.opponent import army, bases, boosts, economy, growth, hands
+from khala_simulator.opponent.builds import load_race, name_of
+from khala_simulator.opponent.economy import Staff
+from khala_simulator.opponent.enemy import Enemy
+from khala_simulator.opponent.side import Side
+from khala_simulator.world.opponent_memory import OpponentMemory
+
+if TYPE_CHECKING:
+    from khala_simulator.world.world import World
+
+PATIENCE: Final = 0.08
+"""How much earlier or later than its build a player does everything, drawn from the seed."""
+
+
+def think(world: World, player: int) -> None:
+    """Play one turn of a computer player."""
+    if world.players[player].mind is None:
+        world.players[player].mind = begin(world, player)
+    side = Side(world, player)
+    if not side.slots.size:
+        return
+    enemy = Enemy(side)
+    hands.rest(side)
+    tax(side)
+    army.lead(side, enemy)
+    staff = Staff(side)
+    economy.mine(side, staff)
+    growth.grow(side, enemy, staff)
+    boosts.boost(side)
+
+
+def begin(world: World, player: int) -> OpponentMemory:
+    """Return the memory with which a player begins: its build, and what the map says."""
+    owner = world.players[player]
+    draws = np.random.default_rng([world.seed, player]).random(2).tolist()
+    places = bases.find(world, player, world.catalog.unit(load_race(owner.race).hall))
+    own = owner.start or places[0]
+    starts = [place for place in world.map.scenario.start_locations if math.dist(place, own) > 1.0]
+    return OpponentMemory(
+        build=name_of(owner.build, draws[0]),
+        patience=1.0 + PATIENCE * (2.0 * draws[1] - 1.0),
+        bases=places or (own,),
+        resources=bases.resources(world),
+        enemy_start=min(starts, default=own),
+    )
+
+
+def tax(side: Side) -> None:
+    """Give a player that cheats by income its extra on what its workers have delivered since."""
+    collected, taxed = side.owner.score.collected, side.mind.taxed
+    extra = side.level.income - 1.0
+    side.owner.minerals += extra * (collected[0] - taxed[0])
+    side.owner.vespene += extra * (collected[1] - taxed[1])
+    side.mind.taxed = list(collected)

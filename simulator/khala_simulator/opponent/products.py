@@ -1,0 +1,166 @@
+"""Making anything by its name: a unit, a structure, an add-on, an upgrade, or a change of kind.
+
+``make`` looks for the abilities that produce it, for a unit of the side that can use one of them now, and for the money;
+when only the money is missing it is put aside, so that it is there later.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.abilities import casting
+from khala_simulator.economy import harvesting, production
+from khala_simulator.economy.harvesting import Phase
+from khala_simulator.economy.requirements import ALIAS
+from khala_simulator.opponent import hands, sites
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.world import NO_TAG
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_simulator.opponent.side import Side
+    from khala_simulator.tables.abilities import Ability, Need
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.casts import Point
+    from khala_simulator.world.world import World
+
+MAKES: Final = frozenset({"train", "build", "build_addon", "warp_in", "structure_morph", "grow", "research"})
+
+
+class Outcome(Enum):
+    """What came of making something."""
+
+    DONE = "ordered"
+    SHORT = "the money is put aside"
+    BLOCKED = "nothing can make it now"
+
+
+def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
+    """Make one of a type or an upgrade, if possible now; structures ``near`` a point, by default in the main base."""
+    found = Outcome.BLOCKED
+    for ability in ways(side.world.catalog, name):
+        makers = list(_makers(side, ability))
+        if not makers or ability.supply > side.purse.room:
+            continue
+        if not side.purse.affords(ability):
+            found = Outcome.SHORT
+        elif _order(side, ability, makers, near):
+            side.purse.take(ability)
+            side.underway[name] += 1
+            return Outcome.DONE
+    if found is Outcome.SHORT:
+        side.purse.take(ways(side.world.catalog, name)[0])
+    return found
+
+
+@lru_cache(maxsize=512)
+def ways(catalog: Catalog, name: str) -> tuple[Ability, ...]:
+    """Return the abilities that make a type of unit or an upgrade."""
+    made = [a for a in catalog.abilities if a.effect in MAKES and name in (a.unit, a.upgrade) and a.users]
+    return tuple(sorted(made, key=lambda a: (a.effect != "warp_in", a.id)))
+
+
+def lacking(side: Side, name: str) -> str:
+    """Return a structure that has to stand before something can be made, and that is not even begun; "" for none."""
+    for ability in ways(side.world.catalog, name)[:1]:
+        for need in _structures(ability.requires):
+            if not side.count(need):
+                return lacking(side, need) or need
+    return ""
+
+
+def _structures(need: Need | None) -> Iterator[str]:
+    """Yield the structures that a condition names, where it asks for all of its parts."""
+    if need is not None and need.kind == "unit":
+        yield need.name.removeprefix(ALIAS)
+    elif need is not None and need.kind == "and":
+        for part in need.parts:
+            yield from _structures(part)
+
+
+def _makers(side: Side, ability: Ability) -> Iterator[int]:
+    """Yield the units that could use an ability now, cost aside; of workers and larvae only the first."""
+    world = side.world
+    for slot in side.named(*ability.users):
+        if not _is_free(side, slot, ability):
+            continue
+        if casting.refusal(world, slot, ability, free=True) is ActionResult.SUCCESS:
+            yield slot
+            if ability.effect != "train" or not world.unit_type(slot).structure:
+                return
+
+
+def _is_free(side: Side, slot: int, ability: Ability) -> bool:
+    world = side.world
+    if ability.effect == "build":
+        return True
+    if ability.effect == "warp_in":
+        return casting.cooldown_left(world, slot, ability) <= 0.0
+    if ability.effect == "grow":
+        return world.target[slot] == NOBODY and not world.casts[slot]
+    parallel = production.parallel(world, slot) if ability.effect == "train" else 1
+    return len(world.jobs.get(slot, ())) < parallel
+
+
+def _order(side: Side, ability: Ability, makers: list[int], near: Point | None) -> bool:
+    if ability.effect == "build":
+        return _build(side, ability, near)
+    if ability.effect == "warp_in":
+        return _warp_in(side, ability, makers[0])
+    return hands.use(side, makers[:1], ability)
+
+
+# structures and warping in --------------------------------------------------------------------------------------------
+
+
+def _build(side: Side, ability: Ability, near: Point | None) -> bool:
+    """Send the nearest free worker to build."""
+    if not hands.free(side):
+        return False
+    world, unit = side.world, side.product(ability)
+    if unit is None:
+        return False
+    geyser = sites.geyser(side) if unit.name == side.race.gas else NOBODY
+    point = side.place(geyser) if geyser != NOBODY else sites.place_for(side, unit, near)
+    if point is None or (unit.name == side.race.gas and geyser == NOBODY):
+        return False
+    worker = free_worker(side, point)
+    if worker == NOBODY:
+        return False
+    field = world.tag_of(int(world.patch[worker]))
+    if geyser != NOBODY:
+        taken = hands.use(side, [worker], ability, target=world.tag_of(geyser))
+    else:
+        taken = hands.use(side, [worker], ability, point=point)
+    if taken and field != NO_TAG:
+        hands.gather(side, [worker], field, queue=True)
+    return taken
+
+
+def free_worker(side: Side, point: Point) -> int:
+    """Return the nearest worker to a point that does nothing more important than mine, or NOBODY."""
+    world = side.world
+    busy = set(map(world.slot_of, side.mind.pulled))
+    free = [w for w in side.workers if w not in busy and _interruptible(world, w)]
+    if not free:
+        return NOBODY
+    offset = world.pos[free] - np.array(point)
+    return free[int(np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2))]
+
+
+def _interruptible(world: World, slot: int) -> bool:
+    fields = harvesting.kinds(world.catalog)[1]
+    patch = int(world.patch[slot])
+    mines = world.harvest[slot] == Phase.TO_RESOURCE and patch != NOBODY and bool(fields[world.type[patch]])
+    return mines or (world.order_kind[slot] == 0 and world.carrier[slot] == NOBODY)
+
+
+def _warp_in(side: Side, ability: Ability, gate: int) -> bool:
+    point = sites.warp_place(side, side.world.catalog.unit(ability.unit))
+    return point is not None and hands.use(side, [gate], ability, point=point)

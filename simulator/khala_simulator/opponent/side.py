@@ -1,0 +1,154 @@
+"""What a computer player knows of its own side in one thought, and the money that it has left in it.
+
+Made afresh for every thought. Above: every other module of this package. Below: the world, and ``levels``, ``builds``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from khala_simulator.economy import building_sites, harvesting, supply
+from khala_simulator.economy.requirements import counts_as
+from khala_simulator.opponent.builds import load_race, stage_at
+from khala_simulator.opponent.levels import FASTER_LOOPS, level_of
+
+if TYPE_CHECKING:
+    from khala_simulator.opponent.builds import Build, Race, Stage
+    from khala_simulator.opponent.levels import Level
+    from khala_simulator.tables.abilities import Ability
+    from khala_simulator.tables.records import UnitType
+    from khala_simulator.world.casts import Point
+    from khala_simulator.world.columns import Ints
+    from khala_simulator.world.opponent_memory import OpponentMemory
+    from khala_simulator.world.world import World
+
+
+@dataclass(slots=True)
+class Purse:
+    """What is left to spend in this thought; it is less than nothing once more is put aside than there is."""
+
+    minerals: float
+    vespene: float
+    room: float
+
+    def affords(self, ability: Ability) -> bool:
+        """Return whether the price of an ability is there; what is put aside does not hinder what is free."""
+        enough = self.minerals >= ability.minerals or not ability.minerals
+        return enough and (self.vespene >= ability.vespene or not ability.vespene)
+
+    def take(self, ability: Ability) -> None:
+        """Spend the price of an ability, or put it aside for later."""
+        self.minerals -= ability.minerals
+        self.vespene -= ability.vespene
+        self.room -= ability.supply
+
+
+class Side:
+    """One player's units by what they are, its plan and its money."""
+
+    def __init__(self, world: World, player: int) -> None:
+        self.world, self.player, self.owner = world, player, world.players[player]
+        assert self.owner.mind is not None
+        self.mind: OpponentMemory = self.owner.mind
+        self.level: Level = level_of(self.owner.difficulty)
+        self.race: Race = load_race(self.owner.race)
+        self.build: Build = self.race.builds[self.mind.build]
+        self.slots: Ints = world.units_of(player)
+        self.whole: dict[str, list[int]] = {}
+        self.begun: dict[str, list[int]] = {}
+        for slot, row, done in zip(
+            self.slots.tolist(), world.type[self.slots].tolist(), world.build_progress[self.slots].tolist(), strict=True
+        ):
+            (self.whole if done >= 1.0 else self.begun).setdefault(world.catalog.units[row].name, []).append(slot)
+        self.used = supply.used(world, player)
+        self.cap = supply.cap(world, player)
+        self.purse = Purse(self.owner.minerals, self.owner.vespene, self.cap - self.used)
+        self.ordered = self._ordered()
+        self.underway = Counter(self.owner.underway)
+
+    # time ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def clock_s(self) -> float:
+        """Seconds of game time on the clock of its build; a weak player's clock is slow."""
+        return self.world.loop / FASTER_LOOPS / (self.level.tempo * self.mind.patience)
+
+    @cached_property
+    def stage(self) -> Stage:
+        """What its build wants now."""
+        return stage_at(self.owner.race, self.mind.build, self.clock_s)
+
+    # units --------------------------------------------------------------------------------------------------------
+
+    def named(self, *names: str) -> list[int]:
+        """Return own finished units of some types, by slot."""
+        return sorted(slot for name in names for slot in self.whole.get(name, ()))
+
+    def kind(self, name: str) -> list[int]:
+        """Return own finished units that count as a type: a Warp Gate is a Gateway."""
+        return self.named(*self._names(name))
+
+    def count(self, name: str) -> int:
+        """Return how many of a type, or of what counts as it, exist, are being made, or are ordered."""
+        names = self._names(name)
+        exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) for n in names)
+        return exist + sum(self.underway[n] for n in names - set(self.begun)) + self.ordered[name]
+
+    def _names(self, name: str) -> set[str]:
+        rows = counts_as(self.world.catalog, name, alias=True)
+        return {self.world.catalog.units[row].name for row in rows}
+
+    @cached_property
+    def workers(self) -> list[int]:
+        """Own workers that are not away as a scout."""
+        scout = self.world.slot_of(self.mind.scout)
+        return [slot for slot in self.named(self.race.worker) if slot != scout]
+
+    @cached_property
+    def halls(self) -> list[int]:
+        """Own finished town halls on the ground, in the order in which the bases were found."""
+        halls = [slot for slot in self.slots.tolist() if harvesting.is_drop_off(self.world, slot)]
+        start = np.array(self.owner.start or self.mind.bases[0])
+        return sorted(halls, key=lambda s: (float(((self.world.pos[s] - start) ** 2).sum()), s))
+
+    @cached_property
+    def army(self) -> list[int]:
+        """Own finished units that fight or go with those that fight, except workers, scouts and a drop on its way."""
+        world, away = self.world, {self.mind.scout, self.mind.drop.transport, *self.mind.drop.squad}
+        return [
+            slot for name, slots in self.whole.items() if world.catalog.unit(name).army
+            for slot in slots if world.tag_of(slot) not in away and not world.expires[slot]
+        ]  # fmt: skip
+
+    @cached_property
+    def army_supply(self) -> float:
+        """Supply of the army."""
+        return sum(self.world.unit_type(slot).supply for slot in self.army)
+
+    def place(self, slot: int) -> Point:
+        """Return where a unit is."""
+        x, y = self.world.pos[slot].tolist()
+        return x, y
+
+    # orders under way ---------------------------------------------------------------------------------------------
+
+    def _ordered(self) -> Counter[str]:
+        """Count what units are on their way to build or to become, and put its price aside if it is not paid yet."""
+        world, found = self.world, Counter[str]()
+        for slot in self.slots[world.casts[self.slots]].tolist():
+            ability = world.catalog.ability_of_id.get(int(world.order_ability[slot]))
+            if ability is None or not ability.unit:
+                continue
+            found[ability.unit] += 1
+            if ability.effect == "build":
+                self.purse.take(ability)
+        return found
+
+    def product(self, ability: Ability) -> UnitType | None:
+        """Return the structure that an ability builds."""
+        return building_sites.product(self.world, ability)

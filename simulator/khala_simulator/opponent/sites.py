@@ -1,0 +1,160 @@
+"""Sites: where a computer player puts its structures.
+
+Around a base, with a way around each of them; not between a town hall and its resources, not where another base's town
+hall will stand, and not on a ramp. Candidates are found on grids of the whole map, then judged by the game's rules.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.economy import building_sites, power
+from khala_simulator.movement.placement import candidates
+from khala_simulator.opponent import bases
+from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
+
+if TYPE_CHECKING:
+    from khala_simulator.maps.game_map import GameMap
+    from khala_simulator.opponent.side import Side
+    from khala_simulator.tables.records import UnitType
+    from khala_simulator.world.casts import Point
+    from khala_simulator.world.columns import Bools, Floats
+    from khala_simulator.world.world import World
+
+NEAREST, FARTHEST = 4.0, 18.0
+"""How far from the base's town hall a structure stands."""
+PYLONS_APART: Final = 4.5
+TRIES: Final = 10
+"""How many candidates the rules judge before the search ends."""
+WITH_ADDON: Final = frozenset({"Barracks", "Factory", "Starport"})
+ADDON_CELLS: Final = 2
+FORWARD: Final = frozenset({"Bunker", "PhotonCannon", "ShieldBattery", "SpineCrawler"})
+"""Structures that stand at the base nearest to the enemy, on its side."""
+FORWARD_BY: Final = 6.0
+
+
+def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | None:
+    """Return where a structure of a type is to stand, or None without a place; ``near`` a point if one is given."""
+    if unit.name == side.race.hall:
+        return near
+    if near is not None:
+        return _nearest(side, unit, near)
+    if unit.name in FORWARD:
+        return _nearest(side, unit, _forward(side))
+    around = [side.place(hall) for hall in side.halls] or [side.mind.bases[0]]
+    if unit.name == side.race.supply:
+        around = around[side.count(unit.name) % len(around) :] + around[: side.count(unit.name) % len(around)]
+    return next((place for base in around if (place := _nearest(side, unit, base)) is not None), None)
+
+
+def _forward(side: Side) -> Point:
+    """Return a point in front of the base nearest to the enemy."""
+    (x, y), (ex, ey) = bases.front(side), side.mind.enemy_start
+    length = max(math.dist((x, y), (ex, ey)), 1.0)
+    return x + (ex - x) / length * FORWARD_BY, y + (ey - y) / length * FORWARD_BY
+
+
+def _nearest(side: Side, unit: UnitType, near: Point) -> Point | None:
+    footprint = building_sites.footprint_of(side.world, unit)
+    if footprint is None:
+        return None
+    at = _centres(side, unit, footprint.size)
+    offset = np.hypot(*(at - np.array(near)).T)
+    far = (offset >= (NEAREST if near in side.mind.bases else 0.0)) & (offset <= FARTHEST)
+    at, offset = at[far], offset[far]
+    if unit.needs_power or unit.name == "Pylon":
+        powered = _by_pylons(side, unit, at)
+        at, offset = at[powered], offset[powered]
+    for index in np.lexsort((at[:, 0], at[:, 1], np.round(offset, 3)))[:TRIES].tolist():
+        x, y = at[index].tolist()
+        if building_sites.refusal(side.world, side.player, unit, (x, y)) is ActionResult.SUCCESS:
+            return x, y
+    return None
+
+
+def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
+    """Return which places suit the Pylons: in a power field, or for a Pylon away from the others."""
+    if unit.needs_power:
+        fields = [power.covered(side.world, source, at) for source in power.sources(side.world, side.player)]
+        return np.logical_or.reduce(fields) if fields else np.zeros(len(at), dtype=np.bool_)
+    pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
+    apart = np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1])
+    result: Bools = (apart >= PYLONS_APART).all(axis=1)
+    return result
+
+
+# grids ----------------------------------------------------------------------------------------------------------------
+
+
+def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
+    """Return (k, 2) the centres where a structure and a way around it find room."""
+    world = side.world
+    open_ground = world.map.terrain.build & ~building_sites.taken(world)
+    open_ground = open_ground & ~_kept_free(world.map, side.mind.bases, side.mind.resources)
+    if unit.needs_creep:
+        open_ground = open_ground & world.creep
+    elif side.owner.race == "zerg" or world.creep.any():
+        open_ground = open_ground & ~world.creep
+    extra = ADDON_CELLS if unit.name in WITH_ADDON else 0
+    width, height = size[0] + 2 + extra, size[1] + 2
+    sums = np.pad(np.cumsum(np.cumsum(open_ground, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+    inside = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width] + sums[:-height, :-width]
+    y, x = np.nonzero(inside == width * height)
+    return np.stack([x + 1 + size[0] / 2.0, y + 1 + size[1] / 2.0], axis=1)
+
+
+@lru_cache(maxsize=16)
+def _kept_free(game_map: GameMap, places: tuple[Point, ...], resources: tuple[Point, ...]) -> Bools:
+    """Return (h, w) cells for town halls, for the ways of workers, and around ground on which nothing can be built."""
+    terrain = game_map.terrain
+    ramp = terrain.walk & ~terrain.build
+    free = ramp.copy()
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            free |= np.roll(ramp, (dy, dx), axis=(0, 1))
+    for place in places:
+        _mark(free, np.array(place), 3.6)
+        for resource in resources:
+            if math.dist(place, resource) <= MECHANICS.harvest_search:
+                for share in np.linspace(0.3, 1.0, 8):
+                    _mark(free, np.array(place) * (1 - share) + np.array(resource) * share, 1.6)
+    return free
+
+
+def _mark(grid: Bools, centre: Floats, half: float) -> None:
+    (x, y), (height, width) = centre.tolist(), grid.shape
+    grid[max(0, int(y - half)) : min(height, int(y + half) + 1), max(0, int(x - half)) : min(width, int(x + half) + 1)] = True
+
+
+# geysers and warping in -----------------------------------------------------------------------------------------------
+
+
+def geyser(side: Side) -> int:
+    """Return a free geyser at an own finished town hall, or NOBODY."""
+    world = side.world
+    ordered = {world.slot_of(order.target) for w in side.workers if world.casts[w] for order in world.orders_of(w)}
+    free = [s for s in world.live.tolist() if s not in ordered and building_sites.is_free_geyser(world, s)]
+    for hall in side.halls:
+        near = [s for s in free if math.dist(side.place(s), side.place(hall)) <= MECHANICS.harvest_search]
+        if near:
+            return min(near, key=lambda s: (math.dist(side.place(s), side.place(hall)), s))
+    return NOBODY
+
+
+def warp_place(side: Side, unit: UnitType) -> Point | None:
+    """Return where to warp a unit in: at the Pylon nearest to the front, a fast one if there is any."""
+    sources = power.sources(side.world, side.player)
+    front = bases.front(side)
+    for source in sorted(sources, key=lambda s: (not s.fast, math.dist(s.point, front), s.slot))[:3]:
+        at = candidates(side.world, unit, source.point, source.radius - 0.5)
+        inside = at[power.covered(side.world, source, at)] if len(at) else at
+        if len(inside):
+            x, y = inside[len(inside) // 3].tolist()
+            return x, y
+    return None
