@@ -1,6 +1,4 @@
-"""The army: it waits at the front, defends the bases, attacks when it is large enough, and retreats from what is too
-strong for it.
-"""
+"""The army: it waits at the front, defends the bases, attacks when large enough, and retreats from what is stronger."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ import numpy as np
 
 from khala_simulator.economy import harvesting
 from khala_simulator.opponent import bases, hands
-from khala_simulator.opponent.enemy import value
+from khala_simulator.opponent.enemy import WORKER_VALUE, value
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.opponent_memory import NEVER
@@ -46,6 +44,8 @@ REINFORCE: Final = 0.15
 """Units that wait join an attack once they are worth this share of it."""
 SPREAD: Final = 11.0
 """An army whose head is so far before its middle waits for the others."""
+WITH: Final = 4.0
+"""So near to the middle of the army its unarmed units stay."""
 SEEN_EMPTY: Final = 6.0
 
 
@@ -61,6 +61,7 @@ def lead(side: Side, enemy: Enemy) -> None:
         attack(side, enemy, army)
     else:
         gather_up(side, army)
+        _garrison(side, army)
         _set_out(side, army)
 
 
@@ -87,7 +88,7 @@ def watch(side: Side, enemy: Enemy) -> Ints | None:
 def threats(side: Side, enemy: Enemy) -> Ints:
     """Return the enemies in sight that fight at an own structure."""
     world = side.world
-    foes = enemy.near(side.mind.bases[0], 1000.0)
+    foes = enemy.fighters
     if not foes.size:
         return foes
     stone = np.array([s for s in side.slots.tolist() if world.unit_type(s).structure], dtype=np.int64)
@@ -130,24 +131,26 @@ def defend(side: Side, army: list[int], threat: Ints) -> None:
 def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
     """Make workers fight while the army at home is weaker than the threat."""
     world, mind = side.world, side.mind
-    assert mind.threat is not None
+    threat_at = mind.threat or mind.bases[0]
     lacking = 1.15 * strength - value(world, army) - value(world, _static(side))
-    near = any(math.dist(side.place(h), mind.threat) < HOME - 6.0 for h in side.halls)
+    near = any(math.dist(side.place(h), threat_at) < HOME - 6.0 for h in side.halls)
     if lacking <= 0.0 or not near or not side.level.pull:
         _release(side)
         return
     most = int(side.level.pull * len(side.workers))
-    wanted = min(most, math.ceil(lacking / 35.0))
+    wanted = min(most, math.ceil(lacking / WORKER_VALUE))
     mind.pulled = [tag for tag in mind.pulled if world.slot_of(tag) != NOBODY]
     candidates = [w for w in side.workers if world.carrier[w] == NOBODY and not world.casts[w]]
-    candidates.sort(key=lambda w: (world.tag_of(w) not in mind.pulled, math.dist(side.place(w), mind.threat), w))
+    candidates.sort(key=lambda w: (world.tag_of(w) not in mind.pulled, math.dist(side.place(w), threat_at), w))
     mind.pulled = [world.tag_of(w) for w in candidates[:wanted]]
     idle = [w for w in candidates[:wanted] if world.order_kind[w] != OrderKind.ATTACK_UNIT]
     ground = [s for s in threat.tolist() if not world.unit_type(s).flying]
-    if idle and ground:
-        first = side.place(idle[0])
-        target = min(ground, key=lambda s: (math.dist(side.place(s), first), s))
-        hands.attack_unit(side, idle, world.tag_of(target))
+    groups: dict[int, list[int]] = {}
+    for worker in idle if ground else ():
+        offset = world.pos[ground] - world.pos[worker]
+        groups.setdefault(ground[int(np.argmin((offset**2).sum(axis=1)))], []).append(worker)
+    for target, group in groups.items():
+        hands.attack_unit(side, group, world.tag_of(target))
 
 
 def _release(side: Side) -> None:
@@ -183,6 +186,17 @@ def gather_up(side: Side, army: list[int]) -> None:
         hands.attack(side, lost, point)
 
 
+def _garrison(side: Side, army: list[int]) -> None:
+    """Send Marines into Bunkers with room."""
+    world = side.world
+    marines = [s for s in army if world.unit_type(s).name == "Marine" and _idle(side, s)]
+    for bunker in side.named("Bunker"):
+        room = world.unit_type(bunker).cargo_space - len(world.passengers(bunker))
+        marines.sort(key=lambda s: (math.dist(side.place(s), side.place(bunker)), s))
+        if room > 0 and marines and hands.smart(side, marines[:room], world.tag_of(bunker)):
+            del marines[:room]
+
+
 def _set_out(side: Side, army: list[int]) -> None:
     """Begin an attack when its time has come and the army is large enough."""
     mind, build = side.mind, side.build
@@ -201,14 +215,17 @@ def attack(side: Side, enemy: Enemy, army: list[int]) -> None:
     """Lead the attack: go on, wait for the others, or retreat."""
     world, mind = side.world, side.mind
     goal = _goal(side, enemy, army)
-    there = [s for s in army if not _waits(side, s)]
+    waiting = [s for s in army if _waits(side, s, goal)]
+    there = [s for s in army if s not in set(waiting)]
     worth = value(world, army)
     mind.wave_value = max(mind.wave_value, worth)
     if not army or worth < SPENT * mind.wave_value or _too_strong(side, enemy, there):
         _call_off(side)
         return
-    waiting = [s for s in army if s not in set(there)]
     fresh = waiting if not there or value(world, waiting) > REINFORCE * worth else []
+    if not fresh:
+        gather_up(side, waiting)
+    there = _support(side, there)
     if "regroup" in side.level.skills:
         ahead = _ahead_of_the_others(side, enemy, there, goal)
         there = [s for s in there if s not in ahead]
@@ -258,6 +275,20 @@ def _goal(side: Side, enemy: Enemy, army: list[int]) -> Point:
     return point
 
 
+def _support(side: Side, there: list[int]) -> list[int]:
+    """Keep units without a weapon with the others; return those that fight."""
+    world = side.world
+    unarmed = [s for s in there if world.ground_weapon[s] < 0 and world.air_weapon[s] < 0 and not world.channels[s]]
+    armed = [s for s in there if s not in set(unarmed)]
+    if not armed or not unarmed:
+        return armed
+    x, y = np.median(world.pos[armed], axis=0).tolist()
+    away = [s for s in unarmed if math.dist(side.place(s), (x, y)) > WITH and not _bound_for(side, s, (x, y), WITH)]
+    if away:
+        hands.attack(side, away, (x, y))
+    return armed
+
+
 def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point) -> set[int]:
     """Stop the head of a long column until the others are near; return it."""
     world = side.world
@@ -275,9 +306,12 @@ def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point
     return set(ahead)
 
 
-def _waits(side: Side, slot: int) -> bool:
-    """Return whether a unit is still where the army gathers, or on its way there."""
-    return _idle(side, slot) and math.dist(side.place(slot), rally(side)) < 2.0 * RALLY_NEAR
+def _waits(side: Side, slot: int, goal: Point) -> bool:
+    """Return whether a unit has not set out yet: it does nothing, nearer to home than to the goal, or gathers."""
+    home, at = rally(side), side.place(slot)
+    if _bound_for(side, slot, home, 2.0):
+        return True
+    return _idle(side, slot) and math.dist(at, home) < math.dist(at, goal)
 
 
 def _idle(side: Side, slot: int) -> bool:

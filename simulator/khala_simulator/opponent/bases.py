@@ -38,7 +38,7 @@ DANGER: Final = 14.0
 def find(world: World, player: int, hall: UnitType) -> tuple[Point, ...]:
     """Return where town halls can stand, the nearest to a player's start by the way on the ground first."""
     start = world.players[player].start or (0.0, 0.0)
-    starts = [place for place in world.map.scenario.start_locations]
+    starts = list(world.map.scenario.start_locations)
     found = [_site(world, player, hall, group, starts) for group in _groups(world)]
     places = [place for place in found if place is not None]
     return tuple(sorted(places, key=lambda place: (way(world, start, place), place)))

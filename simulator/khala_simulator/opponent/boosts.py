@@ -28,7 +28,7 @@ def boost(side: Side) -> None:
 def _inject(side: Side) -> None:
     """Make each Queen with the energy spit larvae on the nearest town hall that has none waiting."""
     world, ability = side.world, side.world.catalog.ability(INJECT)
-    injected = {row for row in world.buffs.rows["slot"].tolist()} if len(world.buffs) else set()
+    injected = set(world.buffs.rows["slot"].tolist()) if len(world.buffs) else set()
     queens = [q for q in side.named("Queen") if world.energy[q] >= ability.energy and not world.casts[q]]
     for hall in side.halls:
         if not queens or hall in injected:
@@ -55,11 +55,10 @@ def _chrono(side: Side) -> None:
     """Speed up what is busy: research first, then whatever the producers make, then workers."""
     world, ability = side.world, side.world.catalog.ability(CHRONO)
     for nexus in side.named("Nexus"):
-        if world.energy[nexus] < ability.energy:
+        if casting.refusal(world, nexus, ability) is not ActionResult.SUCCESS:
             continue
         boosted = set(world.buffs.rows["slot"].tolist()) if len(world.buffs) else set()
-        busy = [s for s in world.jobs if world.owner[s] == side.player and s not in boosted]
-        busy = [s for s in busy if casting.refusal(world, nexus, ability) is ActionResult.SUCCESS]
+        busy = [s for s in sorted(world.jobs) if world.owner[s] == side.player and s not in boosted]
         if not busy:
             return
         target = max(busy, key=lambda s: (world.jobs[s][0].kind == "research", s in side.halls, -s))

@@ -1,7 +1,7 @@
 """Composition: which units the army wants most, by the shares of the build and by what is known of the enemy.
 
-A level that adapts counts what it has seen: units that can't hit flyers count less the more flyers there are, units with
-a bonus against the enemy's attributes count more.
+A level that adapts counts what it has seen: units that can't hit flyers count less the more flyers there are, units
+with a bonus against the enemy's attributes count more.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
@@ -18,11 +17,13 @@ if TYPE_CHECKING:
 AIR_SHIFT: Final = 0.8
 """How much of its share a unit loses that can't hit flyers, if the enemy has nothing else."""
 BONUS_SHIFT: Final = 0.7
+FOR_AIR: Final = 0.1
+"""The part of its share that a unit keeps that hits only flyers while there are none."""
 GAS_PILE: Final = 300.0
 PILE_SHIFT: Final = 0.5
 
 
-def wanted(side: Side, enemy: Enemy) -> dict[str, float]:
+def wanted(side: Side) -> dict[str, float]:
     """Return the shares of the army that a side wants now."""
     shares = {name: share * _for_money(side, name) for name, share in side.stage.army.items()}
     if "adapt" not in side.level.skills:
@@ -59,16 +60,19 @@ def _seen(side: Side) -> tuple[float, dict[str, float]]:
 
 
 def _fit(catalog: Catalog, name: str, flyers: float, attributes: dict[str, float]) -> float:
-    hits_air, bonuses = _strengths(catalog, name)
+    hits_ground, hits_air, bonuses = _strengths(catalog, name)
     fit = 1.0 if hits_air else 1.0 - AIR_SHIFT * flyers
+    if not hits_ground:
+        fit = FOR_AIR + flyers
     return fit * (1.0 + BONUS_SHIFT * sum(share * attributes.get(word, 0.0) for word, share in bonuses))
 
 
 @lru_cache(maxsize=256)
-def _strengths(catalog: Catalog, name: str) -> tuple[bool, tuple[tuple[str, float], ...]]:
-    """Return whether a type hits flyers, and its bonuses by attribute as parts of its damage."""
+def _strengths(catalog: Catalog, name: str) -> tuple[bool, bool, tuple[tuple[str, float], ...]]:
+    """Return whether a type hits the ground and flyers, and its bonuses by attribute as parts of its damage."""
     unit: UnitType = catalog.unit(name)
     weapons = [weapon for weapon in unit.weapons if weapon.works]
     hits_air = unit.weapon_against("air") is not None or not weapons
     bonuses = {word: bonus / max(w.shown_damage, 1.0) for w in weapons for word, bonus in w.shown_bonus}
-    return hits_air, tuple(sorted(bonuses.items()))
+    hits_ground = unit.weapon_against("ground") is not None or not weapons
+    return hits_ground, hits_air, tuple(sorted(bonuses.items()))

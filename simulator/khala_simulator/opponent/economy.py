@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.economy import harvesting, supply
+from khala_simulator.economy import construction, harvesting, supply
 from khala_simulator.opponent import hands, products
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.opponent.products import Outcome
@@ -46,11 +46,22 @@ def mine(side: Side, staff: Staff) -> None:
     world = side.world
     pulled = set(map(world.slot_of, side.mind.pulled))
     idle = [w for w in side.workers if world.order_kind[w] == OrderKind.IDLE and w not in pulled]
+    for site in _abandoned(side):
+        if idle:
+            hands.smart(side, [idle.pop()], world.tag_of(site))
     for worker in idle:
         if not _to_minerals(side, staff, worker):
             return
     _fill_gas(side, staff)
     _even_out(side, staff)
+
+
+def _abandoned(side: Side) -> list[int]:
+    """Return unfinished structures that only go on with a builder, and that have none."""
+    world = side.world
+    halted = [s for slots in side.begun.values() for s in slots if not world.self_made[s]]
+    building = {int(world.order_target[w]) for w in side.workers if world.order_kind[w] == OrderKind.FOLLOW}
+    return [s for s in halted if s not in building and construction.builder_of(world, s) == NOBODY]
 
 
 def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
@@ -111,7 +122,11 @@ def keep_supply_ahead(side: Side) -> None:
     hall = side.world.catalog.unit(side.race.hall).provides
     coming += hall * len(side.begun.get(side.race.hall, ())) * 0.5
     planned = any(step.what == name for step in side.build.opening[side.mind.step :])
-    if (planned and side.cap - side.used > 2.0) or side.cap + coming >= supply.LIMIT or side.cap + coming - side.used > _ahead(side):
+    if (
+        (planned and side.cap - side.used > 2.0)
+        or side.cap + coming >= supply.LIMIT
+        or side.cap + coming - side.used > _ahead(side)
+    ):
         return
     products.make(side, name)
 
@@ -141,5 +156,3 @@ def _wanted(side: Side, staff: Staff) -> int:
     begun = len(side.begun.get(side.race.hall, ()))
     gas = len(side.begun.get(side.race.gas, ()))
     return staff.places + A_HALL * begun + GAS_WORKERS * gas + 2
-
-

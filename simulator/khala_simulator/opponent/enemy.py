@@ -27,6 +27,11 @@ REMEMBERED_S: Final = 90.0
 WORKER_VALUE: Final = 35.0
 """A worker fights worse than its price: 20 hits in the time of 50 for a Marine at the same life."""
 
+VESPENE: Final = 1.2
+"""A unit of vespene counts as so many minerals."""
+A_BUNKER: Final = 250.0
+"""With the Marines in it, which nobody sees."""
+
 
 class Enemy:
     """The enemies of a side, as it knows them in one thought."""
@@ -40,6 +45,7 @@ class Enemy:
         structure = _structures(world.catalog)[world.type[self.known]]
         self.units: Ints = self.known[~structure]
         self.structures: Ints = self.known[structure]
+        self.fighters: Ints = self.known[values_of(world.catalog)[world.type[self.known]] > 0.0]
         self._remember()
 
     def _remember(self) -> None:
@@ -68,9 +74,8 @@ class Enemy:
     def near(self, point: Point, radius: float) -> Ints:
         """Return the enemies in sight within a radius that can fight."""
         world = self.side.world
-        fights = self.known[values_of(world.catalog)[world.type[self.known]] > 0.0]
-        offset = world.pos[fights] - np.array(point)
-        found: Ints = fights[offset[:, 0] ** 2 + offset[:, 1] ** 2 <= radius**2]
+        offset = world.pos[self.fighters] - np.array(point)
+        found: Ints = self.fighters[offset[:, 0] ** 2 + offset[:, 1] ** 2 <= radius**2]
         return found
 
 
@@ -94,7 +99,9 @@ def values_of(catalog: Catalog) -> Floats:
         if unit.worker:
             found[unit.row] = WORKER_VALUE
         elif (unit.army or armed) and not unit.not_in_melee:
-            found[unit.row] = unit.cost[0] + 1.2 * unit.cost[1]
+            found[unit.row] = unit.cost[0] + VESPENE * unit.cost[1]
+        elif unit.name == "Bunker":
+            found[unit.row] = A_BUNKER
     return found
 
 

@@ -38,6 +38,8 @@ PRODUCERS_PER_BASE: Final = 4
 FULL_SHARE: Final = 0.8
 """A side expands when its bases have this share of the workers that they want."""
 ORBITAL: Final = "OrbitalCommand"
+SPARSE: Final = 4
+"""A base that wants so few workers on its minerals is mined out."""
 LEVELS: Final = ("Level1", "Level2", "Level3")
 
 
@@ -46,17 +48,17 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     economy.keep_supply_ahead(side)
     danger = in_danger(side, enemy)
     if danger:
-        train_army(side, enemy)
+        train_army(side)
     change_halls(side)
     economy.train_workers(side, staff)
-    if follow_opening(side):
+    if follow_opening(side, enemy):
         if not danger:
             expand(side, enemy, staff)
         build_structures(side)
         make_units(side)
         research(side)
     if not danger:
-        train_army(side, enemy)
+        train_army(side)
 
 
 def in_danger(side: Side, enemy: Enemy) -> bool:
@@ -78,7 +80,7 @@ def _coming(side: Side) -> float:
 # structures -----------------------------------------------------------------------------------------------------------
 
 
-def follow_opening(side: Side) -> bool:
+def follow_opening(side: Side, enemy: Enemy) -> bool:
     """Make the next step of the opening if its time has come; return True once the opening is over."""
     mind, opening = side.mind, side.build.opening
     if mind.step >= len(opening):
@@ -86,9 +88,7 @@ def follow_opening(side: Side) -> bool:
     step = opening[mind.step]
     if side.used < step.supply and side.owner.minerals < WAITED:
         return False
-    near = None
-    if step.what == side.race.hall:
-        near = mind.bases[1] if len(mind.bases) > 1 else None
+    near = bases.next_place(side, enemy) if step.what == side.race.hall else None
     outcome = products.make(side, step.what, near=near)
     patient = side.world.loop - mind.step_since < PATIENCE_S * FASTER_LOOPS * side.level.tempo
     if outcome is Outcome.DONE or (outcome is Outcome.BLOCKED and not patient):
@@ -106,15 +106,16 @@ def change_halls(side: Side) -> None:
 
 def expand(side: Side, enemy: Enemy, staff: Staff) -> None:
     """Take another base when the build wants one, and the others are full or the money is too much for them."""
-    have = side.count(side.race.hall)
+    hall = side.race.hall
+    mined_out = sum(ideal <= SPARSE for _, ideal in staff.halls.values())
+    have = len(side.halls) - mined_out + len(side.begun.get(hall, ())) + side.ordered[hall]
     rich = side.owner.minerals > 2 * RICH
     wanted = min(side.level.bases, max(side.stage.bases, have + 1 if rich else 0))
     full = len(side.workers) >= FULL_SHARE * staff.places
-    lively = sum(ideal > 4 for _, ideal in staff.halls.values())
-    if (have < wanted and (full or rich)) or (lively < min(have, 2) and have - lively < 2):
+    if have < wanted and (full or rich):
         place = bases.next_place(side, enemy)
         if place is not None:
-            products.make(side, side.race.hall, near=place)
+            products.make(side, hall, near=place)
 
 
 def build_structures(side: Side) -> None:
@@ -124,7 +125,7 @@ def build_structures(side: Side) -> None:
     if short and side.count(side.race.gas) < gas and len(side.workers) >= 14 + 3 * side.count(side.race.gas):
         products.make(side, side.race.gas)
     for name, wanted in side.stage.structures.items():
-        if side.count(name) < _scaled(side, name, wanted) and _one_more(side, name):
+        if side.count(name) < _scaled(side, wanted) and _one_more(side, name):
             return
     _more_producers(side)
 
@@ -135,7 +136,7 @@ def _one_more(side: Side, name: str) -> bool:
     return products.make(side, first or name) is not Outcome.BLOCKED
 
 
-def _scaled(side: Side, name: str, wanted: int) -> int:
+def _scaled(side: Side, wanted: int) -> int:
     """Return how many of a structure a level wants; of each kind at least one."""
     return max(1, math.ceil(wanted * min(1.0, side.level.production))) if wanted > 1 else wanted
 
@@ -174,9 +175,9 @@ def make_units(side: Side) -> None:
             products.make(side, name)
 
 
-def train_army(side: Side, enemy: Enemy) -> None:
+def train_army(side: Side) -> None:
     """Make the units that the army lacks most, as many as producers and money allow."""
-    shares = composition.wanted(side, enemy)
+    shares = composition.wanted(side)
     for _ in range(_free_producers(side)):
         names = composition.by_need(side, shares)
         outcomes = (products.make(side, name) for name in names if _worth_waiting(side, name))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.opponent import army, bases, boosts, economy, growth, hands
+from khala_simulator.opponent import army, bases, boosts, casts, drops, economy, growth, hands, scouting
 from khala_simulator.opponent.builds import load_race, name_of
 from khala_simulator.opponent.economy import Staff
 from khala_simulator.opponent.enemy import Enemy
@@ -36,11 +36,14 @@ def think(world: World, player: int) -> None:
     enemy = Enemy(side)
     hands.rest(side)
     tax(side)
+    casts.cast(side, enemy)
     army.lead(side, enemy)
+    drops.lead(side, enemy)
     staff = Staff(side)
     economy.mine(side, staff)
     growth.grow(side, enemy, staff)
     boosts.boost(side)
+    scouting.look(side)
 
 
 def begin(world: World, player: int) -> OpponentMemory:

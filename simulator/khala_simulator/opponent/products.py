@@ -1,7 +1,7 @@
 """Making anything by its name: a unit, a structure, an add-on, an upgrade, or a change of kind.
 
-``make`` looks for the abilities that produce it, for a unit of the side that can use one of them now, and for the money;
-when only the money is missing it is put aside, so that it is there later.
+``make`` looks for the abilities that produce it, for a unit of the side that can use one now, and for the money; when
+only the money is missing it is put aside, so that it is there later.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def _build(side: Side, ability: Ability, near: Point | None) -> bool:
         return False
     geyser = sites.geyser(side) if unit.name == side.race.gas else NOBODY
     point = side.place(geyser) if geyser != NOBODY else sites.place_for(side, unit, near)
-    if point is None or (unit.name == side.race.gas and geyser == NOBODY):
+    if point is None:
         return False
     worker = free_worker(side, point)
     if worker == NOBODY:

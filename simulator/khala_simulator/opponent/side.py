@@ -121,7 +121,8 @@ class Side:
         """Own finished units that fight or go with those that fight, except workers, scouts and a drop on its way."""
         world, away = self.world, {self.mind.scout, self.mind.drop.transport, *self.mind.drop.squad}
         return [
-            slot for name, slots in self.whole.items() if world.catalog.unit(name).army
+            slot for name, slots in self.whole.items()
+            if (unit := world.catalog.unit(name)).army and not unit.uncommandable
             for slot in slots if world.tag_of(slot) not in away and not world.expires[slot]
         ]  # fmt: skip
 

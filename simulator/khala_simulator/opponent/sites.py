@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Bools, Floats
-    from khala_simulator.world.world import World
 
 NEAREST, FARTHEST = 4.0, 18.0
 """How far from the base's town hall a structure stands."""
@@ -43,6 +42,8 @@ def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | 
     """Return where a structure of a type is to stand, or None without a place; ``near`` a point if one is given."""
     if unit.name == side.race.hall:
         return near
+    if unit.name == side.race.gas:
+        return None
     if near is not None:
         return _nearest(side, unit, near)
     if unit.name in FORWARD:
@@ -82,7 +83,8 @@ def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
     """Return which places suit the Pylons: in a power field, or for a Pylon away from the others."""
     if unit.needs_power:
         fields = [power.covered(side.world, source, at) for source in power.sources(side.world, side.player)]
-        return np.logical_or.reduce(fields) if fields else np.zeros(len(at), dtype=np.bool_)
+        inside: Bools = np.array(fields, dtype=np.bool_).reshape(-1, len(at)).any(axis=0)
+        return inside
     pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
     apart = np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1])
     result: Bools = (apart >= PYLONS_APART).all(axis=1)
@@ -129,7 +131,9 @@ def _kept_free(game_map: GameMap, places: tuple[Point, ...], resources: tuple[Po
 
 def _mark(grid: Bools, centre: Floats, half: float) -> None:
     (x, y), (height, width) = centre.tolist(), grid.shape
-    grid[max(0, int(y - half)) : min(height, int(y + half) + 1), max(0, int(x - half)) : min(width, int(x + half) + 1)] = True
+    grid[
+        max(0, int(y - half)) : min(height, int(y + half) + 1), max(0, int(x - half)) : min(width, int(x + half) + 1)
+    ] = True
 
 
 # geysers and warping in -----------------------------------------------------------------------------------------------
