@@ -57,12 +57,14 @@ class Attack(Data):
 class Build(Data):
     """One way to play a race.
 
-    ``guard`` times the square of the minutes since the opening is the army supply below which the army comes first.
+    With ``saves``, a step of the opening whose time has come is paid before more workers are. ``guard`` times the
+    square of the minutes since the opening is the army supply below which the army comes first.
     """
 
     opening: tuple[Step, ...]
     attack: Attack
     guard: float
+    saves: bool = False
     stages: tuple[Stage, ...]
 
 

@@ -50,8 +50,9 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     if danger:
         train_army(side)
     change_halls(side)
+    over = side.build.saves and follow_opening(side, enemy)
     economy.train_workers(side, staff)
-    if follow_opening(side, enemy):
+    if over or (not side.build.saves and follow_opening(side, enemy)):
         if not danger:
             expand(side, enemy, staff)
         build_structures(side)

@@ -68,7 +68,7 @@ class ScoreCounters:
 
 @dataclass(slots=True)
 class PlayerSetup:
-    """The player of a slot: ``control`` is agent or computer; ``difficulty`` and ``build`` are the API's numbers or 0."""
+    """The player of a slot: ``control`` is agent or computer, ``difficulty`` and ``build`` the API's numbers or 0."""
 
     id: int
     race: str

@@ -1,68 +1,350 @@
-"""The computer player of melee games: it mines, builds, trains, attacks, and plays the same game every time."""
+"""Computer players: what each part of them does by itself, and that whole games go as the levels promise."""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
-from khala_simulator.economy import supply
+from khala_simulator.economy import harvesting, supply
 from khala_simulator.maps.game_map import load_map
-from khala_simulator.opponent.levels import LEVELS, level_of
+from khala_simulator.opponent import army, bases, composition, drops, economy, growth, hands, player, products, sites
+from khala_simulator.opponent.builds import NAMES, load_race, name_of, stage_at
+from khala_simulator.opponent.casts import rules
+from khala_simulator.opponent.economy import Staff
+from khala_simulator.opponent.enemy import Enemy
+from khala_simulator.opponent.levels import level_of, load_levels
+from khala_simulator.opponent.products import Outcome
+from khala_simulator.opponent.side import Side
 from khala_simulator.tick import advance, new_game
+from khala_simulator.world.orders import OrderKind
 from khala_simulator.world.players import GameResult, PlayerSetup
 
 if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
+RACES = ("protoss", "terran", "zerg")
+MACRO, RUSH = 2, 4
+
 
 def game(
-    races: tuple[str, str], difficulties: tuple[int, int], *, seats: tuple[str, str] = ("computer", "computer")
-) -> World:
-    players = [
-        PlayerSetup(i + 1, race, seat, difficulty=level)
-        for i, (race, seat, level) in enumerate(zip(races, seats, difficulties, strict=True))
+    races: tuple[str, str] = ("protoss", "terran"), levels: tuple[int, int] = (7, 1), *, build: int = MACRO,
+    map_name: str = "Melee/Simple64", seats: tuple[str, str] = ("computer", "agent"), seed: int = 2,
+) -> World:  # fmt: skip
+    """Return a game in which, if nothing else is said, only the first player is led by the computer."""
+    setups = [
+        PlayerSetup(i + 1, race, seat, difficulty=level, build=build)
+        for i, (race, seat, level) in enumerate(zip(races, seats, levels, strict=True))
     ]
-    return new_game(load_map("Melee/Flat48"), players, seed=2)
+    return new_game(load_map(map_name), setups, seed=seed)
 
 
-def having(world: World, player: int) -> Counter[str]:
-    return Counter(world.unit_type(slot).name for slot in world.units_of(player).tolist())
+def side_of(world: World, number: int = 1) -> Side:
+    """Return what a computer player knows of its own side, with all the attention that it can have."""
+    owner = world.players[number]
+    owner.mind = owner.mind or player.begin(world, number)
+    owner.mind.actions = 100.0
+    return Side(world, number)
 
 
-@pytest.mark.parametrize(
-    ("race", "supplies", "makes"), [("protoss", "Pylon", "Gateway"), ("terran", "SupplyDepot", "Barracks")]
-)
-def test_it_mines_keeps_supply_ahead_and_builds(race: str, supplies: str, makes: str) -> None:
-    world = game((race, race), (7, 1))
-    advance(world, 1500)
-    hard, _easy = having(world, 1), having(world, 2)
-    assert hard[supplies] >= 1
-    assert hard[makes] >= 1
-    assert supply.used(world, 1) > supply.used(world, 2) >= 12.0
-    assert world.players[1].score.collected[0] > 500
+def put(world: World, owner: int, name: str, x: float, y: float, count: int = 1) -> list[int]:
+    kind = world.catalog.unit(name)
+    return [lifecycle.spawn(world, kind, owner, (x + i % 6, y + i // 6)) for i in range(count)]
 
 
-def test_the_same_game_is_played_every_time() -> None:
-    first, second = (game(("protoss", "zerg"), (6, 6)) for _ in range(2))
-    advance(first, 400)
-    advance(second, 400)
-    assert first.digest() == second.digest()
+def having(world: World, number: int) -> Counter[str]:
+    return Counter(world.unit_type(slot).name for slot in world.units_of(number).tolist())
 
 
-def test_it_attacks_with_a_wave_and_wins_when_no_structure_is_left() -> None:
-    world = game(("protoss", "terran"), (0, 7), seats=("agent", "computer"))
-    world.loop = level_of(7).peace_loops
-    home = world.players[2].start
-    assert home is not None
-    for i in range(40):
-        lifecycle.spawn(world, world.catalog.unit("Marine"), 2, (home[0] - 4.0 + i % 8, home[1] + 4.0 + i // 8))
-    advance(world, 2500)
-    assert world.ended
-    assert [player.result for player in world.players[1:]] == [GameResult.DEFEAT, GameResult.VICTORY]
+# data -----------------------------------------------------------------------------------------------------------------
+
+
+def test_each_level_is_at_least_as_strong_in_everything_as_the_one_below() -> None:
+    levels = [load_levels()[number] for number in range(1, 8)]
+    for weaker, stronger in itertools.pairwise(levels):
+        for more in ("actions", "workers", "bases", "production", "upgrades", "wave", "retreat", "pull"):
+            assert getattr(weaker, more) <= getattr(stronger, more), (stronger.name, more)
+        for less in ("think_loops", "reaction_s", "tempo", "worker_s"):
+            assert getattr(weaker, less) >= getattr(stronger, less), (stronger.name, less)
+        assert weaker.skills <= stronger.skills
+
+
+def test_the_last_three_levels_cheat_by_vision_by_income_and_by_both() -> None:
+    cheats = {level.name: (level.vision, level.income > 1.0) for level in load_levels().values()}
+    assert [name for name, cheat in cheats.items() if any(cheat)] == ["cheat_vision", "cheat_money", "cheat_insane"]
+    assert cheats["cheat_vision"] == (True, False)
+    assert cheats["cheat_money"] == (False, True)
+    assert cheats["cheat_insane"] == (True, True)
+    assert level_of(0).name == "medium"
+
+
+@pytest.mark.parametrize("race", RACES)
+def test_everything_that_a_build_names_can_be_made(race: str) -> None:
+    world = game()
+    facts = load_race(race)
+    assert set(facts.builds) == set(NAMES.values())
+    unknown = []
+    for name, build in facts.builds.items():
+        assert build.stages[0].from_s == 0
+        wanted = [step.what for step in build.opening]
+        for stage in build.stages:
+            wanted += [*stage.structures, *stage.army, *stage.units, *stage.research]
+        unknown += [(name, what) for what in wanted if not products.ways(world.catalog, what)]
+    assert unknown == []
+
+
+def test_every_rule_of_the_casts_names_an_ability_of_its_unit() -> None:
+    catalog = game().catalog
+    assert all(rule.unit in catalog.ability(rule.ability).users for rule in rules())
+
+
+def test_a_stage_wants_what_earlier_stages_wanted_except_their_army() -> None:
+    early, late = (stage_at("protoss", "macro", at_s) for at_s in (0.0, 400.0))
+    assert early.structures.items() <= {**late.structures, **early.structures}.items()
+    assert set(early.research) <= set(late.research)
+    assert "Colossus" in late.army
+    assert "Colossus" not in early.army
+
+
+def test_the_requested_build_is_played_and_the_seed_chooses_where_none_is_asked_for() -> None:
+    assert [name_of(number, 0.0) for number in (2, 3, 4, 5, 6)] == ["macro", "power", "rush", "timing", "air"]
+    assert {name_of(1, draw / 10) for draw in range(10)} == set(NAMES.values())
+    drawn = {player.begin(game(build=1, seed=seed), 1).build for seed in range(8)}
+    assert len(drawn) > 1
+
+
+# places ---------------------------------------------------------------------------------------------------------------
+
+
+def test_bases_are_found_where_the_map_has_resources_its_own_start_first() -> None:
+    world = game()
+    places = bases.find(world, 1, world.catalog.unit("Nexus"))
+    assert len(places) == 4
+    assert places[0] == world.players[1].start
+    assert world.players[2].start in places
+    for place in places:
+        assert len(bases.fields_near(world, place)) == 8
+
+
+def test_structures_keep_the_ways_of_workers_and_the_next_base_free() -> None:
+    world = game(("terran", "zerg"))
+    side = side_of(world)
+    barracks = sites.place_for(side, world.catalog.unit("Barracks"))
+    assert barracks is not None
+    assert math.dist(barracks, side.mind.bases[0]) <= sites.FARTHEST
+    fields = world.pos[bases.fields_near(world, side.mind.bases[0])]
+    ways = (fields + side.mind.bases[0]) / 2.0
+    assert min(math.dist(barracks, way) for way in ways.tolist()) > 2.0
+    assert all(math.dist(barracks, base) > 4.0 for base in side.mind.bases)
+
+
+def test_gateways_wait_for_a_pylon_and_stand_in_its_field() -> None:
+    world = game()
+    world.players[1].minerals = 1000.0
+    assert products.make(side_of(world), "Gateway") is Outcome.BLOCKED
+    x, y = world.players[1].start or (0.0, 0.0)
+    pylon = put(world, 1, "Pylon", x + 7.0 if x < 44 else x - 7.0, y)
+    advance(world, 1)
+    place = sites.place_for(side_of(world), world.catalog.unit("Gateway"))
+    assert place is not None
+    assert math.dist(place, world.pos[pylon[0]].tolist()) <= 6.5
+
+
+# money and attention --------------------------------------------------------------------------------------------------
+
+
+def test_what_is_too_dear_is_put_aside() -> None:
+    world = game(("terran", "zerg"))
+    side = side_of(world)
+    side.purse.minerals = 60.0
+    assert products.make(side, "SupplyDepot") is Outcome.SHORT
+    assert products.make(side, "SCV") is Outcome.SHORT
+    assert world.players[1].minerals == 50.0
+
+
+def test_no_order_is_given_without_attention_and_it_comes_back_with_time() -> None:
+    world = game(levels=(1, 1))
+    side = side_of(world)
+    side.mind.actions = 1.5
+    probes = side.workers
+    assert hands.move(side, probes[:4], (40.0, 40.0))
+    assert not hands.move(side, probes[4:8], (40.0, 40.0))
+    assert world.order_kind[probes[4]] == OrderKind.GATHER
+    world.loop += 224
+    hands.rest(side)
+    assert hands.free(side)
+
+
+def test_income_is_worth_more_to_those_who_cheat_by_it() -> None:
+    world = game(levels=(9, 1))
+    side = side_of(world)
+    before = world.players[1].minerals
+    world.players[1].score.collected[0] += 100.0
+    player.tax(side)
+    player.tax(side)
+    assert world.players[1].minerals == pytest.approx(before + 40.0)
+
+
+# economy --------------------------------------------------------------------------------------------------------------
+
+
+def test_idle_workers_go_where_there_is_room_and_gas_is_staffed() -> None:
+    world = game(("terran", "zerg"))
+    x, y = world.players[1].start or (0.0, 0.0)
+    commands.stop(world, world.units_of(1).tolist())
+    geyser = next(s for s in world.live.tolist() if world.unit_type(s).name == "VespeneGeyser"
+                  and math.dist(world.pos[s].tolist(), (x, y)) < 10.0)  # fmt: skip
+    gx, gy = world.pos[geyser].tolist()
+    refinery = lifecycle.spawn(world, world.catalog.unit("Refinery"), 1, (gx, gy))
+    world.contents[refinery], world.occupant[geyser], world.patch[refinery] = 2250, refinery, geyser
+    for _ in range(2):
+        side = side_of(world)
+        economy.mine(side, Staff(side))
+        advance(world, 8)
+    assert harvesting.assigned(world)[refinery] == 3
+    assert not [w for w in side.workers if world.order_kind[w] == OrderKind.IDLE]
+
+
+def test_a_structure_that_lost_its_builder_gets_another_one() -> None:
+    world = game(("terran", "zerg"))
+    world.players[1].minerals = 200.0
+    assert products.make(side_of(world), "SupplyDepot") is Outcome.DONE
+    while not (site := side_of(world).begun.get("SupplyDepot")):
+        advance(world, 8)
+    builder = next(w for w in side_of(world).workers if world.order_kind[w] == OrderKind.FOLLOW)
+    world.life[builder] = 0.0
+    advance(world, 4)
+    spare = side_of(world).workers[0]
+    commands.stop(world, [spare])
+    side = side_of(world)
+    economy.mine(side, Staff(side))
+    assert world.order_kind[spare] == OrderKind.FOLLOW
+    assert world.order_target[spare] == site[0]
+
+
+def test_it_expands_when_its_base_is_full() -> None:
+    world = game()
+    x, y = world.players[1].start or (0.0, 0.0)
+    put(world, 1, "Probe", x + 4.0 if x < 44 else x - 8.0, y + 4.0, 8)
+    world.players[1].minerals = 450.0
+    side = side_of(world)
+    side.mind.step = 99
+    growth.expand(side, Enemy(side), Staff(side))
+    assert side_of(world).ordered["Nexus"] == 1
+
+
+def test_what_a_structure_requires_is_built_first() -> None:
+    world = game()
+    side = side_of(world)
+    assert products.lacking(side, "RoboticsBay") == "Gateway"
+    assert products.lacking(side, "Gateway") == ""
+
+
+# army -----------------------------------------------------------------------------------------------------------------
+
+
+def test_flyers_make_it_train_what_hits_them() -> None:
+    world = game(("zerg", "protoss"))
+    side = side_of(world)
+    side.mind.step = 99
+    world.loop = 8000
+    usual = composition.wanted(side)
+    row = world.catalog.unit("VoidRay").row
+    side.mind.seen = {number: (row, world.loop) for number in range(6)}
+    answer = composition.wanted(side)
+    assert answer["Roach"] / answer["Hydralisk"] < 0.5 * usual["Roach"] / usual["Hydralisk"]
+
+
+def test_it_defends_after_its_reaction_and_not_before() -> None:
+    world = game(levels=(3, 1))
+    x, y = world.players[1].start or (0.0, 0.0)
+    guards = put(world, 1, "Stalker", x + 5.0 if x < 44 else x - 10.0, y, 4)
+    raiders = put(world, 2, "Zergling", x + 14.0 if x < 44 else x - 14.0, y, 4)
+    commands.hold(world, raiders)
+    advance(world, 1)
+    for slot in guards:
+        world.looks_around[slot] = False
+    side = side_of(world)
+    army.lead(side, Enemy(side))
+    assert side.mind.threat is None
+    world.loop += round(6.0 * 22.4)
+    side = side_of(world)
+    army.lead(side, Enemy(side))
+    assert side.mind.threat is not None
+    assert any(world.order_kind[slot] == OrderKind.ATTACK_MOVE for slot in guards)
+
+
+def test_strong_levels_defend_with_workers_where_the_army_is_too_weak_and_weak_ones_do_not() -> None:
+    pulled = {}
+    for level in (1, 7):
+        world = game(levels=(level, 1))
+        x, y = world.players[1].start or (0.0, 0.0)
+        put(world, 2, "Zergling", x + 7.0 if x < 44 else x - 9.0, y, 6)
+        advance(world, 1)
+        for _ in range(2):
+            side = side_of(world)
+            army.lead(side, Enemy(side))
+            world.loop += round(13.0 * 22.4)
+        pulled[level] = len(side.mind.pulled)
+    assert pulled[1] == 0
+    assert pulled[7] >= 6
+
+
+def test_it_attacks_with_a_wave_and_goes_home_from_what_is_too_strong() -> None:
+    world = game(("terran", "zerg"))
+    side = side_of(world)
+    x, y = army.rally(side)
+    marines = put(world, 1, "Marine", x, y, 48)
+    world.loop = 60 * 448
+    side = side_of(world)
+    army.lead(side, Enemy(side))
+    assert side.mind.attacking
+    army.lead(side_of(world), Enemy(side))
+    assert all(world.order_kind[slot] == OrderKind.ATTACK_MOVE for slot in marines)
+    put(world, 2, "Ultralisk", x + 3.0, y + 3.0, 12)
+    advance(world, 40)
+    side = side_of(world)
+    army.lead(side, Enemy(side))
+    assert not side.mind.attacking
+    assert side.mind.wave > 1.0
+
+
+def test_a_drop_loads_flies_and_unloads_in_the_enemys_base() -> None:
+    world = game(("terran", "zerg"))
+    x, y = army.rally(side_of(world))
+    put(world, 1, "Medivac", x, y)
+    put(world, 1, "Marine", x - 3.0, y - 3.0, 30)
+    world.loop = 350 * 23
+    phases = set()
+    for _ in range(60):
+        side = side_of(world)
+        drops.lead(side, Enemy(side))
+        phases.add(side.mind.drop.phase)
+        if side.mind.drop.phase == "fight":
+            break
+        advance(world, 24)
+    assert phases >= {"load", "fly", "fight"}
+    squad = [world.slot_of(tag) for tag in side.mind.drop.squad]
+    assert len(squad) == 8
+    assert all(math.dist(side.place(s), side.mind.enemy_start) < 14.0 for s in squad if s >= 0)
+
+
+def test_only_a_level_that_cheats_by_vision_knows_what_it_does_not_see() -> None:
+    known = {}
+    for level in (7, 8):
+        world = game(levels=(level, 1))
+        advance(world, 20)
+        known[level] = len(Enemy(side_of(world)).known)
+    assert known[7] == 0
+    assert known[8] > 10
+
+
+# whole games ----------------------------------------------------------------------------------------------------------
 
 
 def test_a_scenarios_own_computer_player_is_left_alone() -> None:
@@ -71,9 +353,47 @@ def test_a_scenarios_own_computer_player_is_left_alone() -> None:
     assert world.opponents == ()
 
 
-def test_harder_ones_want_more_and_wait_less() -> None:
-    levels = [LEVELS[number] for number in sorted(LEVELS)]
-    for easier, harder in itertools.pairwise(levels):
-        assert easier.workers <= harder.workers
-        assert easier.period_loops >= harder.period_loops
-        assert easier.peace_loops >= harder.peace_loops
+@pytest.mark.parametrize(
+    "race", [pytest.param(race, marks=[] if race == "zerg" else [pytest.mark.slow]) for race in RACES]
+)
+def test_the_same_game_is_played_every_time(race: str) -> None:
+    loops = 600
+    first, second = (game((race, "zerg"), (6, 6), seats=("computer", "computer"), build=1) for _ in range(2))
+    advance(first, loops)
+    advance(second, loops)
+    assert first.digest() == second.digest()
+
+
+def test_a_strong_player_has_a_larger_economy_after_a_minute_than_a_weak_one() -> None:
+    world = game(("protoss", "protoss"), (7, 1), seats=("computer", "computer"))
+    advance(world, 1500)
+    strong, weak = having(world, 1), having(world, 2)
+    assert strong["Pylon"] >= 1
+    assert strong["Gateway"] == 1
+    assert strong["Probe"] > weak["Probe"] + 2
+    assert supply.used(world, 1) > supply.used(world, 2) >= 12.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("race", RACES)
+def test_an_elite_player_grows_as_fast_as_the_games_own(race: str) -> None:
+    world = game((race, "terran"), (7, 1), map_name="Melee/Simple64")
+    advance(world, round(90 * 22.4))
+    worker = load_race(race).worker
+    assert 14 <= having(world, 1)[worker] <= 20
+    advance(world, round(210 * 22.4))
+    assert 34 <= having(world, 1)[worker] <= 50
+    advance(world, round(60 * 22.4))
+    halls = sum(harvesting.is_drop_off(world, slot) for slot in world.units_of(1).tolist())
+    armed = sum(world.unit_type(s).supply for s in world.units_of(1).tolist() if world.unit_type(s).army)
+    assert halls >= 2
+    assert armed > 30
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_hard_player_beats_a_very_easy_one() -> None:
+    world = game(("zerg", "terran"), (5, 1), seats=("computer", "computer"), build=RUSH, map_name="Melee/Flat48")
+    advance(world, round(15 * 60 * 22.4))
+    assert world.players[1].result is GameResult.VICTORY
