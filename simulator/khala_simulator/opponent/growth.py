@@ -50,9 +50,7 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     if danger:
         train_army(side)
     change_halls(side)
-    over = side.build.saves and follow_opening(side, enemy)
-    economy.train_workers(side, staff)
-    if over or (not side.build.saves and follow_opening(side, enemy)):
+    if _opening_and_workers(side, enemy, staff):
         if not danger:
             expand(side, enemy, staff)
         build_structures(side)
@@ -60,6 +58,16 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
         research(side)
     if not danger:
         train_army(side)
+
+
+def _opening_and_workers(side: Side, enemy: Enemy, staff: Staff) -> bool:
+    """Follow the opening and make workers, whichever the build pays first; return True once the opening is over."""
+    if not side.build.saves:
+        economy.train_workers(side, staff)
+    over = follow_opening(side, enemy)
+    if side.build.saves:
+        economy.train_workers(side, staff)
+    return over
 
 
 def in_danger(side: Side, enemy: Enemy) -> bool:
@@ -99,9 +107,7 @@ def follow_opening(side: Side, enemy: Enemy) -> bool:
 
 def change_halls(side: Side) -> None:
     """Change the kind of a town hall before it trains the next worker, once the build wants that."""
-    steps = [step.what for step in side.build.opening[: side.mind.step + 1]]
-    wanted = max(steps.count(ORBITAL), side.stage.structures.get(ORBITAL, 0))
-    if side.count(ORBITAL) < wanted:
+    if side.count(ORBITAL) < side.stage.structures.get(ORBITAL, 0):
         products.make(side, ORBITAL)
 
 

@@ -46,7 +46,7 @@ def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
     found = Outcome.BLOCKED
     for ability in ways(side.world.catalog, name):
         makers = list(_makers(side, ability))
-        if not makers or ability.supply > side.purse.room:
+        if not makers or (ability.supply > 0.0 and ability.supply > side.purse.room):
             continue
         if not side.purse.affords(ability):
             found = Outcome.SHORT

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.builds import Build, Race, Stage
     from khala_simulator.opponent.levels import Level
     from khala_simulator.tables.abilities import Ability
+    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Ints
@@ -91,17 +92,13 @@ class Side:
 
     def kind(self, name: str) -> list[int]:
         """Return own finished units that count as a type: a Warp Gate is a Gateway."""
-        return self.named(*self._names(name))
+        return self.named(*_names(self.world.catalog, name))
 
     def count(self, name: str) -> int:
         """Return how many of a type, or of what counts as it, exist, are being made, or are ordered."""
-        names = self._names(name)
+        names = _names(self.world.catalog, name)
         exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) for n in names)
-        return exist + sum(self.underway[n] for n in names - set(self.begun)) + self.ordered[name]
-
-    def _names(self, name: str) -> set[str]:
-        rows = counts_as(self.world.catalog, name, alias=True)
-        return {self.world.catalog.units[row].name for row in rows}
+        return exist + sum(self.underway[n] for n in names if n not in self.begun) + self.ordered[name]
 
     @cached_property
     def workers(self) -> list[int]:
@@ -153,3 +150,9 @@ class Side:
     def product(self, ability: Ability) -> UnitType | None:
         """Return the structure that an ability builds."""
         return building_sites.product(self.world, ability)
+
+
+@lru_cache(maxsize=512)
+def _names(catalog: Catalog, name: str) -> tuple[str, ...]:
+    """Return the names of the types that count as a type."""
+    return tuple(sorted(catalog.units[row].name for row in counts_as(catalog, name, alias=True)))
