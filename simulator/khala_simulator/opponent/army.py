@@ -42,6 +42,8 @@ SPENT: Final = 0.3
 """An attack is over when this share of its value is left."""
 REINFORCE: Final = 0.15
 """Units that wait join an attack once they are worth this share of it."""
+RECALL: Final = 0.3
+"""An attack goes on while the enemies at home are worth less than this share of the army."""
 SPREAD: Final = 11.0
 """An army whose head is so far before its middle waits for the others."""
 WITH: Final = 4.0
@@ -53,16 +55,14 @@ def lead(side: Side, enemy: Enemy) -> None:
     """Give the army its orders for this thought."""
     army = [slot for slot in side.army if side.world.can_act[slot] and side.world.carrier[slot] == NOBODY]
     threat = watch(side, enemy)
-    if threat is not None and threat.size:
-        defend(side, army, threat)
-        if not side.mind.attacking:
-            return
+    if threat is not None:
+        army = defend(side, army, threat)
     if side.mind.attacking:
         attack(side, enemy, army)
-    else:
+    elif threat is None:
         gather_up(side, army)
         _garrison(side, army)
-        _set_out(side, army)
+        _set_out(side)
 
 
 # defence --------------------------------------------------------------------------------------------------------------
@@ -108,24 +108,29 @@ def _nearest_home(side: Side, threat: Ints) -> int:
     return int(threat[int(np.argmin((offset[..., 0] ** 2 + offset[..., 1] ** 2).min(axis=1)))])
 
 
-def defend(side: Side, army: list[int], threat: Ints) -> None:
-    """Send the army against enemies at the bases, workers as well where it is too weak."""
+def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
+    """Send the army at home against enemies at the bases, and workers; return who goes on with the attack.
+
+    An attack is called off where the army at home is too weak, unless the threat is small beside the whole army.
+    """
     world, mind = side.world, side.mind
-    assert mind.threat is not None
-    strength = value(world, threat)
-    helpers = army + side.named("Queen")
-    at_home = [s for s in helpers if math.dist(side.place(s), mind.threat) < 2.5 * HOME]
-    if mind.attacking and value(world, at_home) < strength:
-        away = value(world, army)
-        if strength > 0.3 * away:
-            _call_off(side)
-        at_home = helpers
-    if not mind.attacking:
-        at_home = helpers
-    idle = [s for s in at_home if world.target[s] == NOBODY and not _bound_for(side, s, mind.threat, 6.0)]
+    strength, at = value(world, threat), mind.threat or mind.bases[0]
+    home = [s for s in army if not mind.attacking or _at_home(side, s)]
+    if mind.attacking and strength > max(value(world, home), RECALL * value(world, army)):
+        _call_off(side)
+        home = army
+    helpers = home + side.named("Queen")
+    idle = [s for s in helpers if world.target[s] == NOBODY and not _bound_for(side, s, at, 6.0)]
     if idle:
-        hands.attack(side, idle, mind.threat)
-    _pull_workers(side, at_home, threat, strength)
+        hands.attack(side, idle, at)
+    _pull_workers(side, helpers, threat, strength)
+    return [s for s in army if s not in set(home)]
+
+
+def _at_home(side: Side, slot: int) -> bool:
+    """Return whether a unit is nearer to the own front than to the enemy's start."""
+    at = side.place(slot)
+    return math.dist(at, bases.front(side)) < math.dist(at, side.mind.enemy_start)
 
 
 def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
@@ -197,7 +202,7 @@ def _garrison(side: Side, army: list[int]) -> None:
             del marines[:room]
 
 
-def _set_out(side: Side, army: list[int]) -> None:
+def _set_out(side: Side) -> None:
     """Begin an attack when its time has come and the army is large enough."""
     mind, build = side.mind, side.build
     if side.world.loop < mind.attack_from or side.clock_s < build.attack.from_s:
@@ -205,7 +210,7 @@ def _set_out(side: Side, army: list[int]) -> None:
     enough = max(build.attack.supply * side.level.wave * mind.wave, 2.0)
     if side.army_supply >= enough or (side.used >= FULL and side.army_supply > 20.0):
         mind.attacking = True
-        mind.wave_value = value(side.world, army)
+        mind.wave_value = value(side.world, side.army)
 
 
 # attack ---------------------------------------------------------------------------------------------------------------
@@ -217,9 +222,9 @@ def attack(side: Side, enemy: Enemy, army: list[int]) -> None:
     goal = _goal(side, enemy, army)
     waiting = [s for s in army if _waits(side, s, goal)]
     there = [s for s in army if s not in set(waiting)]
-    worth = value(world, army)
+    worth = value(world, side.army)
     mind.wave_value = max(mind.wave_value, worth)
-    if not army or worth < SPENT * mind.wave_value or _too_strong(side, enemy, there):
+    if worth < SPENT * mind.wave_value or _too_strong(side, enemy, there):
         _call_off(side)
         return
     fresh = waiting if not there or value(world, waiting) > REINFORCE * worth else []
