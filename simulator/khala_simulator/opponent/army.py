@@ -115,7 +115,8 @@ def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
     """
     world, mind = side.world, side.mind
     strength, at = value(world, threat), mind.threat or mind.bases[0]
-    home = [s for s in army if not mind.attacking or _at_home(side, s)]
+    front = bases.front(side)
+    home = [s for s in army if not mind.attacking or _nearer(side.place(s), front, mind.enemy_start)]
     if mind.attacking and strength > max(value(world, home), RECALL * value(world, army)):
         _call_off(side)
         home = army
@@ -127,10 +128,8 @@ def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
     return [s for s in army if s not in set(home)]
 
 
-def _at_home(side: Side, slot: int) -> bool:
-    """Return whether a unit is nearer to the own front than to the enemy's start."""
-    at = side.place(slot)
-    return math.dist(at, bases.front(side)) < math.dist(at, side.mind.enemy_start)
+def _nearer(at: Point, here: Point, there: Point) -> bool:
+    return math.dist(at, here) < math.dist(at, there)
 
 
 def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
@@ -220,7 +219,8 @@ def attack(side: Side, enemy: Enemy, army: list[int]) -> None:
     """Lead the attack: go on, wait for the others, or retreat."""
     world, mind = side.world, side.mind
     goal = _goal(side, enemy, army)
-    waiting = [s for s in army if _waits(side, s, goal)]
+    home = rally(side)
+    waiting = [s for s in army if _waits(side, s, home, goal)]
     there = [s for s in army if s not in set(waiting)]
     worth = value(world, side.army)
     mind.wave_value = max(mind.wave_value, worth)
@@ -311,12 +311,12 @@ def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point
     return set(ahead)
 
 
-def _waits(side: Side, slot: int, goal: Point) -> bool:
+def _waits(side: Side, slot: int, home: Point, goal: Point) -> bool:
     """Return whether a unit has not set out yet: it does nothing, nearer to home than to the goal, or gathers."""
-    home, at = rally(side), side.place(slot)
+    at = side.place(slot)
     if _bound_for(side, slot, home, 2.0):
         return True
-    return _idle(side, slot) and math.dist(at, home) < math.dist(at, goal)
+    return _idle(side, slot) and _nearer(at, home, goal)
 
 
 def _idle(side: Side, slot: int) -> bool:

@@ -122,11 +122,8 @@ def keep_supply_ahead(side: Side) -> None:
     hall = side.world.catalog.unit(side.race.hall).provides
     coming += hall * len(side.begun.get(side.race.hall, ())) * 0.5
     planned = any(step.what == name for step in side.build.opening[side.mind.step :])
-    if (
-        (planned and side.cap - side.used > 2.0)
-        or side.cap + coming >= supply.LIMIT
-        or side.cap + coming - side.used > _ahead(side)
-    ):
+    soon = side.cap + coming
+    if (planned and side.cap - side.used > 2.0) or soon >= supply.LIMIT or soon - side.used > _ahead(side):
         return
     products.make(side, name)
 

@@ -15,7 +15,6 @@ from khala_simulator.economy import production
 from khala_simulator.opponent import bases, composition, economy, products
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.opponent.products import Outcome
-from khala_simulator.tables.prices import cost_of
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.economy import Staff
@@ -193,10 +192,9 @@ def train_army(side: Side) -> None:
 
 
 def _worth_waiting(side: Side, name: str) -> bool:
-    """Return whether a unit can be paid, or will be soon; one without vespene for it does not stop the others."""
-    way = products.ways(side.world.catalog, name)
-    _, vespene = cost_of(way[0]) if way else (0.0, 0.0)
-    return vespene <= max(side.purse.vespene, 0.0) or not vespene
+    """Return whether a unit can be paid, or only minerals are missing: who lacks vespene does not stop the others."""
+    vespene = products.ways(side.world.catalog, name)[0].vespene
+    return not vespene or vespene <= side.purse.vespene
 
 
 def _free_producers(side: Side) -> int:

@@ -56,7 +56,7 @@ def begin(world: World, player: int) -> OpponentMemory:
     return OpponentMemory(
         build=name_of(owner.build, draws[0]),
         patience=1.0 + PATIENCE * (2.0 * draws[1] - 1.0),
-        bases=places or (own,),
+        bases=(own, *(place for place in places if place != own)),
         resources=bases.resources(world),
         enemy_start=min(starts, default=own),
     )

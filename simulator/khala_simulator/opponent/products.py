@@ -51,11 +51,11 @@ def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
         if not side.purse.affords(ability):
             found = Outcome.SHORT
         elif _order(side, ability, makers, near):
-            side.purse.take(ability)
+            side.purse.spend(ability)
             side.underway[name] += 1
             return Outcome.DONE
     if found is Outcome.SHORT:
-        side.purse.take(ways(side.world.catalog, name)[0])
+        side.purse.put_aside(ways(side.world.catalog, name)[0])
     return found
 
 

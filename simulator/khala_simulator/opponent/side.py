@@ -42,11 +42,17 @@ class Purse:
         enough = self.minerals >= ability.minerals or not ability.minerals
         return enough and (self.vespene >= ability.vespene or not ability.vespene)
 
-    def take(self, ability: Ability) -> None:
-        """Spend the price of an ability, or put it aside for later."""
+    def spend(self, ability: Ability) -> None:
+        """Take the price of an ability out."""
         self.minerals -= ability.minerals
         self.vespene -= ability.vespene
         self.room -= ability.supply
+
+    def put_aside(self, ability: Ability) -> None:
+        """Keep the price of an ability for later; minerals only if they are what is missing."""
+        if self.minerals < ability.minerals:
+            self.minerals -= ability.minerals
+        self.vespene -= ability.vespene
 
 
 class Side:
@@ -144,7 +150,7 @@ class Side:
                 continue
             found[ability.unit] += 1
             if ability.effect == "build":
-                self.purse.take(ability)
+                self.purse.spend(ability)
         return found
 
     def product(self, ability: Ability) -> UnitType | None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from khala_simulator.abilities.protoss import warpgate
 from khala_simulator.economy import building_sites, power
-from khala_simulator.movement.placement import candidates
 from khala_simulator.opponent import bases
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
@@ -36,6 +36,9 @@ ADDON_CELLS: Final = 2
 FORWARD: Final = frozenset({"Bunker", "PhotonCannon", "ShieldBattery", "SpineCrawler"})
 """Structures that stand at the base nearest to the enemy, on its side."""
 FORWARD_BY: Final = 6.0
+WARP_STEP: Final = 1.5
+WARP_SOURCES: Final = 3
+"""How many Pylons are tried for a place to warp in."""
 
 
 def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | None:
@@ -153,12 +156,19 @@ def geyser(side: Side) -> int:
 
 def warp_place(side: Side, unit: UnitType) -> Point | None:
     """Return where to warp a unit in: at the Pylon nearest to the front, a fast one if there is any."""
-    sources = power.sources(side.world, side.player)
-    front = bases.front(side)
-    for source in sorted(sources, key=lambda s: (not s.fast, math.dist(s.point, front), s.slot))[:3]:
-        at = candidates(side.world, unit, source.point, source.radius - 0.5)
-        inside = at[power.covered(side.world, source, at)] if len(at) else at
-        if len(inside):
-            x, y = inside[len(inside) // 3].tolist()
-            return x, y
+    world, front = side.world, bases.front(side)
+    sources = sorted(power.sources(world, side.player), key=lambda s: (not s.fast, math.dist(s.point, front), s.slot))
+    for source in sources[:WARP_SOURCES]:
+        for dx, dy in _around(source.radius):
+            point = source.point[0] + dx, source.point[1] + dy
+            if warpgate.refusal(world, side.player, unit, point) is ActionResult.SUCCESS:
+                return point
     return None
+
+
+@lru_cache(maxsize=4)
+def _around(radius: float) -> tuple[Point, ...]:
+    """Return offsets all over a power field, the outermost first."""
+    steps = np.arange(-radius, radius + 0.1, WARP_STEP).tolist()
+    inside = [(x, y) for x in steps for y in steps if 1.0 < math.hypot(x, y) < radius]
+    return tuple(sorted(inside, key=lambda at: (-math.hypot(*at), at)))

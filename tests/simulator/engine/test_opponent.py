@@ -255,7 +255,7 @@ def test_flyers_make_it_train_what_hits_them() -> None:
     world.loop = 8000
     usual = composition.wanted(side)
     row = world.catalog.unit("VoidRay").row
-    side.mind.seen = {number: (row, world.loop) for number in range(6)}
+    side.mind.seen = dict.fromkeys(range(6), (row, world.loop))
     answer = composition.wanted(side)
     assert answer["Roach"] / answer["Hydralisk"] < 0.5 * usual["Roach"] / usual["Hydralisk"]
 
