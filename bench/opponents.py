@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Final
 from bench.duels import wilson
 from khala_simulator.economy import supply
 from khala_simulator.maps.game_map import load_map
+from khala_simulator.opponent import player
 from khala_simulator.opponent.levels import FASTER_LOOPS, load_levels
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.players import GameResult, PlayerSetup
@@ -41,6 +42,8 @@ MOMENTS_S: Final = (90, 180, 300, 480)
 MACRO: Final = 2
 CLEARLY: Final = 1.25
 STRIDE: Final = 112
+HELD_BACK: Final = 1 << 40
+"""A loop that no game reaches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,17 +99,17 @@ def world_of(game_map: str, seats: Sequence[Seat], seed: int) -> World:
 
 
 def growth(game_map: str, seat: Seat, moments_s: Iterable[int], seed: int) -> list[Growth]:
-    """Play against an opponent that does nothing, and note what there is at some moments."""
+    """Play against an opponent that does nothing, without attacking it, and note what there is at some moments."""
     setups = [PlayerSetup(1, seat.race, "computer", difficulty=seat.level, build=seat.build)]
     world = new_game(load_map(game_map), [*setups, PlayerSetup(2, "terran", "agent")], seed=seed)
+    mind = world.players[1].mind = player.begin(world, 1)
+    mind.attack_from = HELD_BACK
     rows = []
     for at_s in moments_s:
         before = at_s - 30
         advance(world, max(0, round(before * FASTER_LOOPS) - world.loop))
         had = list(world.players[1].score.collected)
         advance(world, max(0, round(at_s * FASTER_LOOPS) - world.loop))
-        if world.ended:
-            break
         rows.append(_grown(world, seat, at_s, had))
     return rows
 

@@ -57,8 +57,8 @@ class Attack(Data):
 class Build(Data):
     """One way to play a race.
 
-    With ``saves``, a step of the opening whose time has come is paid before more workers are. ``guard`` times the
-    square of the minutes since the opening is the army supply below which the army comes first.
+    With ``saves``, a step of the opening whose time has come is paid before more workers are. ``guard`` says below how
+    much army supply the army comes first; it grows with the square of the time.
     """
 
     opening: tuple[Step, ...]

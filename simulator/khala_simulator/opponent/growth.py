@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
 
-GUARD_FROM_S: Final = 100.0
-"""Before this, no army is expected."""
+GUARD_FROM_S: Final = 90.0
+"""Before this, no army is expected; the minutes m from then on ask for guard * m * (m + 1) of army supply."""
 MOST_GUARD: Final = 100.0
 QUEEN: Final = 1.5
 """What a Queen counts as army supply."""
@@ -73,7 +73,7 @@ def in_danger(side: Side, enemy: Enemy) -> bool:
     """Return whether the army comes before everything else."""
     own = side.army_supply + _coming(side) + QUEEN * len(side.named("Queen"))
     minutes = max(0.0, side.clock_s - GUARD_FROM_S) / 60.0
-    expected = min(MOST_GUARD, side.build.guard * minutes**2) * side.level.production
+    expected = min(MOST_GUARD, side.build.guard * minutes * (minutes + 1.0)) * side.level.production
     known = enemy.army_supply() if "adapt" in side.level.skills or side.level.vision else 0.0
     attacked = side.mind.threat is not None and side.mind.alarm >= 0
     return own < max(expected, 0.8 * known) or (attacked and own < 1.5 * known + 4.0)
