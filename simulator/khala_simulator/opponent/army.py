@@ -33,6 +33,10 @@ SCOUTS: Final = 2
 """So few enemy workers at a base are scouts and no threat."""
 FULL: Final = 188.0
 """With so much supply in use an army attacks whatever its size."""
+FULL_ARMY: Final = 20.0
+EASY: Final = 1.6
+"""An army so many times the enemy's is an easy win, with at least so much supply."""
+LEAST_EASY: Final = 16.0
 REST_S: Final = 45.0
 """Between two attacks."""
 NEXT_WAVE: Final = 1.25
@@ -62,7 +66,7 @@ def lead(side: Side, enemy: Enemy) -> None:
     elif threat is None:
         gather_up(side, army)
         _garrison(side, army)
-        _set_out(side)
+        _set_out(side, enemy)
 
 
 # defence --------------------------------------------------------------------------------------------------------------
@@ -201,13 +205,19 @@ def _garrison(side: Side, army: list[int]) -> None:
             del marines[:room]
 
 
-def _set_out(side: Side) -> None:
-    """Begin an attack when its time has come and the army is large enough."""
-    mind, build = side.mind, side.build
-    if side.world.loop < mind.attack_from or side.clock_s < build.attack.from_s:
+def _set_out(side: Side, enemy: Enemy) -> None:
+    """Begin an attack when its time has come and the army is large enough.
+
+    A level that adapts waits while it knows of a stronger army; one that sees everything goes early against a weak one.
+    """
+    mind, first, own = side.mind, side.build.attack, side.army_supply
+    if side.world.loop < mind.attack_from:
         return
-    enough = max(build.attack.supply * side.level.wave * mind.wave, 2.0)
-    if side.army_supply >= enough or (side.used >= FULL and side.army_supply > 20.0):
+    known = enemy.army_supply() if "adapt" in side.level.skills else 0.0
+    enough = max(first.supply * side.level.wave * mind.wave, 2.0)
+    on_time = side.clock_s >= first.from_s and own >= max(enough, known)
+    easy = side.level.vision and own >= max(LEAST_EASY, EASY * known)
+    if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
         mind.attacking = True
         mind.wave_value = value(side.world, side.army)
 
