@@ -14,6 +14,7 @@ import numpy as np
 from khala_simulator.economy import building_sites, harvesting
 from khala_simulator.movement import pathfinding
 from khala_simulator.movement.placement import snapped
+from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
@@ -31,6 +32,8 @@ FEWEST_RESOURCES: Final = 5
 """Fewer resources in one place are no base, such as the fields that block a way."""
 REACH: Final = 10
 """How far from the middle of its resources a town hall is looked for."""
+APART: Final = 5.5
+"""No town hall may stand nearer to a resource; the rules judge the rest."""
 TAKEN: Final = 6.0
 DANGER: Final = 14.0
 
@@ -85,9 +88,12 @@ def _site(world: World, player: int, hall: UnitType, group: Floats, starts: list
     if start is not None:
         return start
     steps = range(-REACH, REACH + 1)
-    at = [snapped((float(middle[0]) + dx, float(middle[1]) + dy), (5, 5)) for dx in steps for dy in steps]
-    at.sort(key=lambda p: (float(np.hypot(group[:, 0] - p[0], group[:, 1] - p[1]).sum()), p))
-    return next((p for p in at if building_sites.refusal(world, player, hall, p) == 1), None)
+    at = np.array([snapped((float(middle[0]) + dx, float(middle[1]) + dy), (5, 5)) for dx in steps for dy in steps])
+    away = np.hypot(at[:, None, 0] - group[:, 0], at[:, None, 1] - group[:, 1])
+    at, away = at[away.min(axis=1) >= APART], away[away.min(axis=1) >= APART].sum(axis=1)
+    order = np.lexsort((at[:, 0], at[:, 1], np.round(away, 6)))
+    places = ((float(x), float(y)) for x, y in at[order].tolist())
+    return next((p for p in places if building_sites.refusal(world, player, hall, p) is ActionResult.SUCCESS), None)
 
 
 # the next one ---------------------------------------------------------------------------------------------------------
