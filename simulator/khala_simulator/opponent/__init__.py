@@ -12,7 +12,8 @@ One thought of one player is ``player.think``, a table of contents of the others
 ``bases``      where town halls can stand; ``sites`` where all other structures can
 ``economy``    mining, supply, workers; ``boosts`` MULEs, larvae, Chrono Boost
 ``growth``     opening, expansions, structures, upgrades, army: what the money is spent on
-``army``       rally, attack, retreat, defend; ``casts`` its abilities in a fight
+``army``       ``defence`` of the bases, ``attack`` and retreat, ``stance`` between them
+``casts``      abilities of the army in a fight
 ``scouting``   who looks where; ``drops`` landings in enemy bases
 =============  ========================================================================
 

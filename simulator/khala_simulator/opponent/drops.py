@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from khala_simulator.opponent import army, hands, products
+from khala_simulator.opponent import hands, products, stance
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.opponent_memory import DropMemory
@@ -58,7 +58,7 @@ def _begin(side: Side, enemy: Enemy) -> None:
 
 def _transport(side: Side) -> int:
     """Return a transport at home; without one it is made, for a later drop."""
-    rally = army.rally(side)
+    rally = stance.rally(side)
     name = side.race.transport
     found = [s for s in side.named(name) if math.dist(side.place(s), rally) < 40.0]
     if not found and not side.count(name):
@@ -85,7 +85,7 @@ def _target(side: Side, enemy: Enemy) -> Point:
     world = side.world
     halls = [s for s in enemy.structures.tolist() if "DropOff" in world.unit_type(s).placement]
     places = [side.place(hall) for hall in halls] or [side.mind.enemy_start]
-    home = army.rally(side)
+    home = stance.rally(side)
     x, y = max(places, key=lambda p: (math.dist(p, home), p))
     near = [r for r in side.mind.resources if math.dist(r, (x, y)) < 10.0] or [(x, y)]
     mx, my = sum(p[0] for p in near) / len(near), sum(p[1] for p in near) / len(near)
@@ -139,7 +139,7 @@ def _fight(side: Side) -> None:
 def _send_home(side: Side) -> None:
     transport = side.world.slot_of(side.mind.drop.transport)
     if transport != NOBODY:
-        hands.move(side, [transport], army.rally(side))
+        hands.move(side, [transport], stance.rally(side))
 
 
 def _end(side: Side) -> None:

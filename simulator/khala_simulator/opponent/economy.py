@@ -25,6 +25,15 @@ A_HALL: Final = 16
 """Workers on the minerals of one base."""
 AHEAD_S: Final = 22.0
 """Supply is made for so many seconds of production ahead; a Pylon takes 18, a Supply Depot 21."""
+A_WORKER_S: Final = 12.0
+A_SUPPLY_S: Final = 13.5
+"""A worker takes so long, and a producer for each supply of its units."""
+LARVAE_A_SECOND: Final = 0.13
+"""Of a Hatchery with a Queen from time to time."""
+MANY: Final = 800.0
+"""With so many minerals unspent, larvae have piled up that will be used at once."""
+TWO_HALLS: Final = 1.5
+"""With a second town hall a level makes workers so much faster."""
 
 
 class Staff:
@@ -132,9 +141,9 @@ def _ahead(side: Side) -> float:
     """Return the supply that the side can use up before more is there."""
     makers = len(side.kind(side.race.producer)) + sum(len(side.kind(n)) for n in ("Factory", "Starport"))
     makers += sum(len(side.kind(n)) for n in ("RoboticsFacility", "Stargate"))
-    a_second = len(side.halls) / 12.0 + makers * 2.0 / 27.0
+    a_second = len(side.halls) / A_WORKER_S + makers / A_SUPPLY_S
     if side.owner.race == "zerg":
-        a_second = len(side.halls) * (0.13 + min(side.owner.minerals, 800.0) / 4000.0)
+        a_second = len(side.halls) * (LARVAE_A_SECOND + min(side.owner.minerals, MANY) / MANY / A_WORKER_S)
     return 1.0 + AHEAD_S * a_second
 
 
@@ -146,7 +155,9 @@ def train_workers(side: Side, staff: Staff) -> None:
     while side.count(name) < most and world.loop >= side.mind.next_worker:
         if products.make(side, name) is not Outcome.DONE:
             return
-        side.mind.next_worker = world.loop + round(side.level.worker_s * FASTER_LOOPS / (1 if halls < 2 else 1.5))
+        side.mind.next_worker = world.loop + round(
+            side.level.worker_s * FASTER_LOOPS / (1.0 if halls < 2 else TWO_HALLS)
+        )
 
 
 def _wanted(side: Side, staff: Staff) -> int:

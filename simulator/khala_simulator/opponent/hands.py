@@ -43,9 +43,9 @@ def use(
     return _give(side, lambda: casting.use(side.world, slots, ability, target=target, point=point))
 
 
-def smart(side: Side, slots: Iterable[int], target: int, *, queue: bool = False) -> bool:
+def smart(side: Side, slots: Iterable[int], target: int) -> bool:
     """Right-click a unit (tag)."""
-    return _give(side, lambda: casting.smart(side.world, slots, target=target, queue=queue))
+    return _give(side, lambda: casting.smart(side.world, slots, target=target))
 
 
 def gather(side: Side, slots: Iterable[int], target: int, *, queue: bool = False) -> bool:

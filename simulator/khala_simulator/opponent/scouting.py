@@ -27,7 +27,7 @@ PLACES: Final = 4
 def look(side: Side) -> None:
     """Send a scout, or send the one that is under way on."""
     mind, world = side.mind, side.world
-    if "scout" not in side.level.skills:
+    if "scout" not in side.level.skills or side.level.vision:
         return
     scout = world.slot_of(mind.scout)
     if scout == NOBODY:

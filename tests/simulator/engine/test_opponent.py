@@ -13,7 +13,19 @@ from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.economy import harvesting, supply
 from khala_simulator.maps.game_map import load_map
-from khala_simulator.opponent import army, bases, composition, drops, economy, growth, hands, player, products, sites
+from khala_simulator.opponent import (
+    army,
+    bases,
+    composition,
+    drops,
+    economy,
+    growth,
+    hands,
+    player,
+    products,
+    sites,
+    stance,
+)
 from khala_simulator.opponent.builds import NAMES, load_race, name_of, stage_at
 from khala_simulator.opponent.casts import rules
 from khala_simulator.opponent.economy import Staff
@@ -298,7 +310,7 @@ def test_strong_levels_defend_with_workers_where_the_army_is_too_weak_and_weak_o
 def test_it_attacks_with_a_wave_and_goes_home_from_what_is_too_strong() -> None:
     world = game(("terran", "zerg"))
     side = side_of(world)
-    x, y = army.rally(side)
+    x, y = stance.rally(side)
     marines = put(world, 1, "Marine", x, y, 48)
     world.loop = 60 * 448
     side = side_of(world)
@@ -316,7 +328,7 @@ def test_it_attacks_with_a_wave_and_goes_home_from_what_is_too_strong() -> None:
 
 def test_a_drop_loads_flies_and_unloads_in_the_enemys_base() -> None:
     world = game(("terran", "zerg"))
-    x, y = army.rally(side_of(world))
+    x, y = stance.rally(side_of(world))
     put(world, 1, "Medivac", x, y)
     put(world, 1, "Marine", x - 3.0, y - 3.0, 30)
     world.loop = 350 * 23

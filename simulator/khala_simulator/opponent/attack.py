@@ -1,0 +1,147 @@
+"""Attack: when it begins, where it goes, who waits for the others, and when it is called off."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.opponent import hands, stance
+from khala_simulator.opponent.enemy import value
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.opponent.enemy import Enemy
+    from khala_simulator.opponent.side import Side
+    from khala_simulator.world.casts import Point
+
+FIGHT: Final = 14.0
+"""Units so near to each other take part in the same fight."""
+FULL: Final = 188.0
+"""With so much supply in use an army attacks whatever its size."""
+FULL_ARMY: Final = 20.0
+EASY: Final = 1.6
+"""An army so many times the enemy's is an easy win, with at least so much supply."""
+LEAST_EASY: Final = 16.0
+SPENT: Final = 0.3
+"""An attack is over when this share of its value is left."""
+REINFORCE: Final = 0.15
+"""Units that wait join an attack once they are worth this share of it."""
+SPREAD: Final = 11.0
+"""An army whose head is so far before its middle waits for the others."""
+WITH: Final = 4.0
+"""So near to the middle of the army its unarmed units stay."""
+SEEN_EMPTY: Final = 6.0
+
+
+def set_out(side: Side, enemy: Enemy) -> None:
+    """Begin an attack when its time has come and the army is large enough.
+
+    A level that adapts waits while it knows of a stronger army; one that sees everything goes early against a weak one.
+    """
+    mind, first, own = side.mind, side.build.attack, side.army_supply
+    if side.world.loop < mind.attack_from:
+        return
+    known = enemy.army_supply() if "adapt" in side.level.skills else 0.0
+    enough = max(first.supply * side.level.wave * mind.wave, 2.0)
+    on_time = side.clock_s >= first.from_s and own >= max(enough, known)
+    easy = side.level.vision and own >= max(LEAST_EASY, EASY * known)
+    if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
+        mind.attacking = True
+        mind.wave_value = value(side.world, side.army)
+
+
+def go_on(side: Side, enemy: Enemy, army: list[int]) -> None:
+    """Lead the attack: go on, wait for the others, or retreat."""
+    world, mind = side.world, side.mind
+    goal = _goal(side, enemy, army)
+    home = stance.rally(side)
+    waiting = [s for s in army if _waits(side, s, home, goal)]
+    there = [s for s in army if s not in set(waiting)]
+    worth = value(world, side.army)
+    mind.wave_value = max(mind.wave_value, worth)
+    if worth < SPENT * mind.wave_value or _too_strong(side, enemy, there):
+        stance.call_off(side)
+        return
+    fresh = waiting if not there or value(world, waiting) > REINFORCE * worth else []
+    if not fresh:
+        stance.gather_up(side, waiting)
+    there = _support(side, there)
+    if "regroup" in side.level.skills:
+        ahead = _ahead_of_the_others(side, enemy, there, goal)
+        there = [s for s in there if s not in ahead]
+    idle = [s for s in there + fresh if world.target[s] == NOBODY and not stance.bound_for(side, s, goal, 4.0)]
+    if idle:
+        hands.attack(side, idle, goal)
+
+
+def _too_strong(side: Side, enemy: Enemy, there: list[int]) -> bool:
+    """Return whether the enemies near the attackers are too strong for them."""
+    world = side.world
+    fighting = [s for s in there if world.target[s] != NOBODY]
+    if not fighting or not side.level.retreat or side.used >= FULL:
+        return False
+    x, y = world.pos[fighting].mean(axis=0).tolist()
+    foes = enemy.near((x, y), FIGHT)
+    near = [s for s in there if math.dist(side.place(s), (x, y)) <= FIGHT]
+    return value(world, near) < side.level.retreat * value(world, foes)
+
+
+def _goal(side: Side, enemy: Enemy, army: list[int]) -> Point:
+    """Return what to attack: the nearest enemy structure that is known, else where one may be."""
+    world, mind = side.world, side.mind
+    known = enemy.places()
+    if len(known):
+        middle = np.median(world.pos[army], axis=0) if army else np.array(mind.bases[0])
+        offset = known - middle
+        x, y = known[int(np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2))].tolist()
+        return x, y
+    places = [mind.enemy_start, *reversed(mind.bases)]
+    point = places[mind.searched % len(places)]
+    if any(math.dist(side.place(s), point) < SEEN_EMPTY for s in army):
+        mind.searched += 1
+        point = places[mind.searched % len(places)]
+    return point
+
+
+def _support(side: Side, there: list[int]) -> list[int]:
+    """Keep units without a weapon with the others; return those that fight."""
+    world = side.world
+    unarmed = [s for s in there if world.ground_weapon[s] < 0 and world.air_weapon[s] < 0 and not world.channels[s]]
+    armed = [s for s in there if s not in set(unarmed)]
+    if not armed or not unarmed:
+        return armed
+    x, y = np.median(world.pos[armed], axis=0).tolist()
+    away = [
+        s for s in unarmed if math.dist(side.place(s), (x, y)) > WITH and not stance.bound_for(side, s, (x, y), WITH)
+    ]
+    if away:
+        hands.attack(side, away, (x, y))
+    return armed
+
+
+def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point) -> set[int]:
+    """Stop the head of a long column until the others are near; return it."""
+    world = side.world
+    if len(there) < 4 or any(world.target[s] != NOBODY for s in there):
+        return set()
+    away = np.hypot(*(world.pos[there] - np.array(goal)).T)
+    middle = float(np.median(away))
+    ahead = [s for s, d in zip(there, away.tolist(), strict=True) if middle - d > SPREAD]
+    if not ahead or enemy.near(side.place(ahead[0]), FIGHT).size:
+        return set()
+    centre = world.pos[there][away >= middle].mean(axis=0).tolist()
+    running = [s for s in ahead if world.order_kind[s] != OrderKind.MOVE]
+    if running:
+        hands.move(side, running, (centre[0], centre[1]))
+    return set(ahead)
+
+
+def _waits(side: Side, slot: int, home: Point, goal: Point) -> bool:
+    """Return whether a unit has not set out yet: it does nothing, nearer to home than to the goal, or gathers."""
+    at = side.place(slot)
+    if stance.bound_for(side, slot, home, 2.0):
+        return True
+    return stance.idle(side, slot) and stance.nearer(at, home, goal)

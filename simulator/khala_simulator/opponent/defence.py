@@ -1,0 +1,129 @@
+"""Defence: what threatens the own bases, and who goes there: the army at home, and workers where it is too weak."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from khala_simulator.economy import harvesting
+from khala_simulator.opponent import bases, hands, stance
+from khala_simulator.opponent.enemy import WORKER_VALUE, value
+from khala_simulator.opponent.levels import FASTER_LOOPS
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.opponent_memory import NEVER
+from khala_simulator.world.orders import OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.opponent.enemy import Enemy
+    from khala_simulator.opponent.side import Side
+    from khala_simulator.world.columns import Ints
+
+HOME: Final = 22.0
+"""Enemies so near to an own town hall are a threat; HARM is for other structures."""
+HARM: Final = 12.0
+SCOUTS: Final = 2
+"""So few enemy workers at a base are scouts and no threat."""
+RECALL: Final = 0.3
+"""An attack goes on while the enemies at home are worth less than this share of the army."""
+
+
+def watch(side: Side, enemy: Enemy) -> Ints | None:
+    """Return the enemies at the own bases once the level has reacted to them, None without any."""
+    threat = threats(side, enemy)
+    mind, world = side.mind, side.world
+    if not threat.size:
+        mind.alarm, mind.threat = NEVER, None
+        _release(side)
+        return None
+    if mind.alarm == NEVER:
+        mind.alarm = world.loop
+    if world.loop - mind.alarm < side.level.reaction_s * FASTER_LOOPS:
+        return None
+    x, y = world.pos[_nearest_home(side, threat)].tolist()
+    mind.threat = (x, y)
+    return threat
+
+
+def threats(side: Side, enemy: Enemy) -> Ints:
+    """Return the enemies in sight that fight at an own structure."""
+    world = side.world
+    foes = enemy.fighters
+    if not foes.size:
+        return foes
+    stone = np.array([s for s in side.slots.tolist() if world.unit_type(s).structure], dtype=np.int64)
+    if not stone.size:
+        return foes[:0]
+    reach = np.where(harvesting.kinds(world.catalog)[2][world.type[stone]], HOME, HARM)
+    offset = world.pos[foes][:, None, :] - world.pos[stone]
+    near = (offset[..., 0] ** 2 + offset[..., 1] ** 2 <= reach**2).any(axis=1)
+    found: Ints = foes[near]
+    harmless = [s for s in found.tolist() if world.unit_type(s).worker]
+    return found[:0] if len(harmless) == found.size <= SCOUTS else found
+
+
+def _nearest_home(side: Side, threat: Ints) -> int:
+    home = np.array([side.place(h) for h in side.halls] or [side.mind.bases[0]])
+    offset = side.world.pos[threat][:, None, :] - home
+    return int(threat[int(np.argmin((offset[..., 0] ** 2 + offset[..., 1] ** 2).min(axis=1)))])
+
+
+def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
+    """Send the army at home against enemies at the bases, and workers; return who goes on with the attack.
+
+    An attack is called off where the army at home is too weak, unless the threat is small beside the whole army.
+    """
+    world, mind = side.world, side.mind
+    strength, at = value(world, threat), mind.threat or mind.bases[0]
+    front = bases.front(side)
+    home = [s for s in army if not mind.attacking or stance.nearer(side.place(s), front, mind.enemy_start)]
+    if mind.attacking and strength > max(value(world, home), RECALL * value(world, army)):
+        stance.call_off(side)
+        home = army
+    helpers = home + side.named("Queen")
+    idle = [s for s in helpers if world.target[s] == NOBODY and not stance.bound_for(side, s, at, 6.0)]
+    if idle:
+        hands.attack(side, idle, at)
+    _pull_workers(side, helpers, threat, strength)
+    return [s for s in army if s not in set(home)]
+
+
+def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
+    """Make workers fight while the army at home is weaker than the threat."""
+    world, mind = side.world, side.mind
+    threat_at = mind.threat or mind.bases[0]
+    lacking = 1.15 * strength - value(world, army) - value(world, _static(side))
+    near = any(math.dist(side.place(h), threat_at) < HOME - 6.0 for h in side.halls)
+    if lacking <= 0.0 or not near or not side.level.pull:
+        _release(side)
+        return
+    most = int(side.level.pull * len(side.workers))
+    wanted = min(most, math.ceil(lacking / WORKER_VALUE))
+    mind.pulled = [tag for tag in mind.pulled if world.slot_of(tag) != NOBODY]
+    candidates = [w for w in side.workers if world.carrier[w] == NOBODY and not world.casts[w]]
+    candidates.sort(key=lambda w: (world.tag_of(w) not in mind.pulled, math.dist(side.place(w), threat_at), w))
+    mind.pulled = [world.tag_of(w) for w in candidates[:wanted]]
+    idle = [w for w in candidates[:wanted] if world.order_kind[w] != OrderKind.ATTACK_UNIT]
+    ground = [s for s in threat.tolist() if not world.unit_type(s).flying]
+    groups: dict[int, list[int]] = {}
+    for worker in idle if ground else ():
+        offset = world.pos[ground] - world.pos[worker]
+        groups.setdefault(ground[int(np.argmin((offset**2).sum(axis=1)))], []).append(worker)
+    for target, group in groups.items():
+        hands.attack_unit(side, group, world.tag_of(target))
+
+
+def _release(side: Side) -> None:
+    """Send workers that have defended back to their work."""
+    world, mind = side.world, side.mind
+    fighting = [s for tag in mind.pulled if (s := world.slot_of(tag)) != NOBODY]
+    mind.pulled = []
+    for hall in side.halls[:1]:
+        fields = bases.fields_near(world, side.place(hall))
+        if fighting and fields:
+            hands.gather(side, fighting, world.tag_of(fields[0]))
+
+
+def _static(side: Side) -> list[int]:
+    return side.named("Bunker", "PhotonCannon", "ShieldBattery", "SpineCrawler", "PlanetaryFortress")
