@@ -100,14 +100,17 @@ def _site(world: World, player: int, hall: UnitType, group: Floats, starts: list
 
 
 def next_place(side: Side, enemy: Enemy) -> Point | None:
-    """Return the nearest base that nobody has, and that still has minerals."""
+    """Return the nearest base that nobody has and that still has minerals; on the enemy's half only as a last resort."""
     world = side.world
     halls = [s for s in side.slots.tolist() if harvesting.kinds(world.catalog)[2][world.type[s]]]
     foes = enemy.places()
-    for place in side.mind.bases:
+    places = [place for place in side.mind.bases if fields_near(world, place)]
+    if any(map(side.is_ours, places)):
+        places = [place for place in places if side.is_ours(place)]
+    for place in places:
         free = all(math.dist(side.place(hall), place) > TAKEN for hall in halls)
         safe = not len(foes) or float(np.hypot(foes[:, 0] - place[0], foes[:, 1] - place[1]).min()) > DANGER
-        if free and safe and fields_near(world, place):
+        if free and safe:
             return place
     return None
 

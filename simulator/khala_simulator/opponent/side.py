@@ -5,6 +5,7 @@ Made afresh for every thought. Above: every other module of this package. Below:
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -138,6 +139,10 @@ class Side:
         """Return where a unit is."""
         x, y = self.world.pos[slot].tolist()
         return x, y
+
+    def is_ours(self, point: Point) -> bool:
+        """Return whether a place is nearer to the own start than to the enemy's."""
+        return math.dist(point, self.mind.bases[0]) < math.dist(point, self.mind.enemy_start)
 
     # orders under way ---------------------------------------------------------------------------------------------
 
