@@ -327,7 +327,7 @@ def test_it_attacks_with_a_wave_and_goes_home_from_what_is_too_strong() -> None:
 
 
 def test_a_drop_loads_flies_and_unloads_in_the_enemys_base() -> None:
-    world = game(("terran", "zerg"))
+    world = game(("terran", "zerg"), map_name="Melee/Flat48")
     x, y = stance.rally(side_of(world))
     put(world, 1, "Medivac", x, y)
     put(world, 1, "Marine", x - 3.0, y - 3.0, 30)
@@ -369,7 +369,7 @@ def test_a_scenarios_own_computer_player_is_left_alone() -> None:
     "race", [pytest.param(race, marks=[] if race == "zerg" else [pytest.mark.slow]) for race in RACES]
 )
 def test_the_same_game_is_played_every_time(race: str) -> None:
-    loops = 600
+    loops = 320
     first, second = (game((race, "zerg"), (6, 6), seats=("computer", "computer"), build=1) for _ in range(2))
     advance(first, loops)
     advance(second, loops)
