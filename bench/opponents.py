@@ -111,6 +111,7 @@ def growth(game_map: str, seat: Seat, moments_s: Iterable[int], seed: int) -> li
         had = list(world.players[1].score.collected)
         advance(world, max(0, round(at_s * FASTER_LOOPS) - world.loop))
         rows.append(_grown(world, seat, at_s, had))
+        print(_growth_row(rows[-1]), file=sys.stderr, flush=True)
     return rows
 
 
@@ -189,12 +190,15 @@ def growth_table(rows: Iterable[Growth]) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
     yield "| player | at | workers | bases | army supply | supply | upgrades | minerals/min | vespene/min | unspent |"
     yield f"|{'---|' * 10}"
-    for r in rows:
-        at = f"{r.at_s // 60}:{r.at_s % 60:02d}"
-        yield (
-            f"| {r.seat.name} | {at} | {r.workers} | {r.bases} | {r.army_supply:.0f} | {r.supply:.0f} | {r.upgrades} "
-            f"| {r.minerals:.0f} | {r.vespene:.0f} | {r.unspent:.0f} |"
-        )
+    yield from map(_growth_row, rows)
+
+
+def _growth_row(r: Growth) -> str:
+    at = f"{r.at_s // 60}:{r.at_s % 60:02d}"
+    return (
+        f"| {r.seat.name} | {at} | {r.workers} | {r.bases} | {r.army_supply:.0f} | {r.supply:.0f} | {r.upgrades} "
+        f"| {r.minerals:.0f} | {r.vespene:.0f} | {r.unspent:.0f} |"
+    )
 
 
 def ladder_table(games: Iterable[Game]) -> Iterator[str]:

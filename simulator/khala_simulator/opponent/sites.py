@@ -86,12 +86,10 @@ def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
     """Return which places suit the Pylons: in a power field, or for a Pylon away from the others."""
     if unit.needs_power:
         fields = [power.covered(side.world, source, at) for source in power.sources(side.world, side.player)]
-        inside: Bools = np.array(fields, dtype=np.bool_).reshape(-1, len(at)).any(axis=0)
-        return inside
+        return np.asarray(np.array(fields, dtype=np.bool_).reshape(-1, len(at)).any(axis=0), dtype=np.bool_)
     pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
     apart = np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1])
-    result: Bools = (apart >= PYLONS_APART).all(axis=1)
-    return result
+    return np.asarray((apart >= PYLONS_APART).all(axis=1), dtype=np.bool_)
 
 
 # grids ----------------------------------------------------------------------------------------------------------------
@@ -150,7 +148,8 @@ def geyser(side: Side) -> int:
     for hall in side.halls:
         near = [s for s in free if math.dist(side.place(s), side.place(hall)) <= MECHANICS.harvest_search]
         if near:
-            return min(near, key=lambda s: (math.dist(side.place(s), side.place(hall)), s))
+            nearest: int = min(near, key=lambda s: (math.dist(side.place(s), side.place(hall)), s))
+            return nearest
     return NOBODY
 
 
