@@ -214,7 +214,8 @@ def test_idle_workers_go_where_there_is_room_and_gas_is_staffed() -> None:
     gx, gy = world.pos[geyser].tolist()
     refinery = lifecycle.spawn(world, world.catalog.unit("Refinery"), 1, (gx, gy))
     world.contents[refinery], world.occupant[geyser], world.patch[refinery] = 2250, refinery, geyser
-    for side in (side_of(world), side_of(world)):
+    for _ in range(2):
+        side = side_of(world)
         economy.mine(side, Staff(side))
         advance(world, 8)
     assert harvesting.assigned(world)[refinery] == 3
