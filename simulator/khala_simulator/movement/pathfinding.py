@@ -350,10 +350,7 @@ def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surf
     found = ground.surfaces.get((layer, without))
     if not isinstance(found, Surface):
         bare = layer is Layer.AIR or len(ground.blocked) == len(without)
-        if bare:
-            found = _bare_surface(ground.terrain, layer)
-        else:
-            found = _surface(_free_now(ground, layer, without), layer)
+        found = _bare_surface(ground.terrain, layer) if bare else _surface(_free_now(ground, layer, without), layer)
         ground.surfaces[layer, without] = found
     return found
 

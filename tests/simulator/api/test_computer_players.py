@@ -9,7 +9,7 @@ from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.opponent import player
 from khala_simulator.opponent.levels import level_of
-from khala_simulator.tables.catalog import DEFAULT_VERSION
+from khala_simulator.tables.versions import DEFAULT_VERSION
 
 
 def test_difficulty_and_build_are_those_of_the_request() -> None:
