@@ -31,6 +31,7 @@ FIELDS_KEPT: Final = 2048
 SIDE_CLEARANCE: Final = 0.3
 SAMPLE_STEP: Final = 0.35
 NEAR_SIDE: Final = 0.2
+EDGE: Final = 1e-9
 LOOK_AHEAD: Final = (1, 2, 3, 5, 8, 12, 18, 26)
 NEIGHBOURS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))
 
@@ -62,6 +63,7 @@ class Surface:
         self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
         self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
         self._fields: dict[int, _Field] = {}
+        self._places: dict[tuple[float, ...], tuple[Ints, Floats]] = {}
         # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
         self._steps: list[int] = self._free_steps(blocked).tolist()
         self._edges = _edges(self.width)
@@ -97,20 +99,35 @@ class Surface:
         middle = 0.5 - self.shift
         return np.stack([cells % self.width + middle, cells // self.width + middle], axis=-1)
 
-    def nearest(self, point: Floats, part: int, start: Floats | None = None) -> int:
-        """Return the cell of a connected part nearest to ``point``; the side of ``start`` decides near ties."""
-        members, centres = self._members[part], self._centres[part]
-        distance = geometry.length(centres - point)
-        if start is not None:
-            distance += NEAR_SIDE * geometry.length(centres - start)
-        return int(members[np.argmin(distance)])
+    def nearest(self, point: Floats, part: int, starts: Floats) -> Ints:
+        """Return (k,) the cells of a connected part nearest to a point; the side of each start decides near ties."""
+        cells, distance = self._around(point, part)
+        sides = geometry.length(self.centre(cells) - starts[:, None])
+        nearest: Ints = cells.take(np.argmin(distance + NEAR_SIDE * sides, axis=1))
+        return nearest
+
+    def _around(self, point: Floats, part: int) -> tuple[Ints, Floats]:
+        """Return the cells of a connected part among which a start may choose, and how far from the point they are.
+
+        A start that prefers a cell to the nearest one, d away, is at most their distance nearer to it, so the cell is
+        at most d (1 + NEAR_SIDE) / (1 - NEAR_SIDE) away. A whole army asks for the same goal again and again.
+        """
+        key = (*point.tolist(), part)
+        found = self._places.get(key)
+        if found is None:
+            if len(self._places) >= FIELDS_KEPT:
+                self._places.clear()
+            distance = geometry.length(self._centres[part] - point)
+            near = which(distance <= distance.min() * (1.0 + NEAR_SIDE) / (1.0 - NEAR_SIDE) + EDGE)
+            found = self._places[key] = self._members[part].take(near), distance.take(near)
+        return found
 
     def nearest_free(self, point: Floats) -> int | None:
         """Return the free cell nearest to ``point`` over all parts, or None when nothing is free."""
-        candidates = [self.nearest(point, part) for part in range(len(self._members))]
+        candidates = [cells[np.argmin(d)] for cells, d in (self._around(point, i) for i in range(len(self._members)))]
         if not candidates:
             return None
-        return candidates[int(np.argmin(geometry.length(self.centre(np.array(candidates)) - point)))]
+        return int(candidates[int(np.argmin(geometry.length(self.centre(np.array(candidates)) - point)))])
 
     # lines --------------------------------------------------------------------------------------------------------
 

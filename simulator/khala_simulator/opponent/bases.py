@@ -1,7 +1,7 @@
 """Bases: where town halls can stand on a map, and which one a side takes next.
 
-A base is a group of mineral fields and geysers; its town hall stands as near to all of them as the rules allow, at the
-start location where there is one.
+A base is a group of mineral fields and geysers; its town hall stands as near to all of them as the rules allow. Where
+there is a start location, or a town hall from the beginning, it is there.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ DANGER: Final = 14.0
 def find(world: World, player: int, hall: UnitType) -> tuple[Point, ...]:
     """Return where town halls can stand, the nearest to a player's start by the way on the ground first."""
     start = world.players[player].start or (0.0, 0.0)
-    starts = list(world.map.scenario.start_locations)
+    live = world.live
+    halls = live[harvesting.kinds(world.catalog)[2][world.type[live]]]
+    starts = [*world.map.scenario.start_locations, *((x, y) for x, y in world.pos[halls].tolist())]
     found = [_site(world, player, hall, group, starts) for group in _groups(world)]
     places = [place for place in found if place is not None]
     return tuple(sorted(places, key=lambda place: (way(world, start, place), place)))

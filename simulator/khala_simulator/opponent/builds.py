@@ -7,11 +7,11 @@ the money on it.
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib import resources
 from typing import Final, NamedTuple
 
-import yaml
 from pydantic import BaseModel, ConfigDict
+
+from khala_simulator.tables.loader import read_data
 
 NAMES: Final = {2: "macro", 3: "power", 4: "rush", 5: "timing", 6: "air"}
 """The API's values of AIBuild; all others leave the choice to the seed."""
@@ -85,8 +85,7 @@ class Race(Data):
 @lru_cache(maxsize=3)
 def load_race(race: str) -> Race:
     """Return the builds of a race."""
-    path = resources.files("khala_simulator.data") / "opponents" / f"{race}.yaml"
-    return Race.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    return Race.model_validate(read_data("opponents", f"{race}.yaml"))
 
 
 def name_of(ai_build: int, draw: float) -> str:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import yaml
 
 from khala_simulator.combat import buffs
 from khala_simulator.opponent import hands
 from khala_simulator.opponent.builds import Data
+from khala_simulator.tables.loader import read_data
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
@@ -54,8 +53,7 @@ def cast(side: Side, enemy: Enemy) -> None:
 @lru_cache(maxsize=1)
 def rules() -> tuple[CastRule, ...]:
     """Return the rules of the data file, in its order."""
-    path = resources.files("khala_simulator.data") / "opponents" / "casts.yaml"
-    rows: list[dict[str, Any]] = yaml.safe_load(path.read_text(encoding="utf-8"))["casts"]
+    rows: list[dict[str, Any]] = read_data("opponents", "casts.yaml")["casts"]
     return tuple(CastRule.model_validate(row) for row in rows)
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
 from typing import Any, Final
 
-import yaml
+from khala_simulator.tables.loader import read_data
 
 FASTER_LOOPS: Final = 22.4
 """Game loops in a second of game time."""
@@ -46,8 +45,7 @@ def level_of(difficulty: int) -> Level:
 @lru_cache(maxsize=1)
 def load_levels() -> dict[int, Level]:
     """Return every level by its difficulty."""
-    path = resources.files("khala_simulator.data") / "opponents" / "levels.yaml"
-    rows: dict[int, dict[str, Any]] = yaml.safe_load(path.read_text(encoding="utf-8"))["levels"]
+    rows: dict[int, dict[str, Any]] = read_data("opponents", "levels.yaml")["levels"]
     return {number: _level(row, rows) for number, row in rows.items()}
 
 

@@ -19,7 +19,7 @@ from khala_simulator.tables.mechanics import MECHANICS
 if TYPE_CHECKING:
     from khala_simulator.movement.pathfinding import Surface
     from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Ints
+    from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
 
 CORNER_REACHED = 0.4
@@ -73,8 +73,8 @@ def _find_corners(world: World, crooked: Ints, surface: Surface) -> None:
     cells = surface.cell(world.goal[crooked])
     parts = surface.part[surface.cell(start)]
     usable = parts >= 0
-    for i in np.flatnonzero(usable & (surface.part[cells] != parts)).tolist():
-        cells[i] = surface.nearest(world.goal[crooked[i]], int(parts[i]), start[i])
+    for i in _by_goal(world.goal[crooked], parts, usable & (surface.part[cells] != parts)):
+        cells[i] = surface.nearest(world.goal[crooked[i[0]]], int(parts[i[0]]), start[i])
     elsewhere = surface.cell(world.goal[crooked]) != cells
     crooked, start, cells, elsewhere = crooked[usable], start[usable], cells[usable], elsewhere[usable]
     if crooked.size:
@@ -84,6 +84,15 @@ def _find_corners(world: World, crooked: Ints, surface: Surface) -> None:
         world.nav_point[crooked] = np.where(at_goal[:, None], centre, surface.corners(start, cells))
         offset = centre - start
         world.nav_end[crooked] = at_goal & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
+
+
+def _by_goal(goals: Floats, parts: Ints, chosen: Bools) -> list[list[int]]:
+    """Return the numbers of the chosen walkers, those together that are in the same part and have the same goal."""
+    groups: dict[tuple[float, ...], list[int]] = {}
+    at = which(chosen)
+    for i, goal, part in zip(at.tolist(), goals.take(at, 0).tolist(), parts.take(at).tolist(), strict=True):
+        groups.setdefault((*goal, part), []).append(i)
+    return list(groups.values())
 
 
 def _note_progress(world: World, slots: Ints) -> None:

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any, Final, Literal
 
-import yaml
-
-from khala_simulator.tables.loader import LOADER
+from khala_simulator.tables.loader import read_data
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +93,7 @@ class Mechanics:
 
 def entries() -> tuple[Constant, ...]:
     """Return all constants of the data file, in its order; some are choices of a rule and have no number."""
-    text = (resources.files("khala_simulator.data") / "mechanics.yaml").read_text(encoding="utf-8")
-    raw: dict[str, dict[str, Any]] = yaml.load(text, Loader=LOADER)  # noqa: S506  # a safe one
+    raw: dict[str, dict[str, Any]] = read_data("mechanics.yaml")
     return tuple(Constant(name=name, **fields) for name, fields in raw.items())
 
 

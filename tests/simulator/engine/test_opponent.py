@@ -143,6 +143,12 @@ def test_bases_are_found_where_the_map_has_resources_its_own_start_first() -> No
         assert len(bases.fields_near(world, place)) == 8
 
 
+def test_a_town_hall_that_stands_from_the_beginning_marks_a_base_where_the_map_names_no_start() -> None:
+    world = new_game(load_map("llm_pysc2/pvz_task6_level1"))
+    assert not world.map.scenario.start_locations
+    assert bases.find(world, 2, world.catalog.unit("Hatchery")) == ((70.5, 48.5), (25.5, 48.5))
+
+
 def test_structures_keep_the_ways_of_workers_and_the_next_base_free() -> None:
     world = game(("terran", "zerg"))
     side = side_of(world)

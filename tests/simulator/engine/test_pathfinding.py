@@ -62,7 +62,7 @@ def test_what_is_cut_off_has_no_way() -> None:
     assert divided.distance(at(0.5, 0.5), at(6.5, 0.5)) == 0
     assert divided.distance(at(0.5, 0.5), at(3.5, 0.5)) == 0
     assert set(divided.part.tolist()) == {-1, 0, 1}
-    assert divided.centre(np.array(divided.nearest(at(6.5, 1.5), 0))).tolist() == [2.5, 1.5]
+    assert divided.centre(divided.nearest(at(6.5, 1.5), 0, at(0.5, 0.5)[None])).tolist() == [[2.5, 1.5]]
 
 
 def test_a_line_does_not_pass_between_two_cells_that_touch_at_a_corner() -> None:
