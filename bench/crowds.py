@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, Final
 import cv2
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
+from bench.duels import wilson
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.maps.game_map import map_from
@@ -58,6 +58,7 @@ WALLS: Final = 9999
 """A slot that no unit has, for cells that are blocked."""
 FOREVER: Final = 1e6
 MOST_LOOPS: Final = 1600
+AGAIN_LOOPS: Final = 400
 SECOND: Final = 22.4
 EDGE: Final = 1e-9
 BATTLES: Final[dict[str, dict[str, int]]] = {
@@ -324,34 +325,42 @@ def walls(name: str, cells: int) -> bool:
 
 
 def mirror(seed: int, army: dict[str, int]) -> dict[str, bool] | None:
-    """Play one fight of equal armies at mirrored places; return whose it was by each factor, None for a draw."""
+    """Play one fight of equal armies at mirrored places; return whose it was by each factor, None for a draw.
+
+    The owner on the left, of the units made first, of the lower slots and of the first order are drawn independently.
+    """
     rng = np.random.default_rng(seed)
-    left_owner, first_owner, ordered = (int(v) for v in rng.integers(1, 3, 3))
+    left, first, lower, ordered = (int(v) for v in rng.integers(1, 3, 4))
     world = fresh(seed)
     x, y = MIDDLE
     names = [name for name, count in army.items() for _ in range(count)]
     places = rng.uniform((-9.0, -3.5), (-4.5, 3.5), (len(names), 2)).tolist()
     turned = bool(rng.integers(2))  # mirrored at a line, or turned by half a circle
-    order = [first_owner, 3 - first_owner]
-    jobs = [(owner, i) for owner in order for i in range(len(names))]
-    if rng.integers(2):  # one by one
+    jobs = [(owner, i) for owner in (first, 3 - first) for i in range(len(names))]
+    fillers = [] if lower == first else put(world, "Marine", 0, [MIDDLE] * len(names))
+    if not fillers and rng.integers(2):  # one by one
         jobs.sort(key=lambda job: job[1])
-    for owner, i in jobs:
+    for number, (owner, i) in enumerate(jobs):
+        if number == len(names):
+            for slot in fillers:  # their slots are taken by the units made last
+                world.remove(slot)
         dx, dy = places[i]
-        place = (x + dx, y + dy) if owner == left_owner else (x - dx, y - dy if turned else y + dy)
+        place = (x + dx, y + dy) if owner == left else (x - dx, y - dy if turned else y + dy)
         put(world, names[i], owner, [place])
-    for owner in (ordered, 3 - ordered):
-        goal = x + 8 if owner == left_owner else x - 8
-        commands.attack_move(world, world.units_of(owner).tolist(), (goal, y))
+    goals = {left: (x + 8, y), 3 - left: (x - 8, y)}
     while len(world.units_of(1)) and len(world.units_of(2)) and world.loop < 2 * MOST_LOOPS:
+        if world.loop % AGAIN_LOOPS == 0:  # those who passed each other out of sight meet in the middle
+            for owner in (ordered, 3 - ordered):
+                commands.attack_move(world, world.units_of(owner).tolist(), MIDDLE if world.loop else goals[owner])
         advance(world)
     if bool(len(world.units_of(1))) == bool(len(world.units_of(2))):
         return None
     winner = 1 if len(world.units_of(1)) else 2
     return {
-        "left side": winner == left_owner,
+        "left side": winner == left,
         "player 1": winner == 1,
-        "created first": winner == first_owner,
+        "made first": winner == first,
+        "lower slots": winner == lower,
         "ordered first": winner == ordered,
     }
 
@@ -363,25 +372,26 @@ def binomial(wins: int, games: int) -> float:
     return float(tail / 2**games)
 
 
-def mirrors(games: int) -> Table:
-    """Play so many fights, the same number of each kind; tabulate wins by each factor with their probability."""
-    table = Table(
-        "armies", "games", "draws", "left side", "player 1", "created first", "ordered first", title="mirrors"
-    )
-    total: list[dict[str, bool]] = []
-    each = games // len(BATTLES)
-    for kind, army in BATTLES.items():
-        played = [mirror(seed, army) for seed in range(each)]
+def mirrors(games: int, console: Console) -> None:
+    """Play so many fights, the same number of each kind; print the shares won by each factor."""
+    each, total = games // len(BATTLES), []
+    for number, (kind, army) in enumerate(BATTLES.items()):
+        played = [mirror(seed, army) for seed in range(number * each, (number + 1) * each)]
         decided = [one for one in played if one is not None]
         total += decided
-        table.add_row(kind, str(each), str(each - len(decided)), *_odds(decided))
-    table.add_row("all", str(each * len(BATTLES)), str(each * len(BATTLES) - len(total)), *_odds(total))
-    return table
+        console.print(f"{kind:32} {each - len(decided):3} draws", _odds(decided), soft_wrap=True)
+    console.print(f"{'all':32} {each * len(BATTLES) - len(total):3} draws", _odds(total), soft_wrap=True)
 
 
-def _odds(decided: list[dict[str, bool]]) -> list[str]:
-    wins = {key: sum(one[key] for one in decided) for key in decided[0]}
-    return [f"{count} (p {binomial(count, len(decided)):.2f})" for count in wins.values()]
+def _odds(decided: list[dict[str, bool]]) -> str:
+    """Return the share won by each factor with the interval in which it lies with 95 %, and the odds of a fair coin."""
+    texts = []
+    for factor in decided[0] if decided else ():
+        wins = sum(one[factor] for one in decided)
+        low, high = wilson(wins, len(decided))
+        share, odds = wins / len(decided), binomial(wins, len(decided))
+        texts.append(f"{factor} {wins} of {len(decided)} = {share:.0%} ({low:.0%} to {high:.0%}, p {odds:.2f})")
+    return "  ".join(texts)
 
 
 # pictures -------------------------------------------------------------------------------------------------------------
@@ -443,7 +453,7 @@ def main() -> None:
     options = parser.parse_args()
     console = Console()
     if options.mirrors:
-        console.print(mirrors(options.mirrors))
+        mirrors(options.mirrors, console)
         return
     if options.picture is not None:
         moments(options.picture)

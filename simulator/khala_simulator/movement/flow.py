@@ -23,31 +23,32 @@ if TYPE_CHECKING:
 
 Bytes = NDArray[np.uint8]
 
-CELL: Final = 0.25
+FINE: Final = 4  # cells of the grid in a cell of the ground, on each axis
 MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
 DIGITS: Final = 6
 NOWHERE: Final = 2**DIGITS - 1  # more steps than are looked at
 HOPS: Final = 2  # of up to two cells, from the nearest cell with a way to the point that a walker heads for
-NEARER: Final = 1e-3  # what a unit of distance to the goal weighs, where a step weighs 1
-OFFSETS: Final = np.array([(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)])
-AROUND: Final = np.array([(dx, dy) for dy in (-2, -1, 0, 1, 2) for dx in (-2, -1, 0, 1, 2)])
+NEARER: Final = 1e-5  # what a square cell of distance to the goal weighs, where a step weighs 1
+SIDE: Final = np.arange(-2, 3)
+AROUND: Final = np.array([(dx, dy) for dy in SIDE for dx in SIDE])
+BESIDE: Final = AROUND[np.abs(AROUND).max(axis=1) < 2]  # the cell itself and its eight neighbours
 
 
 class Flow:
     """A grid around walkers (k, 2); ``stand`` and ``reach`` say what is on it, ``points`` finds the ways."""
 
     def __init__(self, surface: Surface, walkers: Floats) -> None:
-        low = np.floor((walkers.min(axis=0) - MARGIN) / CELL).astype(np.int64)
-        high = np.floor((walkers.max(axis=0) + MARGIN) / CELL).astype(np.int64) + 1
-        self.low = low
-        self.width, self.height = (high - low).tolist()
-        x = np.floor((np.arange(low[0], high[0]) + 0.5) * CELL + surface.shift).astype(np.int64)
-        y = np.floor((np.arange(low[1], high[1]) + 0.5) * CELL + surface.shift).astype(np.int64)
-        inside = ((y >= 0) & (y < surface.height))[:, None] & ((x >= 0) & (x < surface.width))
-        self.free: Bools = surface.free[np.clip(y, 0, surface.height - 1)[:, None], np.clip(x, 0, surface.width - 1)]
-        self.free &= inside
+        low = np.floor(walkers.min(axis=0) + (surface.shift - MARGIN)).astype(np.int64)
+        high = np.ceil(walkers.max(axis=0) + (surface.shift + MARGIN)).astype(np.int64)
+        (x0, y0), (x1, y1) = low.tolist(), high.tolist()
+        inside = surface.free[max(y0, 0) : y1, max(x0, 0) : x1]
+        ground = np.zeros((y1 - y0, x1 - x0), dtype=np.bool_)
+        ground[max(-y0, 0) :, max(-x0, 0) :][: inside.shape[0], : inside.shape[1]] = inside
+        self.low = low - surface.shift
+        self.free: Bools = ground.repeat(FINE, axis=0).repeat(FINE, axis=1)
         self.free[[0, -1]] = self.free[:, [0, -1]] = False  # so that no step leads round the edge
         self.wanted: Bools = np.zeros_like(self.free)
+        self.height, self.width = self.free.shape
 
     def stand(self, at: Floats, apart: Floats) -> None:
         """Take the cells nearer than ``apart`` (m,) to bodies at (m, 2)."""
@@ -60,17 +61,14 @@ class Flow:
     def _paint(self, grid: Bools, at: Floats, radius: Floats, *, value: bool) -> None:
         if not len(at):
             return
-        half = math.ceil(float(radius.max()) / CELL)
-        side = np.arange(-half, half + 1)
-        cells = np.floor(at / CELL).astype(np.int64)
-        x, y = cells[:, 0, None] + side, cells[:, 1, None] + side
-        dx, dy = (x + 0.5) * CELL - at[:, 0, None], (y + 0.5) * CELL - at[:, 1, None]
-        x -= self.low[0]
-        y -= self.low[1]
-        inside = (dx * dx)[:, None, :] + (dy * dy)[:, :, None] < (radius * radius)[:, None, None]
-        inside &= ((x >= 0) & (x < self.width))[:, None, :] & ((y >= 0) & (y < self.height))[:, :, None]
-        number = y[:, :, None] * self.width + x[:, None, :]
-        np.put(grid, number[inside], value)
+        at, radius = (at - self.low) * FINE, radius * FINE
+        half = math.ceil(float(radius.max()))
+        square = np.arange(-half, half + 1)
+        x, dx = _columns(at[:, 0], square, self.width)
+        y, dy = _columns(at[:, 1], square, self.height)
+        inside = dx[:, None, :] + dy[:, :, None] < (radius * radius)[:, None, None]
+        number = (y * self.width)[:, :, None] + x[:, None, :]
+        grid.reshape(-1)[number[inside]] = value
 
     def points(self, at: Floats, goal: Floats, width: float) -> tuple[Floats, Bools]:
         """Return the points (k, 2) that walkers at (k, 2) head for, and which of them have a way.
@@ -91,37 +89,37 @@ class Flow:
 
     def _ahead(self, at: Floats, goal: Floats) -> tuple[Floats, Bools, Bools]:
         """Return the points some steps ahead (k, 2), who has a way, and whose ends there."""
-        cells = np.floor(at / CELL).astype(np.int64) - self.low
+        cells = ((at - self.low) * FINE).astype(np.int64)
+        goal = (goal - self.low) * FINE - 0.5
         left = self._spread(cells)
         cell, steps = self._next(left, cells, goal)
         found = steps < NOWHERE
         for _ in range(HOPS):
             cell, steps = self._next(left, cell, goal)
-        return (cell + self.low + 0.5) * CELL, found, steps == 0
+        return (cell + 0.5) / FINE + self.low, found, steps == 0
 
     def _spread(self, cells: Ints) -> Bytes:
         """Return (cells,) the steps from each cell to a place to go to, ``NOWHERE`` if it was not reached.
 
         It ends as soon as the walkers' cells (k, 2) are reached. Each digit of the numbers is a grid by itself.
         """
-        around = cells[:, None, :] + OFFSETS
-        walkers = np.zeros_like(self.free)
-        walkers[around[..., 1], around[..., 0]] = True
-        free, reached, missing = (_bits(g) for g in (self.free, self.free & self.wanted, self.free & walkers))
+        walkers = np.zeros(self.free.size, dtype=np.bool_)
+        walkers[self._numbers(cells, BESIDE)] = True
+        free, reached, missing = (_bits(g) for g in (self.free, self.free & self.wanted, self.free.ravel() & walkers))
         digits, width, step = [0] * DIGITS, self.width, 0
-        while step < NOWHERE - 1 and missing & ~reached:
+        while step < NOWHERE - 1 and missing & reached != missing:
             row = reached | reached << 1 | reached >> 1
             tall = reached if step % 2 else row  # a diagonal every second step: about as long as it looks
             grown = (row | tall << width | tall >> width) & free
-            fresh = grown & ~reached
+            fresh = grown ^ reached
+            if not fresh:
+                break
             step += 1
             for digit in range(DIGITS):
                 if step >> digit & 1:
                     digits[digit] |= fresh
-            reached |= grown
-            if not fresh:
-                break
-        beyond = ~reached & (1 << self.free.size) - 1
+            reached = grown
+        beyond = reached ^ (1 << self.free.size) - 1
         size = (self.free.size + 7) // 8
         packed = b"".join((digit | beyond).to_bytes(size, "little") for digit in digits)
         grids = np.unpackbits(np.frombuffer(packed, np.uint8).reshape(DIGITS, size), axis=1, bitorder="little")
@@ -130,12 +128,26 @@ class Flow:
 
     def _next(self, left: Bytes, cells: Ints, goal: Floats) -> tuple[Ints, Bytes]:
         """Return (k, 2) the cell with the fewest steps left among those around, and how many that are."""
-        around = cells[:, None, :] + AROUND
-        steps = left.take(around[..., 1] * self.width + around[..., 0])
-        centre = (around + self.low + 0.5) * CELL
-        best = np.argmin(steps + NEARER * geometry.length(centre - goal[:, None, :]), axis=1)
-        rows = np.arange(len(cells))
-        return around[rows, best], steps[rows, best]
+        steps = left.take(self._numbers(cells, AROUND))
+        beside = (cells - goal)[:, :, None] + SIDE
+        beside *= beside
+        distance = (beside[:, 1, :, None] + beside[:, 0, None, :]).reshape(steps.shape)
+        best = np.argmin(steps + NEARER * distance, axis=1)
+        return cells + AROUND[best], steps[np.arange(len(cells)), best]
+
+    def _numbers(self, cells: Ints, offsets: Ints) -> Ints:
+        """Return (k, m) the numbers of the cells at offsets (m, 2) from others (k, 2)."""
+        numbers: Ints = (cells[:, 1] * self.width + cells[:, 0])[:, None] + (offsets[:, 1] * self.width + offsets[:, 0])
+        return numbers
+
+
+def _columns(at: Floats, square: Ints, width: int) -> tuple[Ints, Floats]:
+    """Return (m, s) the columns of a square around points (m,), and how far from them they are, squared."""
+    columns = np.floor(at).astype(np.int64)[:, None] + square
+    away = columns + 0.5 - at[:, None]
+    away *= away
+    away[(columns < 0) | (columns >= width)] = np.inf
+    return columns, away
 
 
 def _without_overlap(points: Floats, left: Floats, width: float) -> Bools:

@@ -88,7 +88,7 @@ class Surface:
 
     def cell(self, points: Floats) -> Ints:
         """Return the cells under points (..., 2); points outside count as the nearest cell inside."""
-        at = (points + self.shift).astype(np.int64)
+        at = (points + self.shift if self.shift else points).astype(np.int64)
         np.maximum(at, 0, out=at)
         np.minimum(at, self._last, out=at)
         result: Ints = at[..., 1] * self.width + at[..., 0]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_simulator.movement import pathfinding
-from khala_simulator.movement.contacts import within
 from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some, which
 from khala_simulator.systems import flanking
@@ -47,14 +46,20 @@ def find_headings(world: World) -> None:
     world.detour[turning[over]] = 0
     world.aside[turning[over]] = 0.0
     due = turning[~over]
-    flowing = np.abs(world.detour.take(due)) == flanking.LED
+    flowing = _flowing(world, due)
     # in the middle of the usual step of 8 loops: who gets a new order at every step is led for the rest of it
     if (world.loop - MECHANICS.detour_period) % MECHANICS.flank_period == 0 and due.size:
         world.detour[due[flowing]] //= flanking.LED
-        flowing = np.isin(due, flanking.lead(world, due))
+        flanking.lead(world, due)
+        flowing = _flowing(world, due)
     due = due[~flowing]
     if due.size:
         _look(world, due)
+
+
+def _flowing(world: World, slots: Ints) -> Bools:
+    flowing: Bools = np.abs(world.detour.take(slots)) == flanking.LED
+    return flowing
 
 
 def begin(world: World, slots: Ints, shift: Floats) -> None:
@@ -100,26 +105,24 @@ def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Float
         across = ahead[..., 0] * body[:, 1, None] - ahead[..., 1] * body[:, 0, None]
         reach = np.maximum(along - SEEN_AHEAD, 0.0)
         struck = (along > 0.0) & (across**2 + reach**2 < apart[:, None] ** 2)
-        np.logical_and.at(free, k, ~struck)
+        pair, heading = struck.nonzero()
+        free[k.take(pair), heading] = False
     return free & _on_ground(world, slots, start[:, None, :] + headings * SEEN_AHEAD)
 
 
 def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
     """Return bodies near ``slots`` that block them: (p,) index into ``slots``, (p, 2) offset, (p,) distance to keep."""
     bodies = world.live[~world.walled[world.live]]
-    number = np.full(world.top, -1)
-    number[slots] = np.arange(len(slots))
-    widest = float(world.separation.take(bodies).max())
-    one, other, _ = within(world.pos.take(bodies, 0), 2.0 * widest + SEEN_AHEAD)
-    one, other = bodies.take(np.concatenate((one, other))), bodies.take(np.concatenate((other, one)))
-    looks = number.take(one) >= 0
-    one, other = one[looks], other[looks]
-    k = number.take(one)
+    dx = world.pos[bodies, 0] - start[:, 0, None]
+    dy = world.pos[bodies, 1] - start[:, 1, None]
+    farthest = world.separation.take(slots) + float(world.separation.take(bodies).max()) + SEEN_AHEAD
+    k, body = (dx * dx + dy * dy < (farthest * farthest)[:, None]).nonzero()
+    one, other = slots.take(k), bodies.take(body)
     offset = world.pos.take(other, 0) - start.take(k, 0)
     apart = world.separation.take(one) + world.separation.take(other) - TOLERANCE
     product = way.take(k, 0) * world.intended.take(other, 0)
     meets = (world.layer_bits.take(one) & world.layer_bits.take(other)) != 0
-    meets &= other != world.target.take(one)
+    meets &= (other != one) & (other != world.target.take(one))
     meets &= product[:, 0] + product[:, 1] <= 0.0
     meets &= offset[:, 0] ** 2 + offset[:, 1] ** 2 < (apart + SEEN_AHEAD) ** 2
     return k[meets], offset[meets], apart[meets]

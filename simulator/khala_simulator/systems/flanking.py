@@ -1,10 +1,10 @@
 """Flanking: how melee units that others keep from their targets find another place to fight from.
 
-As soon as one of a kind is blocked, all of its kind that are near follow the flow of ``movement.flow``: round the units
-that stand, to the nearest free places from which they reach a target. Those that choose for themselves go for any enemy
-that is as good as theirs, the others for their own; ``acquire`` changes the target of a unit that reaches another. So
-a second row finds the flanks. Ranged units are left to ``avoidance``. The game's own rule is not known; all of this is
-an estimate.
+As soon as one of them is blocked, all of its owner and size that are near follow the flow of ``movement.flow``: round
+the units that stand, to the nearest free places from which they reach a target. Those that choose for themselves go for
+any enemy that is as good as theirs, the others for their own; ``acquire`` changes the target of a unit that reaches
+another. So a second row finds the flanks. Ranged units are left to ``avoidance``. The game's own rule is not known; all
+of this is an estimate.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from khala_simulator.movement import pathfinding
 from khala_simulator.movement.flow import Flow
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
+from khala_simulator.numeric.arrays import some, which
 from khala_simulator.systems.acquire import RANK_STEP, foes_of, rank_of
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
@@ -32,20 +32,17 @@ ANY = -1
 AIR = int(Layer.AIR)
 
 
-def lead(world: World, blocked: Ints) -> Ints:
-    """Write ``aside`` of pursuers of the same kind as some that are blocked; return those for whom there is a way."""
+def lead(world: World, blocked: Ints) -> None:
+    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked."""
     slots = _pursuers(world)
-    if not slots.size:
-        return slots
-    chooses = world.looks_around.take(slots) & world.acquires.take(slots)
-    target = np.where(chooses, ANY, world.target.take(slots))
-    kinds = np.stack([world.owner.take(slots), world.type.take(slots), target], axis=1)
-    stuck = np.isin(slots, blocked)
-    led = [slots[:0]]
-    for kind in sorted({tuple(row) for row in kinds[stuck].tolist()}):
-        mine = slots[(kinds == kind).all(axis=1)]
-        led.append(_follow(world, mine, _foes(world, mine) if kind[2] == ANY else np.array(kind[2:])))
-    return np.concatenate(led)
+    stuck = np.zeros(world.top, dtype=np.bool_)
+    stuck[blocked] = True
+    if not some(stuck.take(slots)):
+        return
+    standing = _standing(world)
+    for kind in _kinds(world, slots):
+        if some(stuck.take(kind)):
+            _follow(world, kind, standing)
 
 
 def _pursuers(world: World) -> Ints:
@@ -59,25 +56,49 @@ def _pursuers(world: World) -> Ints:
     return chosen
 
 
+def _kinds(world: World, slots: Ints) -> list[Ints]:
+    """Return units apart that differ in owner, size or layer, and in target if they do not choose for themselves."""
+    chooses = world.looks_around.take(slots) & world.acquires.take(slots)
+    columns = (
+        world.owner.take(slots),
+        world.layer.take(slots),
+        world.separation.take(slots),
+        np.where(chooses, ANY, world.target.take(slots)),
+    )
+    kinds: dict[tuple[float, ...], list[int]] = {}
+    for slot, *kind in zip(slots.tolist(), *(column.tolist() for column in columns), strict=True):
+        kinds.setdefault(tuple(kind), []).append(slot)
+    return [np.array(kind) for kind in kinds.values()]
+
+
+def _standing(world: World) -> Ints:
+    """Return the bodies that may have to be gone round: what does not walk, and is no structure."""
+    bodies = world.live
+    standing: Ints = bodies[~world.walled.take(bodies) & ~world.wants.take(bodies)]
+    return standing
+
+
 def _foes(world: World, slots: Ints) -> Ints:
-    """Return the enemies that are as good as the best target of some units of one type that choose for themselves."""
+    """Return the enemies that are as good as the best target of some units that choose for themselves."""
     best = float(rank_of(world, slots, world.target.take(slots)).max())
     foes = foes_of(world, int(world.owner[slots[0]]))
     foes = foes[~world.walled.take(foes) & ((world.plane_bits.take(foes) & GROUND_PLANE) != 0)]
-    rank = rank_of(world, np.full(len(foes), slots[0]), foes)
+    rank = rank_of(world, slots[:1], foes)
     chosen: Ints = foes[rank > best - RANK_STEP]
     return chosen
 
 
-def _follow(world: World, slots: Ints, foes: Ints) -> Ints:
-    """Lead units of one type to the nearest free places in reach of any of the foes; return those with a way."""
+def _follow(world: World, slots: Ints, standing: Ints) -> None:
+    """Lead units of one size to the nearest free places in reach of any of their foes."""
     one = int(slots[0])
+    chooses = world.looks_around[one] and world.acquires[one]
+    foes = _foes(world, slots) if chooses else world.target.take(slots[:1])
     at, width = world.pos.take(slots, 0), float(world.separation[one])
     flow = Flow(pathfinding.surface(world.ground, Layer(int(world.layer[one]))), at)
-    standing = _standing(world, one)
+    bodies = _in_the_way(world, one, standing)
     squeeze = MECHANICS.flank_squeeze
-    flow.stand(world.pos.take(standing, 0), world.separation.take(standing) + (width - squeeze))
-    reach = world.radius.take(foes) + world.radius[one] + world.reach[slots].min()
+    flow.stand(world.pos.take(bodies, 0), world.separation.take(bodies) + (width - squeeze))
+    reach = world.radius.take(foes) + (world.radius.take(slots) + world.reach.take(slots)).min()
     touch = world.separation.take(foes) + width
     flow.reach(world.pos.take(foes, 0), np.maximum(reach, touch) - MECHANICS.chase_slack)
     points, found = flow.points(at, world.pos.take(world.target.take(slots), 0), 2.0 * width - squeeze)
@@ -88,14 +109,11 @@ def _follow(world: World, slots: Ints, foes: Ints) -> Ints:
     world.aside[slots] = (offset / np.maximum(distance, 1e-9)[:, None])[found]
     world.detour[slots] = np.where(world.detour.take(slots) < 0, -LED, LED)
     world.detour_end[slots] = world.loop + MECHANICS.detour_loops
-    return slots
 
 
-def _standing(world: World, one: int) -> Ints:
+def _in_the_way(world: World, one: int, standing: Ints) -> Ints:
     """Return the bodies that a unit has to go around: enemies that stand, and friends that fight or hold."""
-    bodies = world.live
-    bodies = bodies[(world.layer_bits.take(bodies) & world.layer_bits[one]) != 0]
-    bodies = bodies[~world.walled.take(bodies) & ~world.wants.take(bodies)]
+    bodies = standing[(world.layer_bits.take(standing) & world.layer_bits[one]) != 0]
     busy = (world.target.take(bodies) != NOBODY) | world.holds.take(bodies)
     chosen: Ints = bodies[busy | (world.owner.take(bodies) != world.owner[one])]
     return chosen
