@@ -63,6 +63,8 @@ class Flow:
             return
         at, radius = (at - self.low) * FINE, radius * FINE
         half = math.ceil(float(radius.max()))
+        near = which(np.logical_and.reduce((at > -half) & (at < (self.width + half, self.height + half)), axis=1))
+        at, radius = at.take(near, 0), radius.take(near)
         square = np.arange(-half, half + 1)
         x, dx = _columns(at[:, 0], square, self.width)
         y, dy = _columns(at[:, 1], square, self.height)
@@ -76,6 +78,8 @@ class Flow:
         Of ways that are equally short each takes the one that leads nearer to its goal (k, 2). Where a walker is about
         to arrive others of its ``width`` find no room, and go on to the next place.
         """
+        if not np.count_nonzero(self.free & self.wanted):
+            return at, np.zeros(len(at), dtype=np.bool_)
         points, found, arriving = self._ahead(at, goal)
         first = which(arriving)
         first = first[_without_overlap(points[first], geometry.length(points[first] - at[first]), width)]

@@ -96,8 +96,12 @@ class Surface:
 
     def centre(self, cells: Ints) -> Floats:
         """Return the centres (..., 2) of cells."""
-        middle = 0.5 - self.shift
-        return np.stack([cells % self.width + middle, cells // self.width + middle], axis=-1)
+        centre = np.empty((*cells.shape, 2))
+        rows = cells // self.width
+        centre[..., 0] = cells - rows * self.width
+        centre[..., 1] = rows
+        centre += 0.5 - self.shift
+        return centre
 
     def nearest(self, point: Floats, part: int, starts: Floats) -> Ints:
         """Return (k,) the cells of a connected part nearest to a point; the side of each start decides near ties."""

@@ -1,9 +1,10 @@
 """Avoidance: how a walker that bodies block finds a heading around them.
 
-Melee units go where ``flanking`` leads them. Any other blocked walker looks in a fan of headings around its way, takes
-the free one that turns it least, and keeps to its chosen side until it has made progress for a while. Bodies that stand
-or come towards it and the terrain count as obstacles, ``collision`` handles those that go the same way. The game's own
-local avoidance is not known; all of this is an estimate.
+Melee units go where ``flanking`` leads them. Any other blocked walker goes round those who stand ahead of it, on the
+side where fewer of them are: so a crowd parts in two, and ranged units spread into an arc. It looks in a fan of
+headings around its way, on that side first, takes the free one that turns it least, and keeps the side until it has
+made progress for a while. Bodies that stand or come towards it and the terrain count as obstacles, ``collision``
+handles those that go the same way. The game's own local avoidance is not known; all of this is an estimate.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from khala_simulator.numeric.arrays import some, which
 from khala_simulator.systems import flanking
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.numeric.geometry import Floats
@@ -29,6 +31,7 @@ FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
 FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG])
 FAN_SIN = np.array([math.sin(math.radians(a)) for a in FAN_DEG])
 SEEN_AHEAD = 0.7
+LINE = 7.0  # how near bodies count for the side on which to go round them
 TOLERANCE = 0.02
 LAYERS = tuple(Layer)
 AIR = Layer.AIR
@@ -63,13 +66,29 @@ def _flowing(world: World, slots: Ints) -> Bools:
 
 
 def begin(world: World, slots: Ints, shift: Floats) -> None:
-    """Make blocked walkers look for a way around, first on the side to which ``shift`` (k, 2) pushed them."""
-    intended = world.intended.take(slots, 0)
-    pushed = intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0]
-    side = np.where(pushed >= 0.0, 1, -1)
+    """Make blocked walkers look for a way around, first on the side where fewer stand or to which ``shift`` pushed."""
     kept = world.detour.take(slots)
-    world.detour[slots] = np.where(kept != 0, kept, side)
     world.detour_end[slots] = world.loop + MECHANICS.detour_loops
+    new = which(kept == 0)
+    if not new.size:
+        return
+    slots, shift = slots.take(new), shift.take(new, 0)
+    intended = world.intended.take(slots, 0)
+    beside = _beside(world, slots, intended)
+    pushed = intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0]
+    world.detour[slots] = np.where(np.where(beside == 0.0, pushed, -beside) >= 0.0, 1, -1)
+
+
+def _beside(world: World, slots: Ints, way: Floats) -> Floats:
+    """Return (k,) how far to the left of their ways the bodies stand that are near and ahead, summed up."""
+    bodies = world.live
+    bodies = bodies[~world.wants.take(bodies) & (world.layer.take(bodies) != AIR)]
+    at, there = world.pos.take(slots, 0), world.pos.take(bodies, 0)
+    dx, dy = there[:, 0] - at[:, 0, None], there[:, 1] - at[:, 1, None]
+    x, y = way[:, 0, None], way[:, 1, None]
+    near = (dx * dx + dy * dy < LINE * LINE) & (dx * x + dy * y > 0.0)
+    beside: Floats = np.add.reduce((dy * x - dx * y) * near, axis=1)
+    return beside
 
 
 def _look(world: World, slots: Ints) -> None:
@@ -84,7 +103,9 @@ def _look(world: World, slots: Ints) -> None:
     found = free[rows, first]
     chosen = headings[rows, first]
     straight = found & (first == 0)
-    world.detour[slots] = np.where(found & (first > len(FAN_DEG)), -side, side)
+    # an army on its way to a fight keeps to its sides: who turned back would meet those that follow
+    turns = found & (first > len(FAN_DEG)) & (world.target.take(slots) != NOBODY)
+    world.detour[slots] = np.where(turns, -side, side)
     world.aside[slots] = np.where((found & ~straight)[:, None], chosen, 0.0)
 
 

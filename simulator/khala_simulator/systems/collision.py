@@ -222,7 +222,7 @@ def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
 def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
     """Return positions (k, 2) kept a body's clearance away from blocked cells; where there is no room they stay."""
     cell = surface.cell(after)
-    corner = surface.centre(cell) - 0.5
+    corner = np.floor(after + surface.shift) - surface.shift
     room = clearance[:, None]
     low, high = surface.walls_low.take(cell, 0), surface.walls_high.take(cell, 0)
     kept = np.minimum(np.maximum(after, corner + low * room), corner + 1.0 - high * room)
