@@ -9,6 +9,10 @@ centres are r + t + R apart, and stands s, its separation radius, away from othe
 pi / asin(s / (r + t + R)) of them. Round a group it is the perimeter of the hull of its centres plus the circle's,
 divided by 2 s. `fit` is that bound, for Zerglings taken at every loop for the Zealots that live then and at most the
 number of Zerglings.
+
+Ranged units that come as far as their range and stop there stand in one row, on a circle: `fit deg` is the angle of it
+that all of them cover shoulder to shoulder. Units that walk in single file at speed v pass a point every 2 s / v:
+`file s` is how long the last one comes after the first, through a gap in one file, round a target in one to each side.
 """
 
 from __future__ import annotations
@@ -59,6 +63,7 @@ WALLS: Final = 9999
 FOREVER: Final = 1e6
 MOST_LOOPS: Final = 1600
 AGAIN_LOOPS: Final = 400
+ARC_LOOPS: Final = 300
 SECOND: Final = 22.4
 EDGE: Final = 1e-9
 BATTLES: Final[dict[str, dict[str, int]]] = {
@@ -144,6 +149,17 @@ def _touching(world: World, slots: set[int], room: float) -> set[int]:
             )
         }
     return group
+
+
+def arc_of(world: World, attacker: str, target: str, count: int) -> float:
+    """Return the angle in degrees that a row of units covers at the distance at which they reach a target."""
+    one, other = world.catalog.unit(attacker), world.catalog.unit(target)
+    return math.degrees(2.0 * count * math.asin(one.separation / (one.radius + other.radius + one.weapons[0].range)))
+
+
+def file_of(world: World, slots: list[int]) -> float:
+    """Return how many seconds the last of units of one type in single file comes after the first."""
+    return (len(slots) - 1) * 2.0 * float(world.separation[slots[0]]) / float(world.step_max[slots[0]]) / SECOND
 
 
 # experiments ----------------------------------------------------------------------------------------------------------
@@ -244,7 +260,7 @@ def ring(seed: int, attacker: str, target: str, count: int = 20) -> dict[str, fl
 
 
 def choke(seed: int, cells: int) -> dict[str, float]:
-    """Send 12 Marines through a gap to a target behind it; return the seconds until the first, half and all fire."""
+    """Send 12 Marines through a gap to a target behind it; return when the first, half and all of them reach it."""
     world = fresh(seed)
     x, y = (int(v) for v in MIDDLE)
     height = world.map.terrain.size[1]
@@ -260,7 +276,8 @@ def choke(seed: int, cells: int) -> dict[str, float]:
         advance(world)
         when += [world.loop / SECOND] * (int(world.in_reach[mine].sum()) - len(when))
     when += [math.nan] * (len(mine) - len(when))
-    return {"first s": when[0], "half s": when[len(mine) // 2 - 1], "all s": when[-1]}
+    first, half, last = when[0], when[len(mine) // 2 - 1], when[-1]
+    return {"first s": first, "half s": half, "all s": last, "file s": file_of(world, mine)}
 
 
 def arc(seed: int, attacker: str = "Marine", count: int = 24) -> dict[str, float]:
@@ -274,23 +291,19 @@ def arc(seed: int, attacker: str = "Marine", count: int = 24) -> dict[str, float
     foe = put(world, "Ultralisk", 2, [MIDDLE])
     still(world, foe)
     commands.attack_move(world, mine, MIDDLE)
-    first = 0
-    reached = []
-    for _ in range(400):
+    reached: list[int] = []
+    covered: list[float] = []
+    while len(reached) < ARC_LOOPS:
         advance(world)
-        if world.in_reach[mine].any() or first:
-            first = first or world.loop
-            reached.append(int(world.in_reach[mine].sum()))
-    offset = world.pos[mine][world.in_reach[mine]] - world.pos[foe[0]]
-    angle = np.degrees(np.arctan2(offset[:, 1], -offset[:, 0]))
-    all_in = next((i for i, n in enumerate(reached) if n == count), None)
-    return {
-        "reach 1 s": reached[22] / count,
-        "2 s": reached[44] / count,
-        "end": reached[-1] / count,
-        "all s": math.nan if all_in is None else all_in / SECOND,
-        "arc deg": float(np.ptp(angle)),
-    }
+        firing = world.pos[mine][world.in_reach[mine]] - world.pos[foe[0]]
+        if len(firing) or reached:
+            reached.append(len(firing))
+            covered.append(float(np.degrees(np.ptp(np.arctan2(firing[:, 1], -firing[:, 0])))))
+    share = {f"reach {second} s": reached[int(second * SECOND)] / count for second in (1, 2, 4, 8)}
+    angle = {f"deg {second} s": covered[int(second * SECOND)] for second in (1, 2, 4, 8)}
+    all_in = next((loop / SECOND for loop, n in enumerate(reached) if n == count), math.nan)
+    end = {"end": reached[-1] / count, "deg": covered[-1], "fit deg": arc_of(world, attacker, "Ultralisk", count)}
+    return share | angle | {"all s": all_in, "file s": file_of(world, mine[: count // 2])} | end
 
 
 def second_row(seed: int) -> dict[str, float]:
@@ -416,7 +429,7 @@ def moments(path: Path, seconds: Sequence[float] = (0.0, 1.0, 3.0)) -> None:
     cv2.imwrite(str(path), np.hstack(images))
 
 
-def picture(world: World, half: Place = (4.5, 4.0)) -> NDArray[np.uint8]:
+def picture(world: World, half: Place = (4.5, 5.0)) -> NDArray[np.uint8]:
     """Draw a fight: bodies and where they face, filled where they are in reach of their target."""
     around = world.pos[world.live].mean(axis=0)
     image = np.full((int(2 * half[1] * SCALE), int(2 * half[0] * SCALE), 3), 245, dtype=np.uint8)
@@ -432,6 +445,7 @@ def picture(world: World, half: Place = (4.5, 4.0)) -> NDArray[np.uint8]:
             cv2.circle(image, at, int(radius * SCALE), colour, -1, cv2.LINE_AA)
         cv2.circle(image, at, int(radius * SCALE), colour, 2, cv2.LINE_AA)
         cv2.line(image, at, front, (30, 30, 30), 2, cv2.LINE_AA)
+    image[:, -3:] = 255  # between two moments
     return image
 
 
