@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from array import array
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Final
 
@@ -302,16 +303,13 @@ class _Field:
     def __init__(self, goal: int, cells: int) -> None:
         self.distance = [math.inf] * cells
         self.distance[goal] = 0.0
-        self.towards = list(range(cells))
+        self.towards = array("q", np.arange(cells).tobytes())
         self._settled = bytearray(cells)
         self._heap = [(0.0, goal)]
-        self._array: Ints | None = None
 
     def towards_array(self) -> Ints:
-        """Return (cells,) ``towards`` as an array; cells that are not settled have no meaning in it."""
-        if self._array is None:
-            self._array = np.array(self.towards)
-        return self._array
+        """Return (cells,) ``towards`` as an array that shares its memory; cells not settled have no meaning in it."""
+        return np.frombuffer(self.towards, dtype=np.int64)
 
     def reach(self, cells: list[int], steps: list[int], edges: list[list[tuple[int, float]]]) -> None:
         """Go on until all of ``cells`` are settled or nothing is left to settle."""
@@ -332,7 +330,6 @@ class _Field:
                     distance[neighbour] = further
                     towards[neighbour] = cell
                     heapq.heappush(heap, (further, neighbour))
-        self._array = None
 
 
 @lru_cache(maxsize=64)

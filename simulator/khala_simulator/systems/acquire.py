@@ -47,9 +47,10 @@ def choose_targets(world: World) -> None:
     n = world.top
     due = world.looks_around[:n] | (world.guns_walking[:n] & world.walks[:n])
     due &= world.acquires[:n]
-    due &= ~_peaceful(world)
     due &= world.scan_loop[:n] <= world.loop
     due &= world.windup[:n] < 0.0
+    if some(workers := due & world.defensive[:n]):
+        due &= ~(workers & ~_seeks_fights(world.order_kind[:n]))
     content = world.in_reach[:n] & (world.target[:n] != NOBODY)
     if world.loop % MECHANICS.look_up_period == 0:
         content &= world.rank[:n] >= TOP_RANK
@@ -69,12 +70,10 @@ def choose_targets(world: World) -> None:
             _seek(world, player, mine)
 
 
-def _peaceful(world: World) -> Bools:
-    """Return whether each unit leaves fighting to others: a worker does, unless it attack-moves or patrols."""
-    n = world.top
-    order = world.order_kind[:n]
-    peaceful: Bools = world.defensive[:n] & (order != ATTACK_MOVE) & (order != PATROL)
-    return peaceful
+def _seeks_fights(order: Ints) -> Bools:
+    """Return whether workers with these orders pick fights by themselves."""
+    seeks: Bools = (order == ATTACK_MOVE) | (order == PATROL)
+    return seeks
 
 
 def _give_up(world: World, seekers: Ints) -> None:
@@ -250,4 +249,4 @@ def _friends_near(world: World, victim: int) -> list[int]:
 def _free_to_answer(world: World, slot: int) -> bool:
     roams = world.looks_around[slot] and not (world.holds[slot] or world.leashed[slot]) and world.step_max[slot] > 0.0
     free = world.acquires[slot] and world.target[slot] == NOBODY
-    return bool(roams and free and not (world.defensive[slot] and _peaceful(world)[slot]))
+    return bool(roams and free and (not world.defensive[slot] or _seeks_fights(world.order_kind[slot])))
