@@ -100,8 +100,8 @@ def test_who_comes_through_a_gap_behind_others_goes_on_to_either_side(field: Any
     world.life[foe] = world.life_max[foe] = 1e6
     slots = [field.put("Marine", 1, *place) for place in rows(12, 3, 5, 15.3, 0.8)]
     commands.attack_move(world, slots, (24, 16.5))
-    field.until(lambda: world.in_reach[slots].any(), most=100)
-    field.until(lambda: world.in_reach[slots].all(), most=200)
+    field.until(lambda: world.in_reach[slots].sum() >= 1, most=100)
+    field.until(lambda: world.in_reach[slots].sum() == len(slots), most=200)
 
 
 def test_a_column_of_marines_spreads_until_most_of_them_fire(field: Any) -> None:
