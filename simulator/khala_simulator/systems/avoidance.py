@@ -31,7 +31,6 @@ FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
 FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG])
 FAN_SIN = np.array([math.sin(math.radians(a)) for a in FAN_DEG])
 SEEN_AHEAD = 0.7
-LINE = 7.0  # how near bodies count for the side on which to go round them
 TOLERANCE = 0.02
 LAYERS = tuple(Layer)
 AIR = Layer.AIR
@@ -86,7 +85,7 @@ def _beside(world: World, slots: Ints, way: Floats) -> Floats:
     at, there = world.pos.take(slots, 0), world.pos.take(bodies, 0)
     dx, dy = there[:, 0] - at[:, 0, None], there[:, 1] - at[:, 1, None]
     x, y = way[:, 0, None], way[:, 1, None]
-    near = (dx * dx + dy * dy < LINE * LINE) & (dx * x + dy * y > 0.0)
+    near = (dx * dx + dy * dy < MECHANICS.detour_look**2) & (dx * x + dy * y > 0.0)
     beside: Floats = np.add.reduce((dy * x - dx * y) * near, axis=1)
     return beside
 

@@ -53,6 +53,7 @@ class Mechanics:
     detour_after: int
     detour_period: int
     detour_loops: int
+    detour_look: float
     flank_period: int
     flank_look: float
     flank_reach: float
