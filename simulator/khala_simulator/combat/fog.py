@@ -38,8 +38,7 @@ def remember(world: World, player: int) -> None:
     seen = world.visible[player, slots]
     if not memory.made:  # the game shows where the neutral things are from the start
         seen = seen | (world.owner[slots] == NEUTRAL)
-    for slot in slots[seen].tolist():
-        _note(world, memory, slot)
+    _note(world, memory, slots[seen])
     in_sight = {int(world.tag[slot]) for slot in slots[world.visible[player, slots]].tolist()}
     hidden = [s for s in memory.of_unit.values() if s.unit not in in_sight]
     for snapshot in hidden:
@@ -48,22 +47,17 @@ def remember(world: World, player: int) -> None:
     memory.shown = [s for s in hidden if s.unit in memory.of_unit]
 
 
-def _note(world: World, memory: FogMemory, slot: int) -> None:
-    tag = int(world.tag[slot])
-    known = memory.of_unit.get(tag)
-    if known is None:
-        memory.made += 1
-    index = memory.made if known is None else (known.tag - TAG_BASE) >> INDEX_SHIFT
-    (x, y), (hx, hy) = world.pos[slot].tolist(), world.heading[slot].tolist()
-    memory.of_unit[tag] = RememberedUnit(
-        tag=TAG_BASE | index << INDEX_SHIFT,
-        unit=tag,
-        row=int(world.type[slot]),
-        owner=int(world.owner[slot]),
-        pos=(x, y),
-        heading=(hx, hy),
-        build_progress=float(world.build_progress[slot]),
-    )
+def _note(world: World, memory: FogMemory, slots: NDArray[np.int64]) -> None:
+    """Remember units as they are now; most are resources and finished structures, the same as the last time."""
+    columns = (world.tag, world.type, world.owner, world.pos, world.heading, world.build_progress)
+    for tag, row, owner, (x, y), (hx, hy), progress in zip(*(c[slots].tolist() for c in columns), strict=True):
+        known, now = memory.of_unit.get(tag), (row, owner, (x, y), (hx, hy), float(progress))
+        if known is not None and now == (known.row, known.owner, known.pos, known.heading, known.build_progress):
+            continue
+        if known is None:
+            memory.made += 1
+        own_tag = TAG_BASE | memory.made << INDEX_SHIFT if known is None else known.tag
+        memory.of_unit[tag] = RememberedUnit(own_tag, tag, *now)
 
 
 def _place_is_seen(world: World, player: int, snapshot: RememberedUnit) -> bool:
