@@ -9,6 +9,7 @@ import numpy as np
 
 from khala_simulator.opponent import hands, stance
 from khala_simulator.opponent.enemy import value
+from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
@@ -25,6 +26,9 @@ FULL_ARMY: Final = 20.0
 EASY: Final = 1.6
 """An army so many times the enemy's is an easy win, with at least so much supply."""
 LEAST_EASY: Final = 16.0
+COUNTER_S: Final = 15.0
+BATTLE: Final = 0.5
+"""For so long after enemies were repelled that were worth this share of the own army there may be a counter-attack."""
 SPENT: Final = 0.3
 """An attack is over when this share of its value is left."""
 REINFORCE: Final = 0.15
@@ -39,7 +43,8 @@ SEEN_EMPTY: Final = 6.0
 def set_out(side: Side, enemy: Enemy) -> None:
     """Begin an attack when its time has come and the army is large enough.
 
-    A level that adapts waits while it knows of a stronger army; one that sees everything goes early against a weak one.
+    A level that adapts waits while it knows of a stronger army, and goes early against one that has just lost a battle
+    at the own bases; one that sees everything goes early against every weak one.
     """
     mind, first, own = side.mind, side.build.attack, side.army_supply
     if side.world.loop < mind.attack_from:
@@ -47,10 +52,17 @@ def set_out(side: Side, enemy: Enemy) -> None:
     known = enemy.army_supply() if "adapt" in side.level.skills else 0.0
     enough = max(first.supply * side.level.wave * mind.wave, 2.0)
     on_time = side.clock_s >= first.from_s and own >= max(enough, known)
-    easy = side.level.vision and own >= max(LEAST_EASY, EASY * known)
+    easy = (side.level.vision or _won(side)) and own >= max(LEAST_EASY, EASY * known)
     if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
         mind.attacking = True
         mind.wave_value = value(side.world, side.army)
+
+
+def _won(side: Side) -> bool:
+    """Return whether an attack on the own bases that was worth something has just been repelled."""
+    when, worth = side.mind.repelled
+    recent = when >= 0 and side.world.loop - when < COUNTER_S * FASTER_LOOPS
+    return recent and "adapt" in side.level.skills and worth > BATTLE * value(side.world, side.army)
 
 
 def go_on(side: Side, enemy: Enemy, army: list[int]) -> None:

@@ -54,16 +54,27 @@ class Attack(Data):
     supply: float
 
 
+class Guard(NamedTuple):
+    """Below how much army supply the army comes first: m minutes after ``from_s`` it is growth * m * (m + 1)."""
+
+    from_s: float
+    growth: float
+
+    def supply(self, at_s: float) -> float:
+        """Return that army supply at a time of the build's clock."""
+        minutes = max(0.0, at_s - self.from_s) / 60.0
+        return self.growth * minutes * (minutes + 1.0)
+
+
 class Build(Data):
     """One way to play a race.
 
-    With ``saves``, a step of the opening whose time has come is paid before more workers are. ``guard`` says below how
-    much army supply the army comes first; it grows with the square of the time.
+    With ``saves``, a step of the opening whose time has come is paid before more workers are.
     """
 
     opening: tuple[Step, ...]
     attack: Attack
-    guard: float
+    guard: Guard
     saves: bool = False
     stages: tuple[Stage, ...]
 

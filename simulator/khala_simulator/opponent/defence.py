@@ -18,11 +18,16 @@ from khala_simulator.world.orders import OrderKind
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
+    from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Ints
 
-HOME: Final = 22.0
+HOME: Final = 16.0
 """Enemies so near to an own town hall are a threat; HARM is for other structures."""
-HARM: Final = 12.0
+HARM: Final = 9.0
+AT_WORK: Final = 11.0
+"""Workers help, and a weak army fights, only against enemies so near to a town hall."""
+HOPELESS: Final = 2.0
+"""Workers don't fight what is worth so many times more than all of them."""
 SCOUTS: Final = 2
 """So few enemy workers at a base are scouts and no threat."""
 RECALL: Final = 0.3
@@ -34,9 +39,12 @@ def watch(side: Side, enemy: Enemy) -> Ints | None:
     threat = threats(side, enemy)
     mind, world = side.mind, side.world
     if not threat.size:
-        mind.alarm, mind.threat = NEVER, None
+        if mind.threat is not None:
+            mind.repelled = world.loop, mind.worst
+        mind.alarm, mind.threat, mind.worst = NEVER, None, 0.0
         _release(side)
         return None
+    mind.worst = max(mind.worst, value(world, threat))
     if mind.alarm == NEVER:
         mind.alarm = world.loop
     if world.loop - mind.alarm < side.level.reaction_s * FASTER_LOOPS:
@@ -72,7 +80,8 @@ def _nearest_home(side: Side, threat: Ints) -> int:
 def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
     """Send the army at home against enemies at the bases, and workers; return who goes on with the attack.
 
-    An attack is called off where the army at home is too weak, unless the threat is small beside the whole army.
+    An attack is called off where the army at home is too weak, unless the threat is small beside the whole army. An
+    army that is too weak alone waits at its front until the enemies are between its workers.
     """
     world, mind = side.world, side.mind
     strength, at = value(world, threat), mind.threat or mind.bases[0]
@@ -82,6 +91,9 @@ def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
         stance.call_off(side)
         home = army
     helpers = home + side.named("Queen")
+    if _waits(side, helpers, at, strength):
+        stance.gather_up(side, home)
+        return [s for s in army if s not in set(home)]
     idle = [s for s in helpers if world.target[s] == NOBODY and not stance.bound_for(side, s, at, 6.0)]
     if idle:
         hands.attack(side, idle, at)
@@ -89,16 +101,26 @@ def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
     return [s for s in army if s not in set(home)]
 
 
+def _waits(side: Side, helpers: list[int], at: Point, strength: float) -> bool:
+    """Return whether the army at home should not go to the enemies yet."""
+    weak = value(side.world, helpers) < side.level.retreat * strength
+    return weak and not _at_work(side, at)
+
+
+def _at_work(side: Side, at: Point) -> bool:
+    return any(math.dist(side.place(hall), at) < AT_WORK for hall in side.halls)
+
+
 def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
     """Make workers fight while the army at home is weaker than the threat."""
     world, mind = side.world, side.mind
     threat_at = mind.threat or mind.bases[0]
     lacking = 1.15 * strength - value(world, army) - value(world, _static(side))
-    near = any(math.dist(side.place(h), threat_at) < HOME - 6.0 for h in side.halls)
-    if lacking <= 0.0 or not near or not side.level.pull:
+    most = int(side.level.pull * len(side.workers))
+    hopeless = lacking > HOPELESS * most * WORKER_VALUE
+    if lacking <= 0.0 or hopeless or not _at_work(side, threat_at):
         _release(side)
         return
-    most = int(side.level.pull * len(side.workers))
     wanted = min(most, math.ceil(lacking / WORKER_VALUE))
     mind.pulled = [tag for tag in mind.pulled if world.slot_of(tag) != NOBODY]
     candidates = [w for w in side.workers if world.carrier[w] == NOBODY and not world.casts[w]]

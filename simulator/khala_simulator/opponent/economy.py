@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 GAS_WORKERS: Final = 3
 MOVED_AT_ONCE: Final = 4
 """How many workers change to another base in one thought."""
-GAS_ENOUGH: Final = 400.0
-"""With so much vespene unspent and few minerals, gas structures get one worker only."""
+GAS_ENOUGH: Final = 250.0
+"""With so much vespene unspent, and less than half as many minerals, gas structures get one worker only."""
 A_HALL: Final = 16
 """Workers on the minerals of one base."""
 AHEAD_S: Final = 22.0
@@ -92,7 +92,7 @@ def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
 
 def _fill_gas(side: Side, staff: Staff) -> None:
     world = side.world
-    plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < GAS_ENOUGH / 2
+    plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < side.owner.vespene / 2
     wanted = 1 if plenty else GAS_WORKERS
     for gas, (assigned, _) in sorted(staff.gas.items()):
         if assigned > wanted and plenty:
@@ -130,9 +130,9 @@ def keep_supply_ahead(side: Side) -> None:
     coming = provides * (side.count(name) - len(side.kind(name)))
     hall = side.world.catalog.unit(side.race.hall).provides
     coming += hall * len(side.begun.get(side.race.hall, ())) * 0.5
-    planned = any(step.what == name for step in side.build.opening[side.mind.step :])
+    planned = any(step.what == name for step in side.build.opening[side.mind.step : side.mind.step + 1])
     soon = side.cap + coming
-    if (planned and side.cap - side.used > 2.0) or soon >= supply.LIMIT or soon - side.used > _ahead(side):
+    if (planned and side.cap > side.used) or soon >= supply.LIMIT or soon - side.used > _ahead(side):
         return
     products.make(side, name)
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
 
-GUARD_FROM_S: Final = 90.0
-"""Before this, no army is expected; the minutes m from then on ask for guard * m * (m + 1) of army supply."""
 MOST_GUARD: Final = 100.0
 QUEEN: Final = 1.5
 """What a Queen counts as army supply."""
@@ -39,12 +37,14 @@ FULL_SHARE: Final = 0.8
 ORBITAL: Final = "OrbitalCommand"
 SPARSE: Final = 4
 """A base that wants so few workers on its minerals is mined out."""
+ADDONS: Final = ("TechLab", "Reactor")
 LEVELS: Final = ("Level1", "Level2", "Level3")
 
 
 def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     """Spend the money of this thought."""
     economy.keep_supply_ahead(side)
+    keep_for_addons(side)
     danger = in_danger(side, enemy)
     if danger:
         train_army(side)
@@ -72,8 +72,7 @@ def _opening_and_workers(side: Side, enemy: Enemy, staff: Staff) -> bool:
 def in_danger(side: Side, enemy: Enemy) -> bool:
     """Return whether the army comes before everything else."""
     own = side.army_supply + _coming(side) + QUEEN * len(side.named("Queen"))
-    minutes = max(0.0, side.clock_s - GUARD_FROM_S) / 60.0
-    expected = min(MOST_GUARD, side.build.guard * minutes * (minutes + 1.0)) * side.level.production
+    expected = min(MOST_GUARD, side.build.guard.supply(side.clock_s)) * side.level.production
     known = enemy.army_supply() if "adapt" in side.level.skills or side.level.vision else 0.0
     attacked = side.mind.threat is not None and side.mind.alarm >= 0
     return own < max(expected, 0.8 * known) or (attacked and own < 1.5 * known + 4.0)
@@ -108,6 +107,13 @@ def change_halls(side: Side) -> None:
     """Change the kind of a town hall before it trains the next worker, once the build wants that."""
     if side.count(ORBITAL) < side.stage.structures.get(ORBITAL, 0):
         products.make(side, ORBITAL)
+
+
+def keep_for_addons(side: Side) -> None:
+    """Keep a producer of each kind idle whose add-on is missing and paid: busy ones can't build it."""
+    for name, wanted in side.stage.structures.items():
+        if name.endswith(ADDONS) and side.count(name) < _scaled(side, wanted):
+            products.keep_for(side, name)
 
 
 def expand(side: Side, enemy: Enemy, staff: Staff) -> None:

@@ -17,6 +17,7 @@ from khala_simulator.economy import harvesting, production
 from khala_simulator.economy.harvesting import Phase
 from khala_simulator.economy.requirements import ALIAS
 from khala_simulator.opponent import hands, sites
+from khala_simulator.opponent.side import names_of
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import NO_TAG
@@ -62,8 +63,13 @@ def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
 @lru_cache(maxsize=512)
 def ways(catalog: Catalog, name: str) -> tuple[Ability, ...]:
     """Return the abilities that make a type of unit or an upgrade."""
-    made = [a for a in catalog.abilities if a.effect in MAKES and name in (a.unit, a.upgrade) and a.users]
+    made = [a for a in catalog.abilities if a.effect in MAKES and name in (a.unit, a.upgrade) and not _back(catalog, a)]
     return tuple(sorted(made, key=lambda a: (a.effect != "warp_in", a.id)))
+
+
+def _back(catalog: Catalog, ability: Ability) -> bool:
+    """Return whether an ability makes nothing new, as when a Warp Gate, which counts as a Gateway, becomes one."""
+    return bool(ability.unit) and set(ability.users) <= set(names_of(catalog, ability.unit))
 
 
 def lacking(side: Side, name: str) -> str:
@@ -104,8 +110,23 @@ def _is_free(side: Side, slot: int, ability: Ability) -> bool:
         return casting.cooldown_left(world, slot, ability) <= 0.0
     if ability.effect == "grow":
         return world.target[slot] == NOBODY and not world.casts[slot]
+    if ability.effect == "train" and slot in side.kept:
+        return False
     parallel = production.parallel(world, slot) if ability.effect == "train" else 1
     return len(world.jobs.get(slot, ())) < parallel
+
+
+def keep_for(side: Side, name: str) -> None:
+    """Keep the structure that is free first from training, so that an add-on can be made there."""
+    world, ability = side.world, ways(side.world.catalog, name)[0]
+    bare = [s for s in side.named(*ability.users) if world.addon[s] == NOBODY and s not in side.kept]
+    if bare and side.purse.affords(ability):
+        side.kept.add(min(bare, key=lambda s: (len(world.jobs.get(s, ())), -_done(world, s), s)))
+
+
+def _done(world: World, slot: int) -> float:
+    """Return what part of its first job a structure has done."""
+    return max((job.done / job.loops for job in world.jobs.get(slot, ())[:1]), default=1.0)
 
 
 def _order(side: Side, ability: Ability, makers: list[int], near: Point | None) -> bool:

@@ -78,6 +78,7 @@ class Side:
         self.purse = Purse(self.owner.minerals, self.owner.vespene, self.cap - self.used)
         self.ordered = self._ordered()
         self.underway = Counter(self.owner.underway)
+        self.kept: set[int] = set()  # structures that train nothing, for an add-on
 
     # time ---------------------------------------------------------------------------------------------------------
 
@@ -99,11 +100,11 @@ class Side:
 
     def kind(self, name: str) -> list[int]:
         """Return own finished units that count as a type: a Warp Gate is a Gateway."""
-        return self.named(*_names(self.world.catalog, name))
+        return self.named(*names_of(self.world.catalog, name))
 
     def count(self, name: str) -> int:
         """Return how many of a type, or of what counts as it, exist, are being made, or are ordered."""
-        names = _names(self.world.catalog, name)
+        names = names_of(self.world.catalog, name)
         exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) for n in names)
         return exist + sum(self.underway[n] for n in names if n not in self.begun) + self.ordered[name]
 
@@ -164,6 +165,6 @@ class Side:
 
 
 @lru_cache(maxsize=512)
-def _names(catalog: Catalog, name: str) -> tuple[str, ...]:
+def names_of(catalog: Catalog, name: str) -> tuple[str, ...]:
     """Return the names of the types that count as a type."""
     return tuple(sorted(catalog.units[row].name for row in counts_as(catalog, name, alias=True)))

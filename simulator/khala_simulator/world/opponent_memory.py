@@ -43,6 +43,8 @@ class OpponentMemory:
     searched: int = 0  # how many bases the army has found empty
     alarm: int = NEVER  # since when enemies are seen at its bases
     threat: Point | None = None
+    worst: float = 0.0  # worth of the enemies there at their most
+    repelled: tuple[int, float] = (NEVER, 0.0)  # when the last threat was over, and its worth
     pulled: list[int] = field(default_factory=list)  # workers that defend
     scout: int = 0
     scouted: int = 0  # how many places the scout has seen
