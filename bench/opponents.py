@@ -4,11 +4,13 @@
     python -m bench.opponents growth --races terran --levels 1 7 --minutes 5
     python -m bench.opponents ladder --race zerg --games 10     each pair of levels, one race against itself
     python -m bench.opponents ladder --neighbours --games 10    each level against the one below it, nine match-ups
+    python -m bench.opponents ladder --pairs 7-8 --log won.jsonl     one pair; games in the file are not played again
     python -m bench.opponents speed                             loops per second of a game with and without them
 
 Straight on the engine, without the SC2 API. A pair plays each seed from both seats in turn. A game that is not over
 after `--minutes` goes to the side whose units and structures cost more, if it has a quarter more; else it is drawn.
-The levels were tuned on seeds below 1000; the ladder begins with seed 1000. `--json` for one JSON object.
+The levels were tuned on seeds below 100; the ladder begins with seed 100. `--json` for one JSON object. With `--log`
+each game is written down when it is over, and a long ladder can be cut and gone on with; `--games 0` prints the file.
 """
 
 from __future__ import annotations
@@ -20,8 +22,9 @@ import math
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from bench.duels import wilson
@@ -103,7 +106,7 @@ def growth(game_map: str, seat: Seat, moments_s: Iterable[int], seed: int) -> li
     setups = [PlayerSetup(1, seat.race, "computer", difficulty=seat.level, build=seat.build)]
     world = new_game(load_map(game_map), [*setups, PlayerSetup(2, "terran", "agent")], seed=seed)
     mind = world.players[1].mind = player.begin(world, 1)
-    mind.attack_from = HELD_BACK
+    mind.attack_from = mind.next_drop = HELD_BACK
     rows = []
     for at_s in moments_s:
         before = at_s - 30
@@ -161,10 +164,10 @@ def _ahead(world: World) -> int:
     return 1 if worth[0] > worth[1] else 2
 
 
-def fixtures(pairs: Iterable[tuple[Seat, Seat]], games: int, seed: int) -> Iterator[tuple[Seat, Seat, int]]:
-    """Yield the games of each pair of a weaker and a stronger player: each seed from both seats in turn."""
-    for weaker, stronger in pairs:
-        for number in range(games):
+def fixtures(pairs: Sequence[tuple[Seat, Seat]], games: int, seed: int) -> Iterator[tuple[Seat, Seat, int]]:
+    """Yield the games of all pairs of a weaker and a stronger player: each seed from both seats, every pair in turn."""
+    for number in range(games):
+        for weaker, stronger in pairs:
             seats = (weaker, stronger) if number % 2 else (stronger, weaker)
             yield *seats, seed + number // 2
 
@@ -181,6 +184,14 @@ def neighbours(races: Sequence[str], levels: Sequence[int], build: int) -> list[
         for weaker, stronger in itertools.product(races, races)
         for a, b in itertools.pairwise(sorted(levels))
     ]
+
+
+def pairs_of(options: argparse.Namespace) -> list[tuple[Seat, Seat]]:
+    """Return the pairs that the options ask for."""
+    if options.neighbours:
+        return neighbours(options.races, options.levels, options.build)
+    every = ladder(options.race, options.levels, options.build)
+    return [(a, b) for a, b in every if not options.pairs or f"{a.level}-{b.level}" in options.pairs]
 
 
 # tables ---------------------------------------------------------------------------------------------------------------
@@ -225,18 +236,33 @@ def ladder_table(games: Iterable[Game]) -> Iterator[str]:
 
 
 def played(options: argparse.Namespace, pairs: Sequence[tuple[Seat, Seat]]) -> list[Game]:
-    """Play all games of the pairs, with their progress on stderr."""
-    todo = list(fixtures(pairs, options.games, options.seed))
-    done: list[Game] = []
-    columns = zip(*[(options.map, a, b, seed, options.minutes) for a, b, seed in todo], strict=True)
-    with ProcessPoolExecutor(max(1, options.processes)) as pool:
-        results: Iterable[Game] = (
-            pool.map(play, *columns) if options.processes > 1 else itertools.starmap(play, zip(*columns, strict=True))
-        )
-        for game in results:
-            done.append(game)
-            _progress(len(done), len(todo), f"{game.first.name} - {game.second.name}: {game.winner}")
+    """Play the games of the pairs that the log does not have yet; return all games, those of the log first."""
+    done = list(logged(options.log))
+    known = {(game.first, game.second, game.seed) for game in done}
+    todo = [row for row in fixtures(pairs, options.games, options.seed) if row not in known]
+    for number, game in enumerate(_games(options, todo), start=1):
+        done.append(game)
+        if options.log:
+            with options.log.open("a", encoding="utf-8") as file:
+                print(json.dumps(asdict(game)), file=file)
+        _progress(number, len(todo), f"{game.first.name} - {game.second.name}: {game.winner} at {game.minutes} min")
     return done
+
+
+def logged(log: Path | None) -> Iterator[Game]:
+    """Yield the games of a log, none if there is no such file."""
+    for line in log.read_text(encoding="utf-8").splitlines() if log and log.exists() else ():
+        row = json.loads(line)
+        yield Game(**{**row, "first": Seat(**row["first"]), "second": Seat(**row["second"])})
+
+
+def _games(options: argparse.Namespace, todo: Sequence[tuple[Seat, Seat, int]]) -> Iterator[Game]:
+    if options.processes < 2:
+        yield from (play(options.map, *row, options.minutes) for row in todo)
+        return
+    with ProcessPoolExecutor(options.processes) as pool:
+        waiting = [pool.submit(play, options.map, *row, options.minutes) for row in todo]
+        yield from (future.result() for future in as_completed(waiting))
 
 
 def _progress(done: int, whole: int, what: str) -> None:
@@ -287,10 +313,12 @@ def main() -> None:
     parser.add_argument("--races", nargs="*", default=list(RACES), choices=RACES)
     parser.add_argument("--levels", nargs="*", type=int, default=sorted(load_levels()))
     parser.add_argument("--neighbours", action="store_true", help="each level against the one below it, all match-ups")
+    parser.add_argument("--pairs", nargs="*", default=[], help="of levels, such as 3-4; every pair by default")
+    parser.add_argument("--log", type=Path, help="a file with a line for each game")
     parser.add_argument("--build", type=int, default=MACRO, help="AIBuild of the API; 1 chooses by the seed")
     parser.add_argument("--games", type=int, default=10, help="of each pair")
     parser.add_argument("--minutes", type=float, default=0.0, help="of game time; 8 for growth, 20 for games")
-    parser.add_argument("--seed", type=int, default=1000, help="of the first game")
+    parser.add_argument("--seed", type=int, default=100, help="of the first game")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
     options = parser.parse_args()
@@ -303,9 +331,7 @@ def main() -> None:
         rows = grown(options)
         lines = list(growth_table(rows))
     else:
-        every = ladder(options.race, options.levels, options.build)
-        pairs = neighbours(options.races, options.levels, options.build) if options.neighbours else every
-        rows = played(options, pairs)
+        rows = played(options, pairs_of(options))
         lines = list(ladder_table(rows))
     if options.json:
         json.dump({"command": " ".join(sys.argv), "rows": [asdict(row) for row in rows]}, sys.stdout)
