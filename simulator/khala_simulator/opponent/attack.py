@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
+    from khala_simulator.maps.game_map import GameMap
     from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
     from khala_simulator.world.casts import Point
@@ -38,6 +40,9 @@ SPREAD: Final = 11.0
 WITH: Final = 4.0
 """So near to the middle of the army its unarmed units stay."""
 SEEN_EMPTY: Final = 6.0
+SEARCH_S: Final = 60.0
+SEARCH_STEP: Final = 12
+"""With all bases empty, points so far apart all over the map are looked at, each for so many seconds at most."""
 
 
 def set_out(side: Side, enemy: Enemy) -> None:
@@ -54,7 +59,7 @@ def set_out(side: Side, enemy: Enemy) -> None:
     on_time = side.clock_s >= first.from_s and own >= max(enough, known)
     easy = (side.level.vision or _won(side)) and own >= max(LEAST_EASY, EASY * known)
     if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
-        mind.attacking = True
+        mind.attacking, mind.searched_since = True, side.world.loop
         mind.wave_value = value(side.world, side.army)
 
 
@@ -110,12 +115,23 @@ def _goal(side: Side, enemy: Enemy, army: list[int]) -> Point:
         offset = known - middle
         x, y = known[int(np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2))].tolist()
         return x, y
-    places = [mind.enemy_start, *reversed(mind.bases)]
+    places = [mind.enemy_start, *reversed(mind.bases), *_everywhere(world.map)]
     point = places[mind.searched % len(places)]
-    if any(math.dist(side.place(s), point) < SEEN_EMPTY for s in army):
-        mind.searched += 1
+    late = world.loop - mind.searched_since > SEARCH_S * FASTER_LOOPS
+    if late or any(math.dist(side.place(s), point) < SEEN_EMPTY for s in army):
+        mind.searched, mind.searched_since = mind.searched + 1, world.loop
         point = places[mind.searched % len(places)]
     return point
+
+
+@lru_cache(maxsize=4)
+def _everywhere(game_map: GameMap) -> tuple[Point, ...]:
+    """Return walkable points all over a map, row by row to and fro."""
+    y, x = np.nonzero(game_map.terrain.walk)
+    half = SEARCH_STEP // 2
+    on_grid = (x % SEARCH_STEP == half) & (y % SEARCH_STEP == half)
+    points = [(px + 0.5, py + 0.5) for px, py in zip(x[on_grid].tolist(), y[on_grid].tolist(), strict=True)]
+    return tuple(sorted(points, key=lambda p: (p[1], p[0] if p[1] // SEARCH_STEP % 2 else -p[0])))
 
 
 def _support(side: Side, there: list[int]) -> list[int]:

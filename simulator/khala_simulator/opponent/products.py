@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.abilities import casting
-from khala_simulator.economy import harvesting, production
+from khala_simulator.abilities.terran import addons
+from khala_simulator.economy import building_sites, harvesting, production
 from khala_simulator.economy.harvesting import Phase
 from khala_simulator.economy.requirements import ALIAS
 from khala_simulator.opponent import hands, sites
@@ -46,12 +47,14 @@ def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
     """Make one of a type or an upgrade, if possible now; structures ``near`` a point, by default in the main base."""
     found = Outcome.BLOCKED
     for ability in ways(side.world.catalog, name):
-        makers = list(_makers(side, ability))
-        if not makers or (ability.supply > 0.0 and ability.supply > side.purse.room):
+        if ability.supply > 0.0 and ability.supply > side.purse.room:
+            continue
+        maker = next(_makers(side, ability), NOBODY)
+        if maker == NOBODY:
             continue
         if not side.purse.affords(ability):
             found = Outcome.SHORT
-        elif _order(side, ability, makers, near):
+        elif _order(side, ability, maker, near):
             side.purse.spend(ability)
             side.underway[name] += 1
             return Outcome.DONE
@@ -91,15 +94,13 @@ def _structures(need: Need | None) -> Iterator[str]:
 
 
 def _makers(side: Side, ability: Ability) -> Iterator[int]:
-    """Yield the units that could use an ability now, cost aside; of workers and larvae only the first."""
+    """Yield the units that could use an ability now, cost aside."""
     world = side.world
     for slot in side.named(*ability.users):
         if not _is_free(side, slot, ability):
             continue
         if casting.refusal(world, slot, ability, free=True) is ActionResult.SUCCESS:
             yield slot
-            if ability.effect != "train" or not world.unit_type(slot).structure:
-                return
 
 
 def _is_free(side: Side, slot: int, ability: Ability) -> bool:
@@ -119,9 +120,13 @@ def _is_free(side: Side, slot: int, ability: Ability) -> bool:
 def keep_for(side: Side, name: str) -> None:
     """Keep the structure that is free first from training, so that an add-on can be made there."""
     world, ability = side.world, ways(side.world.catalog, name)[0]
-    bare = [s for s in side.named(*ability.users) if world.addon[s] == NOBODY and s not in side.kept]
-    if bare and side.purse.affords(ability):
-        side.kept.add(min(bare, key=lambda s: (len(world.jobs.get(s, ())), -_done(world, s), s)))
+    unit, bare = world.catalog.unit(ability.unit), [s for s in side.named(*ability.users) if world.addon[s] == NOBODY]
+    bare.sort(key=lambda s: (len(world.jobs.get(s, ())), -_done(world, s), s))
+    for slot in bare if side.purse.affords(ability) else ():
+        place = addons.place_of(world, slot)
+        if building_sites.refusal(world, side.player, unit, place) is ActionResult.SUCCESS:
+            side.kept.add(slot)
+            return
 
 
 def _done(world: World, slot: int) -> float:
@@ -129,12 +134,12 @@ def _done(world: World, slot: int) -> float:
     return max((job.done / job.loops for job in world.jobs.get(slot, ())[:1]), default=1.0)
 
 
-def _order(side: Side, ability: Ability, makers: list[int], near: Point | None) -> bool:
+def _order(side: Side, ability: Ability, maker: int, near: Point | None) -> bool:
     if ability.effect == "build":
         return _build(side, ability, near)
     if ability.effect == "warp_in":
-        return _warp_in(side, ability, makers[0])
-    return hands.use(side, makers[:1], ability)
+        return _warp_in(side, ability, maker)
+    return hands.use(side, [maker], ability)
 
 
 # structures and warping in --------------------------------------------------------------------------------------------

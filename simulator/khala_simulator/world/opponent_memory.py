@@ -40,7 +40,8 @@ class OpponentMemory:
     wave: float = 1.0  # factor on the size of the next attack
     wave_value: float = 0.0  # of the army at the start of the attack
     attack_from: int = 0  # no attack before
-    searched: int = 0  # how many bases the army has found empty
+    searched: int = 0  # how many places the army has found empty
+    searched_since: int = 0  # since when it goes to the next one
     alarm: int = NEVER  # since when enemies are seen at its bases
     threat: Point | None = None
     worst: float = 0.0  # worth of the enemies there at their most
