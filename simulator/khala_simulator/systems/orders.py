@@ -36,9 +36,17 @@ def _lost(world: World) -> list[int]:
 
 
 def _arrived(world: World) -> list[int]:
-    """Return slots whose walk has reached its point, or as near as the crowd there or the terrain allows."""
+    """Return slots whose walk has reached its point, or as near as the crowd there or the terrain allows.
+
+    Units that look for targets on their way have just looked in vain: if not, an attack on a place would end as soon as
+    the first enemy there is dead.
+    """
     n = world.top
-    walkers = which(world.walks[:n] & ((world.target[:n] == NOBODY) | ~world.looks_around[:n]))
+    walks, looks = world.walks[:n], world.looks_around[:n]
+    if some(looks & walks):
+        looked = (world.loop % MECHANICS.scan_period == 1) & (world.scan_loop[:n] > world.loop)
+        walks = walks & (~looks | (world.target[:n] == NOBODY) & (looked | ~world.acquires[:n]))
+    walkers = which(walks)
     if not walkers.size:
         return []
     offset = world.order_point.take(walkers, 0) - world.pos.take(walkers, 0)
