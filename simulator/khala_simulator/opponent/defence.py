@@ -13,7 +13,6 @@ from khala_simulator.opponent.enemy import WORKER_VALUE, value
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.opponent_memory import NEVER
-from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
@@ -28,8 +27,9 @@ AT_WORK: Final = 11.0
 """Workers help, and a weak army fights, only against enemies so near to a town hall."""
 HOPELESS: Final = 2.0
 """Workers don't fight what is worth so many times more than all of them."""
+WOUNDED: Final = 0.4
 SCOUTS: Final = 2
-"""So few enemy workers at a base are scouts and no threat."""
+"""So few enemy workers that attack nothing are scouts and no threat."""
 RECALL: Final = 0.3
 """An attack goes on while the enemies at home are worth less than this share of the army."""
 
@@ -67,7 +67,7 @@ def threats(side: Side, enemy: Enemy) -> Ints:
     offset = world.pos[foes][:, None, :] - world.pos[stone]
     near = (offset[..., 0] ** 2 + offset[..., 1] ** 2 <= reach**2).any(axis=1)
     found: Ints = foes[near]
-    harmless = [s for s in found.tolist() if world.unit_type(s).worker]
+    harmless = [s for s in found.tolist() if world.unit_type(s).worker and world.target[s] == NOBODY]
     return found[:0] if len(harmless) == found.size <= SCOUTS else found
 
 
@@ -114,37 +114,47 @@ def _at_work(side: Side, at: Point) -> bool:
 def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
     """Make workers fight while the army at home is weaker than the threat."""
     world, mind = side.world, side.mind
-    threat_at = mind.threat or mind.bases[0]
+    at = mind.threat or mind.bases[0]
     lacking = 1.15 * strength - value(world, army) - value(world, _static(side))
     most = int(side.level.pull * len(side.workers))
     hopeless = lacking > HOPELESS * most * WORKER_VALUE
-    if lacking <= 0.0 or hopeless or not _at_work(side, threat_at):
+    if lacking <= 0.0 or hopeless or not _at_work(side, at):
         _release(side)
         return
     wanted = min(most, math.ceil(lacking / WORKER_VALUE))
     mind.pulled = [tag for tag in mind.pulled if world.slot_of(tag) != NOBODY]
     candidates = [w for w in side.workers if world.carrier[w] == NOBODY and not world.casts[w]]
-    candidates.sort(key=lambda w: (world.tag_of(w) not in mind.pulled, math.dist(side.place(w), threat_at), w))
-    mind.pulled = [world.tag_of(w) for w in candidates[:wanted]]
-    idle = [w for w in candidates[:wanted] if world.order_kind[w] != OrderKind.ATTACK_UNIT]
-    ground = [s for s in threat.tolist() if not world.unit_type(s).flying]
-    groups: dict[int, list[int]] = {}
-    for worker in idle if ground else ():
-        offset = world.pos[ground] - world.pos[worker]
-        groups.setdefault(ground[int(np.argmin((offset**2).sum(axis=1)))], []).append(worker)
-    for target, group in groups.items():
-        hands.attack_unit(side, group, world.tag_of(target))
+    candidates.sort(
+        key=lambda w: (_wounded(side, w), world.tag_of(w) not in mind.pulled, math.dist(side.place(w), at), w)
+    )
+    called = candidates[:wanted]
+    back = [s for tag in mind.pulled if (s := world.slot_of(tag)) not in called]
+    mind.pulled = [world.tag_of(w) for w in called]
+    _to_work(side, back)
+    idle = [w for w in called if world.target[w] == NOBODY and not stance.bound_for(side, w, at, 3.0)]
+    if idle and any(not world.unit_type(s).flying for s in threat.tolist()):
+        hands.attack(side, idle, at)
+
+
+def _wounded(side: Side, slot: int) -> bool:
+    """Return whether a worker fights only after all others."""
+    world = side.world
+    whole = float(world.life_max[slot] + world.shields_max[slot])
+    return bool(world.life[slot] + world.shields[slot] < WOUNDED * whole)
 
 
 def _release(side: Side) -> None:
     """Send workers that have defended back to their work."""
-    world, mind = side.world, side.mind
-    fighting = [s for tag in mind.pulled if (s := world.slot_of(tag)) != NOBODY]
-    mind.pulled = []
-    for hall in side.halls[:1]:
-        fields = bases.fields_near(world, side.place(hall))
-        if fighting and fields:
-            hands.gather(side, fighting, world.tag_of(fields[0]))
+    back = [s for tag in side.mind.pulled if (s := side.world.slot_of(tag)) != NOBODY]
+    side.mind.pulled = []
+    _to_work(side, back)
+
+
+def _to_work(side: Side, workers: list[int]) -> None:
+    """Send workers to a field of the first base."""
+    fields = [f for hall in side.halls[:1] for f in bases.fields_near(side.world, side.place(hall))]
+    if workers and fields:
+        hands.gather(side, workers, side.world.tag_of(fields[0]))
 
 
 def _static(side: Side) -> list[int]:
