@@ -27,7 +27,8 @@ QUEEN: Final = 1.5
 PATIENCE_S: Final = 70.0
 """A step of the opening that is impossible for so long is skipped."""
 WAITED: Final = 300.0
-"""With so many minerals a step of the opening does not wait for its supply: the workers of weak levels come late."""
+"""With so many minerals a step of the opening, except a town hall, does not wait for its supply: the workers of weak
+levels come late."""
 RICH: Final = 450.0
 """With so many minerals unspent there are too few producers."""
 PLENTY_OF_GAS: Final = 250.0
@@ -93,9 +94,10 @@ def follow_opening(side: Side, enemy: Enemy) -> bool:
     if mind.step >= len(opening):
         return True
     step = opening[mind.step]
-    if side.used < step.supply and side.owner.minerals < WAITED:
+    hall = step.what == side.race.hall
+    if side.used < step.supply and (hall or side.owner.minerals < WAITED):
         return False
-    near = bases.next_place(side, enemy) if step.what == side.race.hall else None
+    near = bases.next_place(side, enemy) if hall else None
     outcome = products.make(side, step.what, near=near)
     patient = side.world.loop - mind.step_since < PATIENCE_S * FASTER_LOOPS * side.level.tempo
     if outcome is Outcome.DONE or (outcome is Outcome.BLOCKED and not patient):

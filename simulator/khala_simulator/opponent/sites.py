@@ -85,8 +85,10 @@ def _nearest(side: Side, unit: UnitType, near: Point) -> Point | None:
 def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
     """Return which places suit the Pylons: in a power field, or for a Pylon away from the others."""
     if unit.needs_power:
-        fields = [power.covered(side.world, source, at) for source in power.sources(side.world, side.player)]
-        return np.asarray(np.array(fields, dtype=np.bool_).reshape(-1, len(at)).any(axis=0), dtype=np.bool_)
+        powered = np.zeros(len(at), dtype=np.bool_)
+        for source in power.sources(side.world, side.player):
+            powered |= power.covered(side.world, source, at)
+        return powered
     pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
     apart = np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1])
     return np.asarray((apart >= PYLONS_APART).all(axis=1), dtype=np.bool_)

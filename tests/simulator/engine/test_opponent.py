@@ -173,6 +173,15 @@ def test_gateways_wait_for_a_pylon_and_stand_in_its_field() -> None:
     assert math.dist(place, world.pos[pylon[0]].tolist()) <= 6.5
 
 
+def test_without_room_near_a_base_no_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = game()
+    x, y = world.players[1].start or (0.0, 0.0)
+    put(world, 1, "Pylon", x + 7.0 if x < 44 else x - 7.0, y)
+    monkeypatch.setattr(sites, "NEAREST", sites.FARTHEST)
+    for name in ("Gateway", "Pylon"):
+        assert sites.place_for(side_of(world), world.catalog.unit(name)) is None
+
+
 # money and attention --------------------------------------------------------------------------------------------------
 
 
