@@ -1,6 +1,6 @@
 """How strong the computer players are: how they grow, and which level beats which.
 
-    python -m bench.opponents growth                            every level of every race at 1:30, 3, 5 and 8 minutes
+    python -m bench.opponents growth                            every level of every race at 1:30, 3, 5, 6 and 8 minutes
     python -m bench.opponents growth --races terran --levels 1 7 --minutes 5
     python -m bench.opponents ladder --race zerg --games 10     each pair of levels, one race against itself
     python -m bench.opponents ladder --neighbours --games 10    each level against the one below it, nine match-ups
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 RACES: Final = ("protoss", "terran", "zerg")
-MOMENTS_S: Final = (90, 180, 300, 480)
+MOMENTS_S: Final = (90, 180, 300, 360, 480)
 MACRO: Final = 2
 CLEARLY: Final = 1.25
 STRIDE: Final = 112

@@ -25,7 +25,7 @@ FIGHT: Final = 14.0
 FULL: Final = 188.0
 """With so much supply in use an army attacks whatever its size."""
 FULL_ARMY: Final = 20.0
-EASY: Final = 1.6
+EASY: Final = 1.4
 """An army so many times the enemy's is an easy win, with at least so much supply."""
 LEAST_EASY: Final = 16.0
 COUNTER_S: Final = 15.0

@@ -27,7 +27,7 @@ BETWEEN_S: Final = 110.0
 LOAD_S: Final = 14.0
 FLY_S: Final = 90.0
 FIGHT_S: Final = 45.0
-LEAST_ARMY: Final = 26.0
+LEAST_ARMY: Final = 36.0
 """Army supply below which no part of it is sent away."""
 NEAR: Final = 7.0
 UNLOAD: Final = "unload_all_at"

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
     from khala_simulator.opponent.side import Side
 
-MOST_GUARD: Final = 100.0
+MOST_GUARD: Final = 60.0
+"""No larger army comes before upgrades and structures."""
 QUEEN: Final = 1.5
 """What a Queen counts as army supply."""
 PATIENCE_S: Final = 70.0
@@ -48,6 +49,8 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     keep_for_addons(side)
     danger = in_danger(side, enemy)
     if danger:
+        if side.owner.vespene >= PLENTY_OF_GAS and side.mind.threat is None:
+            research(side)
         train_army(side)
     change_halls(side)
     if _opening_and_workers(side, enemy, staff):
