@@ -345,7 +345,7 @@ def test_a_drop_loads_flies_and_unloads_in_the_enemys_base() -> None:
     world = game(("terran", "zerg"), map_name="Melee/Flat48")
     x, y = stance.rally(side_of(world))
     put(world, 1, "Medivac", x, y)
-    put(world, 1, "Marine", x - 3.0, y - 3.0, 30)
+    put(world, 1, "Marine", x - 3.0, y - 3.0, 40)
     world.loop = 350 * 23
     phases = [""]
     while phases[-1] != "fight" and len(phases) < 60:
