@@ -33,6 +33,8 @@ levels come late."""
 RICH: Final = 450.0
 """With so many minerals unspent there are too few producers."""
 PLENTY_OF_GAS: Final = 250.0
+IDLE_GAS: Final = 150.0
+"""With so much vespene upgrades come before an army that is too small: what it lacks is minerals."""
 PRODUCERS_PER_BASE: Final = 4
 FULL_SHARE: Final = 0.8
 """A side expands when its bases have this share of the workers that they want."""
@@ -49,7 +51,7 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     keep_for_addons(side)
     danger = in_danger(side, enemy)
     if danger:
-        if side.owner.vespene >= PLENTY_OF_GAS and side.mind.threat is None:
+        if side.owner.vespene >= IDLE_GAS and side.mind.threat is None:
             research(side)
         train_army(side)
     change_halls(side)
