@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.economy import production
-from khala_simulator.opponent import bases, composition, economy, products
+from khala_simulator.opponent import bases, composition, economy, products, sites
 from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.opponent.products import Outcome
 
@@ -128,11 +128,14 @@ def expand(side: Side, enemy: Enemy, staff: Staff) -> None:
     hall = side.race.hall
     mined_out = sum(ideal <= SPARSE for _, ideal in staff.halls.values())
     have = len(side.halls) - mined_out + len(side.begun.get(hall, ())) + side.ordered[hall]
-    rich = side.owner.minerals > 2 * RICH
+    short_of_larvae = hall == side.race.producer and not side.named("Larva")
+    rich = side.owner.minerals > (RICH if short_of_larvae else 2 * RICH)
     wanted = min(side.level.bases, max(side.stage.bases, have + 1 if rich else 0))
     full = len(side.workers) >= FULL_SHARE * staff.places
     if have < wanted and (full or rich):
         place = bases.next_place(side, enemy)
+        if place is None and rich and hall == side.race.producer:
+            place = sites.beside(side, side.world.catalog.unit(hall))
         if place is not None:
             products.make(side, hall, near=place)
 

@@ -57,6 +57,11 @@ def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | 
     return next((place for base in around if (place := _nearest(side, unit, base)) is not None), None)
 
 
+def beside(side: Side, hall: UnitType) -> Point | None:
+    """Return where one more town hall can stand at a base that has one, for its larvae."""
+    return _nearest(side, hall, side.mind.bases[0])
+
+
 def _forward(side: Side) -> Point:
     """Return a point in front of the base nearest to the enemy."""
     (x, y), (ex, ey) = bases.front(side), side.mind.enemy_start
@@ -104,7 +109,7 @@ def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
     open_ground = open_ground & ~_kept_free(world.map, side.mind.bases, side.mind.resources)
     if unit.needs_creep:
         open_ground = open_ground & world.creep
-    elif side.owner.race == "zerg" or world.creep.any():
+    elif unit.name != side.race.hall and (side.owner.race == "zerg" or world.creep.any()):
         open_ground = open_ground & ~world.creep
     extra = ADDON_CELLS if unit.name in WITH_ADDON else 0
     width, height = size[0] + 2 + extra, size[1] + 2
