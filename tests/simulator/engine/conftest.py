@@ -58,8 +58,8 @@ class Field:
     def still(self, name: str, owner: int, x: float, y: float, energy: float | None = None) -> int:
         """Put a unit that stays where it is and does not fight."""
         slot = self.put(name, owner, x, y)
-        self.world.looks_around[slot] = False
         buffs.apply(self.world, slot, "LurkerHoldFireB")
+        self.world.looks_around[slot] = self.world.flees[slot] = False
         if energy is not None:
             self.world.energy[slot] = energy
         return slot
