@@ -6,7 +6,9 @@
 
 The path is a checkout of https://github.com/oxwhirl/smac, or where pip has put the package; it is no dependency of this
 project. Each map has a process of its own that may take so many seconds an episode, so that a hang is seen. Checked
-are the sizes of observations and states, that no episode is worth more than 20, and that no game was started again.
+are the sizes of observations and states, that no game was started again, and that no episode is worth more than 20. It
+may be worth more by what enemies regain: SMAC takes the absolute value of what a step is worth, so life and shields
+that grow count as much as those that fall, and count again when they fall.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +30,7 @@ from khala_simulator.process.install import install
 
 AGENTS = ("random", "heuristic")
 MOST_REWARD = 20.0
-"""What SMAC scales the best episode to."""
+"""What SMAC scales the best episode to, if enemies regain nothing."""
 START_S = 30.0
 
 
@@ -82,27 +84,43 @@ def play(map_name: str, agent: str, episodes: int, seed: int) -> Played:
     if env.force_restarts:
         trouble.append(f"{env.force_restarts} games started again")
     env.close()
-    rewards = [reward for reward, _, _ in results]
-    if max(rewards) > MOST_REWARD + 1e-6:
-        trouble.append(f"an episode worth {max(rewards):.2f}")
+    rewards = [one.reward for one in results]
+    trouble += [f"an episode worth {one.reward:.2f}" for one in results if one.reward > one.most + 1e-6]
     return Played(
-        map_name, agent, episodes, won=sum(won for _, won, _ in results), reward=float(np.mean(rewards)),
-        most=max(rewards), steps=float(np.mean([steps for _, _, steps in results])), obs=facts["obs_shape"],
+        map_name, agent, episodes, won=sum(one.won for one in results), reward=float(np.mean(rewards)),
+        most=max(rewards), steps=float(np.mean([one.steps for one in results])), obs=facts["obs_shape"],
         state=facts["state_shape"], actions=facts["n_actions"], wall_s=time.monotonic() - begun_s,
         trouble="; ".join(dict.fromkeys(trouble)),
     )  # fmt: skip
 
 
-def _episode(env: Any, agent: str, rng: np.random.Generator) -> tuple[float, bool, int]:
-    """Return the reward of one episode, whether it was won, and its steps."""
-    total, over, info, steps = 0.0, False, {}, 0
+class Episode(NamedTuple):
+    """The end of one episode."""
+
+    reward: float
+    most: float
+    """What it may be worth at most."""
+    won: bool
+    steps: int
+
+
+def _episode(env: Any, agent: str, rng: np.random.Generator) -> Episode:
+    """Play one episode to its end."""
+    total, regained, over, info, steps = 0.0, 0.0, False, {}, 0
     while not over:
         actions = [0] * env.n_agents
         if agent == "random":
             actions = [int(rng.choice(np.flatnonzero(env.get_avail_agent_actions(i)))) for i in range(env.n_agents)]
         reward, over, info = env.step(actions)
-        total, steps = total + reward, steps + 1
-    return total, bool(info.get("battle_won")), steps
+        total, regained, steps = total + reward, regained + _regained(env), steps + 1
+    most = MOST_REWARD * (1 + 2 * regained / env.max_reward)
+    return Episode(total, most, bool(info.get("battle_won")), steps)
+
+
+def _regained(env: Any) -> float:
+    """Return the life and shields that living enemies gained in the last step."""
+    both = ((enemy, env.previous_enemy_units.get(number)) for number, enemy in env.enemies.items() if enemy.health > 0)
+    return float(sum(max(0.0, now.health + now.shield - old.health - old.shield) for now, old in both if old))
 
 
 def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: argparse.Namespace) -> Played:
