@@ -120,7 +120,7 @@ def growth(game_map: str, seat: Seat, moments_s: Iterable[int], seed: int) -> li
 
 def _grown(world: World, seat: Seat, at_s: int, had: list[float]) -> Growth:
     owner, slots = world.players[1], world.units_of(1).tolist()
-    units = [world.unit_type(slot) for slot in slots]
+    units = [world.unit_type(slot) for at in slots for slot in (at, *world.passengers(at))]
     collected = owner.score.collected
     return Growth(
         seat=seat,

@@ -8,7 +8,6 @@ import numpy as np
 
 from khala_simulator.economy import construction, harvesting, supply
 from khala_simulator.opponent import hands, products
-from khala_simulator.opponent.levels import FASTER_LOOPS
 from khala_simulator.opponent.products import Outcome
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
 GAS_WORKERS: Final = 3
 MOVED_AT_ONCE: Final = 4
 """How many workers change to another base in one thought."""
-GAS_ENOUGH: Final = 250.0
-"""With so much vespene unspent, and less than half as many minerals, gas structures get one worker only."""
+GAS_ENOUGH: Final = 200.0
+"""With so much vespene unspent, and fewer minerals, gas structures get one worker only."""
 A_HALL: Final = 16
 """Workers on the minerals of one base."""
 AHEAD_S: Final = 22.0
@@ -28,8 +27,8 @@ AHEAD_S: Final = 22.0
 A_WORKER_S: Final = 12.0
 A_SUPPLY_S: Final = 13.5
 """A worker takes so long, and a producer for each supply of its units."""
-LARVAE_A_SECOND: Final = 0.13
-"""Of a Hatchery with a Queen from time to time."""
+LARVAE: Final = (0.12, 0.15)
+"""Supply a second of what the larvae of a Hatchery become, and of those that a Queen adds."""
 MANY: Final = 800.0
 """With so many minerals unspent, larvae have piled up that will be used at once."""
 TWO_HALLS: Final = 1.5
@@ -92,7 +91,7 @@ def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
 
 def _fill_gas(side: Side, staff: Staff) -> None:
     world = side.world
-    plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < side.owner.vespene / 2
+    plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < side.owner.vespene
     wanted = 1 if plenty else GAS_WORKERS
     for gas, (assigned, _) in sorted(staff.gas.items()):
         if assigned > wanted and plenty:
@@ -143,7 +142,8 @@ def _ahead(side: Side) -> float:
     makers += sum(len(side.kind(n)) for n in ("RoboticsFacility", "Stargate"))
     a_second = len(side.halls) / A_WORKER_S + makers / A_SUPPLY_S
     if side.owner.race == "zerg":
-        a_second = len(side.halls) * (LARVAE_A_SECOND + min(side.owner.minerals, MANY) / MANY / A_WORKER_S)
+        halls, queens = len(side.halls), min(len(side.halls), len(side.named("Queen")))
+        a_second = halls * LARVAE[0] + queens * LARVAE[1] + halls * min(side.owner.minerals, MANY) / MANY / A_WORKER_S
     return 1.0 + AHEAD_S * a_second
 
 
@@ -155,9 +155,7 @@ def train_workers(side: Side, staff: Staff) -> None:
     while side.count(name) < most and world.loop >= side.mind.next_worker:
         if products.make(side, name) is not Outcome.DONE:
             return
-        side.mind.next_worker = world.loop + round(
-            side.level.worker_s * FASTER_LOOPS / (1.0 if halls < 2 else TWO_HALLS)
-        )
+        side.mind.next_worker = side.after(side.level.worker_s / (1.0 if halls < 2 else TWO_HALLS))
 
 
 def _wanted(side: Side, staff: Staff) -> int:

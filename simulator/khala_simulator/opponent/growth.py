@@ -32,7 +32,7 @@ WAITED: Final = 300.0
 levels come late."""
 RICH: Final = 450.0
 """With so many minerals unspent there are too few producers."""
-PLENTY_OF_GAS: Final = 250.0
+PLENTY_OF_GAS: Final = 150.0
 IDLE_GAS: Final = 150.0
 """With so much vespene upgrades come before an army that is too small: what it lacks is minerals."""
 PRODUCERS_PER_BASE: Final = 4
@@ -48,11 +48,11 @@ LEVELS: Final = ("Level1", "Level2", "Level3")
 def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
     """Spend the money of this thought."""
     economy.keep_supply_ahead(side)
-    keep_for_addons(side)
+    make_addons(side)
     danger = in_danger(side, enemy)
     if danger:
-        if side.owner.vespene >= IDLE_GAS and side.mind.threat is None:
-            research(side)
+        if side.mind.threat is None:
+            _before_the_army(side, staff)
         train_army(side)
     change_halls(side)
     if _opening_and_workers(side, enemy, staff):
@@ -63,6 +63,14 @@ def grow(side: Side, enemy: Enemy, staff: Staff) -> None:
         research(side)
     if not danger:
         train_army(side)
+
+
+def _before_the_army(side: Side, staff: Staff) -> None:
+    """Spend on what pays even while the army is too small, as long as nobody attacks."""
+    if side.owner.vespene >= IDLE_GAS:
+        research(side)
+    if not side.build.saves:
+        economy.train_workers(side, staff)
 
 
 def _opening_and_workers(side: Side, enemy: Enemy, staff: Staff) -> bool:
@@ -100,6 +108,8 @@ def follow_opening(side: Side, enemy: Enemy) -> bool:
         return True
     step = opening[mind.step]
     hall = step.what == side.race.hall
+    if side.world.loop < mind.step_since + side.level.step_s * FASTER_LOOPS:
+        return False
     if side.used < step.supply and (hall or side.owner.minerals < WAITED):
         return False
     near = bases.next_place(side, enemy) if hall else None
@@ -116,10 +126,12 @@ def change_halls(side: Side) -> None:
         products.make(side, ORBITAL)
 
 
-def keep_for_addons(side: Side) -> None:
-    """Keep a producer of each kind idle whose add-on is missing and paid: busy ones can't build it."""
+def make_addons(side: Side) -> None:
+    """Make the add-ons that can be paid; keep a producer idle for one that has none idle: busy ones can't build it."""
     for name, wanted in side.stage.structures.items():
-        if name.endswith(ADDONS) and side.count(name) < _scaled(side, wanted):
+        if not name.endswith(ADDONS) or side.count(name) >= _scaled(side, wanted):
+            continue
+        if side.purse.affords(products.ways(side.world.catalog, name)[0]) and products.make(side, name) is not Outcome.DONE:
             products.keep_for(side, name)
 
 
@@ -198,13 +210,23 @@ def make_units(side: Side) -> None:
 
 
 def train_army(side: Side) -> None:
-    """Make the units that the army lacks most, as many as producers and money allow."""
+    """Make the units that the army lacks most, as many as the level, producers and money allow."""
     shares = composition.wanted(side)
     for _ in range(_free_producers(side)):
-        names = composition.by_need(side, shares)
-        outcomes = (products.make(side, name) for name in names if _worth_waiting(side, name))
-        if next((o for o in outcomes if o is not Outcome.BLOCKED), Outcome.BLOCKED) is not Outcome.DONE:
+        if side.world.loop < side.mind.next_army or not _train_one(side, composition.by_need(side, shares)):
             return
+
+
+def _train_one(side: Side, names: list[str]) -> bool:
+    """Make the first unit that is possible; return whether it is paid."""
+    for name in names:
+        outcome = products.make(side, name) if _worth_waiting(side, name) else Outcome.BLOCKED
+        if outcome is Outcome.DONE:
+            ability = products.ways(side.world.catalog, name)[0]
+            side.mind.next_army = side.after(side.level.army_s * ability.supply)
+        if outcome is not Outcome.BLOCKED:
+            return outcome is Outcome.DONE
+    return False
 
 
 def _worth_waiting(side: Side, name: str) -> bool:

@@ -24,6 +24,8 @@ class Level:
     reaction_s: float
     tempo: float
     worker_s: float
+    army_s: float
+    step_s: float
     workers: int
     bases: int
     production: float

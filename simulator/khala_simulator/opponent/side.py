@@ -87,6 +87,10 @@ class Side:
         """Seconds of game time on the clock of its build; a weak player's clock is slow."""
         return self.world.loop / FASTER_LOOPS / (self.level.tempo * self.mind.patience)
 
+    def after(self, seconds: float) -> int:
+        """Return the game loop so many seconds from now."""
+        return self.world.loop + round(seconds * FASTER_LOOPS)
+
     @cached_property
     def stage(self) -> Stage:
         """What its build wants now."""

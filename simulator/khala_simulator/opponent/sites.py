@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.abilities.protoss import warpgate
+from khala_simulator.abilities.terran import addons
 from khala_simulator.economy import building_sites, power
 from khala_simulator.opponent import bases
 from khala_simulator.tables.action_result import ActionResult
@@ -106,7 +107,7 @@ def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
     """Return (k, 2) the centres where a structure and a way around it find room."""
     world = side.world
     open_ground = world.map.terrain.build & ~building_sites.taken(world)
-    open_ground = open_ground & ~_kept_free(world.map, side.mind.bases, side.mind.resources)
+    open_ground = open_ground & ~_kept_free(world.map, side.mind.bases, side.mind.resources) & ~_for_addons(side)
     if unit.needs_creep:
         open_ground = open_ground & world.creep
     elif unit.name != side.race.hall and (side.owner.race == "zerg" or world.creep.any()):
@@ -117,6 +118,15 @@ def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
     inside = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width] + sums[:-height, :-width]
     y, x = np.nonzero(inside == width * height)
     return np.stack([x + 1 + size[0] / 2.0, y + 1 + size[1] / 2.0], axis=1)
+
+
+def _for_addons(side: Side) -> Bools:
+    """Return (h, w) the cells at the side of own structures where their add-ons stand, or will."""
+    kept = np.zeros_like(side.world.map.terrain.build)
+    for name in WITH_ADDON:
+        for slot in (*side.whole.get(name, ()), *side.begun.get(name, ())):
+            _mark(kept, np.array(addons.place_of(side.world, slot)), 0.9)
+    return kept
 
 
 @lru_cache(maxsize=16)

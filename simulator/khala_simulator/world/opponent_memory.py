@@ -36,6 +36,7 @@ class OpponentMemory:
     actions: float = 0.0  # orders that it may give before it has to wait
     thought: int = 0  # when it thought last
     next_worker: int = 0  # when it may order the next worker
+    next_army: int = 0  # when it may order the next unit of its army
     attacking: bool = False
     wave: float = 1.0  # factor on the size of the next attack
     wave_value: float = 0.0  # of the army at the start of the attack
