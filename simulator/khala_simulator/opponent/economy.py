@@ -31,6 +31,8 @@ LARVAE: Final = (0.12, 0.15)
 """Supply a second of what the larvae of a Hatchery become, and of those that a Queen adds."""
 MANY: Final = 800.0
 """With so many minerals unspent, larvae have piled up that will be used at once."""
+NEARLY: Final = 0.7
+"""A town hall takes 71 seconds, so AHEAD_S before it is there this part of it is done."""
 TWO_HALLS: Final = 1.5
 """With a second town hall a level makes workers so much faster."""
 
@@ -128,7 +130,7 @@ def keep_supply_ahead(side: Side) -> None:
     provides = side.world.catalog.unit(name).provides
     coming = provides * (side.count(name) - len(side.kind(name)))
     hall = side.world.catalog.unit(side.race.hall).provides
-    coming += hall * len(side.begun.get(side.race.hall, ())) * 0.5
+    coming += hall * sum(side.world.build_progress[s] >= NEARLY for s in side.begun.get(side.race.hall, ()))
     planned = any(step.what == name for step in side.build.opening[side.mind.step : side.mind.step + 1])
     soon = side.cap + coming
     if (planned and side.cap > side.used) or soon >= supply.LIMIT or soon - side.used > _ahead(side):

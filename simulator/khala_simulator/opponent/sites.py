@@ -25,11 +25,15 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.side import Side
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
-    from khala_simulator.world.columns import Bools, Floats
+    from khala_simulator.world.columns import Bools, Floats, Ints
 
 NEAREST, FARTHEST = 4.0, 18.0
 """How far from the base's town hall a structure stands."""
 PYLONS_APART: Final = 4.5
+POWERED: Final = 6.5
+"""How far from a Pylon a structure can stand."""
+ROOMY: Final = 0.5
+"""A Pylon powers at least this share of the room that the best place for one would."""
 TRIES: Final = 10
 """How many candidates the rules judge before the search ends."""
 WITH_ADDON: Final = frozenset({"Barracks", "Factory", "Starport"})
@@ -96,8 +100,16 @@ def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
             powered |= power.covered(side.world, source, at)
         return powered
     pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
-    apart = np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1])
-    return np.asarray((apart >= PYLONS_APART).all(axis=1), dtype=np.bool_)
+    apart = (np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1]) >= PYLONS_APART).all(axis=1)
+    room = _room(side, at)
+    return np.asarray(apart & (room >= ROOMY * room[apart].max(initial=0)), dtype=np.bool_)
+
+
+def _room(side: Side, at: Floats) -> Ints:
+    """Return how many places for a Gateway Pylons would power."""
+    gateway = _centres(side, side.world.catalog.unit(side.race.producer), (3, 3))
+    powered: Ints = (np.hypot(gateway[:, None, 0] - at[:, 0], gateway[:, None, 1] - at[:, 1]) <= POWERED).sum(axis=0)
+    return powered
 
 
 # grids ----------------------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_simulator.abilities import commands
+from khala_simulator.abilities.terran import addons
 from khala_simulator.combat import lifecycle
 from khala_simulator.economy import harvesting, supply
 from khala_simulator.maps.game_map import load_map
@@ -81,7 +82,7 @@ def test_each_level_is_at_least_as_strong_in_everything_as_the_one_below() -> No
     for weaker, stronger in itertools.pairwise(levels):
         for more in ("actions", "workers", "bases", "production", "upgrades", "wave", "retreat", "pull"):
             assert getattr(weaker, more) <= getattr(stronger, more), (stronger.name, more)
-        for less in ("think_loops", "reaction_s", "tempo", "worker_s"):
+        for less in ("think_loops", "reaction_s", "tempo", "worker_s", "army_s", "step_s"):
             assert getattr(weaker, less) >= getattr(stronger, less), (stronger.name, less)
         assert weaker.skills <= stronger.skills
 
@@ -159,6 +160,30 @@ def test_structures_keep_the_ways_of_workers_and_the_next_base_free() -> None:
     ways = (fields + side.mind.bases[0]) / 2.0
     assert min(math.dist(barracks, way) for way in ways.tolist()) > 2.0
     assert all(math.dist(barracks, base) > 4.0 for base in side.mind.bases)
+
+
+def test_the_place_at_the_side_of_a_barracks_is_kept_for_its_add_on() -> None:
+    world = game(("terran", "zerg"))
+    barracks = sites.place_for(side_of(world), world.catalog.unit("Barracks"))
+    assert barracks is not None
+    addon = addons.place_of(world, put(world, 1, "Barracks", *barracks)[0])
+    advance(world, 1)
+    for _ in range(6):
+        depot = sites.place_for(side_of(world), world.catalog.unit("SupplyDepot"), near=addon)
+        assert depot is not None
+        assert max(abs(depot[0] - addon[0]), abs(depot[1] - addon[1])) >= 2.0
+        put(world, 1, "SupplyDepot", *depot)
+        advance(world, 1)
+
+
+@pytest.mark.parametrize("seed", [1, 3])  # from either start
+def test_the_first_pylon_powers_room_for_three_structures(seed: int) -> None:
+    world = game(seed=seed)
+    for name in ("Pylon", "Gateway", "CyberneticsCore", "Gateway"):
+        place = sites.place_for(side_of(world), world.catalog.unit(name))
+        assert place is not None, name
+        put(world, 1, name, *place)
+        advance(world, 1)
 
 
 def test_gateways_wait_for_a_pylon_and_stand_in_its_field() -> None:
@@ -272,7 +297,48 @@ def test_what_a_structure_requires_is_built_first() -> None:
     assert products.lacking(side, "Gateway") == ""
 
 
+def test_a_town_hall_gives_supply_for_the_plan_only_once_it_is_nearly_done() -> None:
+    world = game()
+    world.players[1].minerals = 100.0
+    x, y = world.players[1].start or (0.0, 0.0)
+    nexus = put(world, 1, "Nexus", x, y + 20.0 if y < 44 else y - 20.0)[0]
+    put(world, 1, "Probe", x + 4.0 if x < 44 else x - 8.0, y + 4.0, 3)
+    ordered = {}
+    for done in (0.9, 0.2):
+        world.build_progress[nexus] = done
+        side = side_of(world)
+        side.mind.step = 99
+        economy.keep_supply_ahead(side)
+        ordered[done] = side_of(world).ordered["Pylon"]
+    assert ordered == {0.9: 0, 0.2: 1}
+
+
+def test_a_weak_level_waits_between_the_steps_of_its_opening() -> None:
+    first = {}
+    for level in (1, 7):
+        world = game(levels=(level, 1))
+        world.players[1].minerals = 400.0
+        side = side_of(world)
+        growth.follow_opening(side, Enemy(side))
+        first[level] = side_of(world).ordered["Pylon"]
+    assert first == {1: 0, 7: 1}
+
+
 # army -----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_weak_level_makes_its_army_slowly_whatever_it_could_pay() -> None:
+    made = {}
+    for level in (1, 7):
+        world = game(("terran", "zerg"), levels=(level, 1))
+        put(world, 1, "Barracks", 40.0, 44.0)
+        put(world, 1, "SupplyDepot", 46.0, 44.0, 2)
+        world.players[1].minerals = 1000.0
+        for _ in range(2):
+            growth.train_army(side_of(world))
+            advance(world, 410)
+        made[level] = having(world, 1)["Marine"]
+    assert made == {1: 1, 7: 2}
 
 
 def test_flyers_make_it_train_what_hits_them() -> None:
@@ -411,10 +477,9 @@ def test_an_elite_player_grows_as_fast_as_the_games_own(race: str) -> None:
     advance(world, round(210 * 22.4))
     assert 34 <= having(world, 1)[worker] <= 50
     advance(world, round(60 * 22.4))
-    halls = sum(harvesting.is_drop_off(world, slot) for slot in world.units_of(1).tolist())
-    armed = sum(world.unit_type(s).supply for s in world.units_of(1).tolist() if world.unit_type(s).army)
-    assert halls >= 2
-    assert armed > 30
+    units = [slot for at in world.units_of(1).tolist() for slot in (at, *world.passengers(at))]
+    assert sum(harvesting.is_drop_off(world, slot) for slot in units) >= 2
+    assert sum(world.unit_type(slot).supply for slot in units if world.unit_type(slot).army) > 40
 
 
 @pytest.mark.slow
