@@ -129,9 +129,9 @@ def change_halls(side: Side) -> None:
 def make_addons(side: Side) -> None:
     """Make the add-ons that can be paid; keep a producer idle for one that has none idle: busy ones can't build it."""
     for name, wanted in side.stage.structures.items():
-        if not name.endswith(ADDONS) or side.count(name) >= _scaled(side, wanted):
-            continue
-        if side.purse.affords(products.ways(side.world.catalog, name)[0]) and products.make(side, name) is not Outcome.DONE:
+        missing = name.endswith(ADDONS) and side.count(name) < _scaled(side, wanted)
+        paid = missing and side.purse.affords(products.ways(side.world.catalog, name)[0])
+        if paid and products.make(side, name) is not Outcome.DONE:
             products.keep_for(side, name)
 
 
