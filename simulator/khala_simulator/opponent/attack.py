@@ -32,7 +32,7 @@ COUNTER_S: Final = 15.0
 BATTLE: Final = 0.5
 """For so long after enemies were repelled that were worth this share of the own army there may be a counter-attack."""
 SPENT: Final = 0.3
-"""An attack is over when this share of its value is left."""
+"""An attack is over when this share of its value is left, unless the enemy has even less."""
 REINFORCE: Final = 0.15
 """Units that wait join an attack once they are worth this share of it."""
 SPREAD: Final = 11.0
@@ -79,7 +79,8 @@ def go_on(side: Side, enemy: Enemy, army: list[int]) -> None:
     there = [s for s in army if s not in set(waiting)]
     worth = value(world, side.army)
     mind.wave_value = max(mind.wave_value, worth)
-    if worth < SPENT * mind.wave_value or _too_strong(side, enemy, there):
+    spent = worth < SPENT * mind.wave_value and side.army_supply <= enemy.army_supply()
+    if spent or _too_strong(side, enemy, there):
         stance.call_off(side)
         return
     fresh = waiting if not there or value(world, waiting) > REINFORCE * worth else []

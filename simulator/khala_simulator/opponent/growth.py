@@ -223,7 +223,8 @@ def _train_one(side: Side, names: list[str]) -> bool:
         outcome = products.make(side, name) if _worth_waiting(side, name) else Outcome.BLOCKED
         if outcome is Outcome.DONE:
             ability = products.ways(side.world.catalog, name)[0]
-            side.mind.next_army = side.after(side.level.army_s * ability.supply)
+            pace = side.level.army_s * economy.A_HALL / max(1, len(side.workers))
+            side.mind.next_army = side.after(pace * ability.supply)
         if outcome is not Outcome.BLOCKED:
             return outcome is Outcome.DONE
     return False
