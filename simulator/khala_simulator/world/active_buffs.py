@@ -34,10 +34,20 @@ class ActiveBuffs:
     """The buffs in force, a row each, in the order in which they came."""
 
     def __init__(self) -> None:
-        self.rows: NDArray[np.void] = np.zeros(0, dtype=ROW)
+        self.rows = np.zeros(0, dtype=ROW)
+
+    @property
+    def rows(self) -> NDArray[np.void]:
+        """(k,) the table; rows come and go by a new one, and no unit or kind in it changes."""
+        return self._rows
+
+    @rows.setter
+    def rows(self, rows: NDArray[np.void]) -> None:
+        self._rows = rows
+        self._first: dict[tuple[int, int], int] | None = None  # (slot, kind) -> its first row, for ``find``
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self._rows)
 
     def of(self, slot: int) -> NDArray[np.void]:
         """Return the rows of a unit."""
@@ -46,8 +56,12 @@ class ActiveBuffs:
 
     def find(self, slot: int, row: int) -> int:
         """Return the index of the first row of a kind on a unit, or -1."""
-        found = np.flatnonzero((self.rows["slot"] == slot) & (self.rows["buff"] == row))
-        return int(found[0]) if found.size else -1
+        if self._first is None:
+            kinds = zip(self.rows["slot"].tolist(), self.rows["buff"].tolist(), strict=True)
+            self._first = {}
+            for index, kind in enumerate(kinds):
+                self._first.setdefault(kind, index)
+        return self._first.get((slot, row), -1)
 
     def forget(self, slot: int) -> None:
         """Remove the buffs on a unit that is gone; buffs that it cast stay."""

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from khala_simulator.world.columns import Bools, Ints
 
-Eye = tuple[int, int, float, int]
-"""What sees: its cell, its radius, and the cliff level from which on it does not see."""
-
 
 class WorldCaches:
     """Notes between changes of the population."""
@@ -39,7 +36,7 @@ class WorldCaches:
         self.passive_units_at = -1  # the population for which this was written
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
         self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
-        self.eyes: dict[int, tuple[set[Eye], NDArray[np.int16]]] = {}  # by player, what ``vision`` saw with last
+        self.eyes: object | None = None  # with what the players saw last, for ``vision``
         self.powered_at = -1  # the population for which ``powered`` was written
         self.fighters: Ints = np.zeros(0, dtype=np.int64)  # slots with a target, as of this loop's measuring
         self.anyone_moved = True  # a unit walked in the last loop

@@ -7,7 +7,12 @@ without it. Only immobile units leave one. ``fog`` keeps them up to date; on map
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 TAG_BASE: Final = 2 << 32
 INDEX_SHIFT: Final = 18
@@ -32,7 +37,9 @@ class FogMemory:
     def __init__(self) -> None:
         self.of_unit: dict[int, RememberedUnit] = {}
         self.shown: list[RememberedUnit] = []
+        self.cells: NDArray[np.int64] = np.zeros(0, dtype=np.int64)  # of those, as numbers y * width + x
         self.made = 0
+        self.noted: bytes | None = None  # all that was in sight the last time, as it was
 
     def find(self, tag: int) -> RememberedUnit | None:
         """Return the shown snapshot with this tag of its own, or None."""

@@ -310,12 +310,20 @@ class World(UnitColumns, WorldCaches):
 
     def is_visible(self, player: int) -> Bools:
         """Return (len(live),) whether ``player`` sees each living unit now; cloak and detection are ignored here."""
+        seen: Bools = self.visible_units()[player]
+        return seen
+
+    def visible_units(self) -> Bools:
+        """Return (players, len(live)) the same of every player."""
         if not self.fog:
-            return np.ones(len(self.live), dtype=np.bool_)
-        cells = self.pos[self.live].astype(np.int64)
+            return np.ones((len(self.players), len(self.live)), dtype=np.bool_)
         width, height = self.map.terrain.size
-        x, y = np.clip(cells[:, 0], 0, width - 1), np.clip(cells[:, 1], 0, height - 1)
-        seen: Bools = (self.visibility[player, y, x] == 2) | (self.owner[self.live] == player)
+        at = self.pos.take(self.live, 0).astype(np.int64)
+        np.maximum(at, 0, out=at)
+        np.minimum(at, (width - 1, height - 1), out=at)
+        cells = at[:, 1] * width + at[:, 0]
+        seen: Bools = self.visibility.reshape(len(self.players), -1).take(cells, axis=1) == 2
+        seen[self.owner.take(self.live), np.arange(len(cells))] = True
         return seen
 
     # result -------------------------------------------------------------------------------------------------------
