@@ -1,6 +1,6 @@
 """Contacts: which bodies touch or nearly do.
 
-A look-up for ``systems.collision`` and ``avoidance``, which act on it. Among a few bodies every pair is measured, with
+A look-up for ``systems.collision``, which acts on it. Among a few bodies every pair is measured, with
 distances looked up in a table; many are sorted along the wider axis of the crowd and only neighbours are measured, so
 that the cost grows with the crowd and not with its square.
 """
@@ -21,102 +21,154 @@ if TYPE_CHECKING:
 
 SKIN: Final = 0.1  # how far apart two bodies may be to be worth looking at
 OVERLAP_ALLOWED: Final = 0.005
-TABLE_LIMIT: Final = 80  # up to so many bodies a table of all pairs is the faster way
+TABLE_LIMIT: Final = 80  # up to so many units a table of all pairs is the faster way
+WORTH_A_LOOK: Final = 40  # and up to so many bodies a look at one, as they seldom touch
 
 
 @dataclass(slots=True)
 class Pairs:
-    """Pairs of bodies (k,), as indices into the living slots, each pair both ways round; ``apart`` is what to keep."""
+    """Pairs of bodies, as indices into the living slots, each pair both ways round."""
 
-    one: Ints
-    other: Ints
-    apart: Floats
+    both: Ints  # (2, k)
+    apart: Floats  # (k,) distance to keep
+    closest: float  # the least distance between two of a pair, squared
+
+    @property
+    def one(self) -> Ints:
+        """(k,) the first of each pair."""
+        return self.both[0]
+
+    @property
+    def other(self) -> Ints:
+        """(k,) the second."""
+        return self.both[1]
 
 
 @dataclass(slots=True)
 class Bodies:
     """The constants of the pairs of living bodies until a unit is born, dies or changes."""
 
+    changes: int  # those of the world for which they hold
+    content: tuple[bytes, ...]  # of the columns of which they are made
+    count: int  # of living units
     rows: Ints  # (k,) those that can meet other bodies
     separation: Floats  # (n,) of every living unit
     bits: Ints  # (n,) layers it collides in, 0 for what stands on a footprint: that is a wall, not a body
     flying: Bools  # (n,)
     any_flying: bool
     widest: float  # the largest separation
-    table: tuple[Floats, Floats, Floats] | None  # of all pairs: touching and near, squared, and to be kept
+    table: tuple[Floats, Floats, Floats] | None  # of all pairs of rows: touching, near, and to be kept; see ``_table``
 
     @classmethod
     def of(cls, world: World) -> Bodies:
         """Return the bodies of a world's living units."""
         slots = world.live
-        bits = np.where(world.walled[slots], 0, world.layer_bits[slots])
+        bits = np.where(world.walled.take(slots), 0, world.layer_bits.take(slots))
         rows = which(bits != 0)
-        separation = world.separation[slots]
-        flying = world.layer[slots] == int(Layer.AIR)
-        table = _table(separation, bits) if len(slots) <= TABLE_LIMIT else None
-        widest = float(separation[rows].max(initial=0.0))
-        return cls(rows, separation, bits, flying, bool(flying.any()), widest, table)
+        separation = world.separation.take(slots)
+        flying = world.layer.take(slots) == int(Layer.AIR)
+        content = _content(world)
+        sizes = separation.take(rows)
+        table = _table(sizes, bits.take(rows)) if len(rows) <= TABLE_LIMIT else None
+        widest = float(sizes.max(initial=0.0))
+        count = len(slots)
+        return cls(world.changes, content, count, rows, separation, bits, flying, bool(flying.any()), widest, table)
 
     def near(self, at: Floats) -> Pairs | None:
-        """Return the pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch."""
-        if self.table is None:
-            return self._neighbours(at)
-        touching, near, apart = self.table
+        """Return the pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch.
+
+        Forces are summed up in the order of the pairs, so it is always the same: by slots, or that of ``within``.
+        """
+        at = at.take(self.rows, 0)
+        if self.count <= TABLE_LIMIT:
+            return self._looked_up(at)
+        if len(self.rows) <= WORTH_A_LOOK and not self._touching(at)[1]:
+            return None
+        return self._neighbours(at)
+
+    def _touching(self, at: Floats) -> tuple[Floats, bool]:
+        """Return the distances of the pairs in the table, squared, and whether any two touch."""
         x, y = at[:, 0], at[:, 1]
         squared = x[:, None] - x
         squared *= squared
         dy = y[:, None] - y
         dy *= dy
         squared += dy
-        if not some(squared < touching):
+        return squared, self.table is not None and some(squared < self.table[0])
+
+    def _looked_up(self, at: Floats) -> Pairs | None:
+        squared, touch = self._touching(at)
+        if not touch or self.table is None:
             return None
-        flat = which((squared < near).ravel())  # one index into a table costs a third of two
-        one, other = np.divmod(flat, len(at))
-        return Pairs(one, other, apart.take(flat))
+        flat = which((squared < self.table[1]).ravel())  # one index into a table costs a third of two
+        both = self.rows.take(np.stack(np.divmod(flat, len(at))))
+        return Pairs(both, self.table[2].take(flat), float(squared.take(flat).min()))
 
     def _neighbours(self, at: Floats) -> Pairs | None:
-        """Do the same as ``near``, without a table."""
-        if not len(self.rows):
+        """Do the same as ``_looked_up``, without a table."""
+        if not len(at):
             return None
-        one, other, squared = within(at.take(self.rows, 0), 2.0 * self.widest + SKIN)
-        one, other = self.rows.take(one), self.rows.take(other)
-        apart = self.separation.take(one) + self.separation.take(other)
-        meets = (self.bits.take(one) & self.bits.take(other)) != 0
+        pairs, squared = within(at, 2.0 * self.widest + SKIN)
+        pairs = self.rows.take(pairs)
+        apart = self.separation.take(pairs)
+        apart = apart[0] + apart[1]
+        bits = self.bits.take(pairs)
+        meets = (bits[0] & bits[1]) != 0
         meets &= squared < (apart + SKIN) ** 2
-        squared, apart = squared[meets], apart[meets]
+        near = which(meets)
+        squared, apart = squared.take(near), apart.take(near)
         if not some(squared < np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2):
             return None
-        one, other = one[meets], other[meets]
-        return Pairs(np.concatenate((one, other)), np.concatenate((other, one)), np.concatenate((apart, apart)))
+        one, other = pairs.take(near, 1)
+        both = np.concatenate((one, other, other, one)).reshape(2, -1)
+        return Pairs(both, np.concatenate((apart, apart)), float(squared.min()))
 
 
 def bodies_of(world: World) -> Bodies:
     """Return the bodies of a world's living units, rebuilt now if something has changed."""
     known = world.bodies
-    if not isinstance(known, Bodies):
-        known = world.bodies = Bodies.of(world)
-    return known
+    if isinstance(known, Bodies):
+        if known.changes == world.changes:
+            return known
+        if known.content == _content(world):  # such as when a worker took up a load
+            known.changes = world.changes
+            return known
+    made = world.bodies = Bodies.of(world)
+    return made
 
 
-def within(at: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Return every pair of points (n, 2) less than ``reach`` apart on both axes, once, and their distance squared.
+def _content(world: World) -> tuple[bytes, ...]:
+    """Return all of which ``Bodies`` are made."""
+    columns = (world.walled, world.layer_bits, world.layer, world.separation)
+    return world.live.tobytes(), *(column.take(world.live).tobytes() for column in columns)
+
+
+def within(at: Floats, reach: float) -> tuple[Ints, Floats]:
+    """Return every pair of points (n, 2) less than ``reach`` apart on both axes, once (2, k), and their distance squared.
 
     The points are sorted along the axis on which they spread wider, and each is paired with those that follow.
     """
     axes = np.ascontiguousarray(at.T)
-    along, across = axes if np.ptp(axes[0]) >= np.ptp(axes[1]) else axes[::-1]
-    order = np.argsort(along, kind="stable")
+    spread = np.maximum.reduce(axes, axis=1) - np.minimum.reduce(axes, axis=1)
+    along, across = axes if spread[0] >= spread[1] else axes[::-1]
+    order = along.argsort(kind="stable")
     along, across = along.take(order), across.take(order)
     rank = np.arange(len(order))
-    follow = np.searchsorted(along, along + reach, "left") - rank - 1
-    one = np.repeat(rank, follow)
-    first = np.cumsum(follow) - follow
-    other = np.arange(len(one)) - np.repeat(first - rank - 1, follow)
+    follow = along.searchsorted(along + reach)
+    follow -= rank
+    follow -= 1
+    one = rank.repeat(follow)
+    # the first of the k-th point's pairs is the sum of all before, its followers begin at k + 1
+    other = np.arange(len(one))
+    other += (rank + 1 + follow - np.add.accumulate(follow)).repeat(follow)
     aside = across.take(one) - across.take(other)
     close = which(np.abs(aside) < reach)
     one, other, aside = one.take(close), other.take(close), aside.take(close)
     ahead = along.take(one) - along.take(other)
-    return order.take(one), order.take(other), ahead * ahead + aside * aside
+    ahead *= ahead
+    aside *= aside
+    ahead += aside
+    return order.take(np.concatenate((one, other)).reshape(2, -1)), ahead
 
 
 def _table(separation: Floats, bits: Ints) -> tuple[Floats, Floats, Floats]:

@@ -10,7 +10,6 @@ body ever ends inside a wall.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,27 +70,28 @@ def _push_apart(world: World, slots: Ints, before: Floats, after: Floats) -> boo
     start = after.copy()
     drifting = False
     if bodies.any_flying:
-        flying = bodies.flying
-        soft = flying.take(found.one) | flying.take(found.other)
-        drifting = _drift_apart(world, slots, after, _only(found, soft))
-        found = _only(found, ~soft)
-    if found.one.size:
-        pairs = _Pairs(found.one, found.other, found.apart, _shares(world, slots, found.one, found.other))
+        flying = bodies.flying.take(found.both)
+        soft = flying[0] | flying[1]
+        if some(soft):
+            drifting = _drift_apart(world, slots, after, _only(found, soft))
+            found = _only(found, ~soft)
+    if found.apart.size:
+        pairs = _Pairs(found.both, found.apart, _shares(world, slots, found.both), len(after))
         deep = pairs.relax(after, MECHANICS.push_rounds)
         if deep.size:
-            pressed = pairs.one[deep[pairs.share[deep] >= EVEN]]
-            after[pressed] = start[pressed] = before[pressed]
+            pressed = found.one.take(deep[pairs.share.take(deep) >= EVEN])
+            after[pressed] = start[pressed] = before.take(pressed, 0)
             pairs.relax(after, MECHANICS.push_rounds - 1)
     shift = after - start
     far = geometry.length(shift)
-    if far.max() > MECHANICS.push_limit:
+    if np.maximum.reduce(far) > MECHANICS.push_limit:
         shift *= np.minimum(1.0, MECHANICS.push_limit / np.maximum(far, 1e-12))[:, None]
         np.add(start, shift, out=after)
-    return bool(found.one.size) or drifting
+    return bool(found.apart.size) or drifting
 
 
 def _only(pairs: Pairs, chosen: Bools) -> Pairs:
-    return Pairs(pairs.one[chosen], pairs.other[chosen], pairs.apart[chosen])
+    return Pairs(pairs.both.compress(chosen, 1), pairs.apart[chosen], pairs.closest)
 
 
 def _drift_apart(world: World, slots: Ints, at: Floats, pairs: Pairs) -> bool:
@@ -110,62 +110,65 @@ def _drift_apart(world: World, slots: Ints, at: Floats, pairs: Pairs) -> bool:
     return some(depth > OVERLAP_ALLOWED)
 
 
-@dataclass(slots=True)
 class _Pairs:
-    """Bodies near each other, (k,) each, as indices into the living slots; every pair is there both ways round."""
+    """Bodies near each other, as indices into ``count`` living slots; every pair is there both ways round."""
 
-    one: Ints
-    other: Ints
-    apart: Floats  # distance to keep
-    share: Floats  # part of an overlap by which ``one`` gives way
+    def __init__(self, both: Ints, apart: Floats, share: Floats, count: int) -> None:
+        self.both = both  # (2, k)
+        self.apart = apart  # (k,) distance to keep
+        self.share = share  # (k,) part of an overlap by which the first gives way
+        self.count = count
+        self._pushed = np.concatenate((both[0], both[0] + count))  # where its x and y are in (2, count)
 
     def relax(self, at: Floats, rounds: int) -> Ints:
         """Push overlapping pairs apart up to ``rounds`` times, in place; return those that stay deep in each other."""
         axes = np.ascontiguousarray(at.T)  # (2, n)
-        one, other, n = self.one, self.other, len(at)
+        flat = axes.reshape(-1)
         while True:
-            offset = axes.take(one, 1) - axes.take(other, 1)
+            points = axes.take(self.both, 1)
+            offset = points[:, 0] - points[:, 1]
             squared = offset * offset
-            distance = np.sqrt(squared[0] + squared[1])
+            distance = squared[0] + squared[1]
+            np.sqrt(distance, out=distance)
             depth = self.apart - distance
             if rounds == 0 or not some(depth > OVERLAP_ALLOWED):
                 break
             rounds -= 1
-            push = np.maximum(depth, 0.0) / np.maximum(distance, SAME_POINT)
+            push = np.maximum(depth, 0.0, out=depth)
+            push /= np.maximum(distance, SAME_POINT, out=distance)
             push *= self.share
             offset *= push
-            axes[0] += np.bincount(one, offset[0], n)
-            axes[1] += np.bincount(one, offset[1], n)
+            flat += np.bincount(self._pushed, offset.reshape(-1), 2 * self.count)
         at[:] = axes.T
         return which(depth > OVERLAP_PRESSED)
 
 
 def _part(at: Floats, pairs: Pairs) -> None:
     """Give bodies on the very same point a direction to separate in: one of eight, by their numbers."""
+    if pairs.closest >= SAME_POINT:
+        return
     offset = at.take(pairs.one, 0) - at.take(pairs.other, 0)
     offset *= offset
     same = offset[:, 0] + offset[:, 1] < SAME_POINT
-    if some(same):
-        stirred = np.unique(pairs.one[same])
-        at[stirred] += EIGHT_DIRECTIONS[stirred % 8] * (1.0 + stirred[:, None]) * SAME_POINT * STIR
+    stirred = np.unique(pairs.one[same])
+    at[stirred] += EIGHT_DIRECTIONS[stirred % 8] * (1.0 + stirred[:, None]) * SAME_POINT * STIR
 
 
-def _shares(world: World, slots: Ints, one: Ints, other: Ints) -> Floats:
-    """Return the share of an overlap by which the first of each pair gives way; the other takes the rest."""
-    yielding, yielding_to_friend = _yielding(world, slots)
-    mine, theirs = yielding.take(one), yielding.take(other)
-    if yielding_to_friend is not None:
-        owner = world.owner.take(slots)
-        friends = owner.take(one) == owner.take(other)
-        mine = np.where(friends, yielding_to_friend.take(one), mine)
-        theirs = np.where(friends, yielding_to_friend.take(other), theirs)
+def _shares(world: World, slots: Ints, both: Ints) -> Floats:
+    """Return the share of an overlap by which the first of each pair (2, k) gives way; the other takes the rest."""
     wants = world.wants.take(slots)
-    rivals = wants.take(one) & wants.take(other)
+    yielding, yielding_to_friend = _yielding(world, slots, wants)
+    yields = yielding.take(both)
+    if yielding_to_friend is not None:
+        owner = world.owner.take(slots).take(both)
+        yields = np.where(owner[0] == owner[1], yielding_to_friend.take(both), yields)
+    wanting = wants.take(both)
+    rivals = wanting[0] & wanting[1]
+    mine, theirs = yields
     if some(rivals):
-        left = _left(world, slots)
-        ahead = left.take(other) - left.take(one)
-        mine = np.where(rivals & (ahead > 0.0), mine * MECHANICS.push_ahead, mine)
-        theirs = np.where(rivals & (ahead < 0.0), theirs * MECHANICS.push_ahead, theirs)
+        left = _left(world, slots).take(both)
+        mine[rivals & (left[1] > left[0])] *= MECHANICS.push_ahead
+        theirs[rivals & (left[1] < left[0])] *= MECHANICS.push_ahead
     share: Floats = mine / (mine + theirs)
     return share
 
@@ -178,9 +181,9 @@ def _left(world: World, slots: Ints) -> Floats:
     return left
 
 
-def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
+def _yielding(world: World, slots: Ints, wants: Bools) -> tuple[Floats, Floats | None]:
     """Return how easily each of ``slots`` is pushed by an enemy, and by a friend; None when it is the same for all."""
-    firm = np.where(world.wants.take(slots), 1.0, MECHANICS.push_firm)
+    firm = np.where(wants, 1.0, MECHANICS.push_firm)
     if census(world).low_priority_bodies:
         firm *= world.lightness.take(slots)
     immobile = (world.step_max.take(slots) <= 0.0) | world.holds.take(slots)
@@ -189,7 +192,7 @@ def _yielding(world: World, slots: Ints) -> tuple[Floats, Floats | None]:
     idle = world.target.take(slots) == NOBODY
     if not some(idle):
         return firm, None
-    idle &= ~world.wants.take(slots) & ~immobile
+    idle &= ~(wants | immobile)
     return firm, np.where(idle, MECHANICS.push_idle * world.lightness.take(slots), firm)
 
 

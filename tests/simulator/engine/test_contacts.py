@@ -21,7 +21,7 @@ POINTS = st.lists(st.tuples(SIXTEENTHS, SIXTEENTHS), min_size=1, max_size=60)
 @given(points=POINTS, reach=st.integers(1, 80).map(lambda n: n / 16))
 def test_all_pairs_within_reach_are_found_once(points: list[tuple[float, float]], reach: float) -> None:
     at = np.array(points, dtype=np.float64)
-    one, other, squared = within(at, reach)
+    (one, other), squared = within(at, reach)
     found = {frozenset(pair) for pair in zip(one.tolist(), other.tolist(), strict=True)}
     assert len(found) == len(one)
     away = np.abs(at[:, None, :] - at)
