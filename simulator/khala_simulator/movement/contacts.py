@@ -36,12 +36,14 @@ class Pairs:
     @property
     def one(self) -> Ints:
         """(k,) the first of each pair."""
-        return self.both[0]
+        one: Ints = self.both[0]
+        return one
 
     @property
     def other(self) -> Ints:
         """(k,) the second."""
-        return self.both[1]
+        other: Ints = self.both[1]
+        return other
 
 
 @dataclass(slots=True)
@@ -144,9 +146,9 @@ def _content(world: World) -> tuple[bytes, ...]:
 
 
 def within(at: Floats, reach: float) -> tuple[Ints, Floats]:
-    """Return every pair of points (n, 2) less than ``reach`` apart on both axes, once (2, k), and their distance squared.
+    """Return (2, k) every pair of points (n, 2) less than ``reach`` apart on both axes, and (k,) its distance squared.
 
-    The points are sorted along the axis on which they spread wider, and each is paired with those that follow.
+    Each pair is there once. The points are sorted along the axis on which they spread wider, and each is paired with those that follow.
     """
     axes = np.ascontiguousarray(at.T)
     spread = np.maximum.reduce(axes, axis=1) - np.minimum.reduce(axes, axis=1)

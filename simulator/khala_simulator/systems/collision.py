@@ -197,35 +197,36 @@ def _yielding(world: World, slots: Ints, wants: Bools) -> tuple[Floats, Floats |
 
 
 def _keep_on_surfaces(world: World, slots: Ints, before: Floats, after: Floats) -> None:
-    layers = world.layer.take(slots)
+    """Put every body that has moved where its layer allows."""
+    moved = _moved(before, after)
+    layers = world.layer.take(slots.take(moved))
     for layer in LAYERS:
-        mine = which(layers == layer.value)
+        mine = moved[layers == layer.value]
         if not mine.size:
             continue
+        to = after.take(mine, 0)
         if layer is AIR:
             x0, y0, x1, y1 = world.map.terrain.playable
-            mine = _moved(mine, before, after)
-            after[mine] = np.clip(after[mine], (x0, y0), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
+            after[mine] = np.minimum(np.maximum(to, (x0, y0)), (x1 - EDGE_MARGIN, y1 - EDGE_MARGIN))
             continue
         surface = pathfinding.surface(world.ground, layer)
-        free = surface.open.take(surface.cell(after.take(mine, 0)))
-        if np.count_nonzero(free) < len(free):
-            near = _moved(mine[~free], before, after)
-            if near.size:
-                after[near] = _off_walls(surface, before[near], after[near], world.clearance[slots[near]])
+        cell = surface.cell(to)
+        near = which(~surface.open.take(cell))
+        if near.size:
+            mine = mine.take(near)
+            room = world.clearance.take(slots.take(mine))
+            after[mine] = _off_walls(surface, before.take(mine, 0), to.take(near, 0), cell.take(near), room)
 
 
-def _moved(bodies: Ints, before: Floats, after: Floats) -> Ints:
+def _moved(before: Floats, after: Floats) -> Ints:
     """Return the bodies that have moved; only they need correction."""
-    changed = before.take(bodies, 0) != after.take(bodies, 0)
-    moved: Ints = bodies[changed[:, 0] | changed[:, 1]]
-    return moved
+    changed = before != after
+    return which(changed[:, 0] | changed[:, 1])
 
 
-def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Floats) -> Floats:
+def _off_walls(surface: Surface, before: Floats, after: Floats, cell: Ints, clearance: Floats) -> Floats:
     """Return positions (k, 2) kept a body's clearance away from blocked cells; where there is no room they stay."""
-    cell = surface.cell(after)
-    corner = np.floor(after + surface.shift) - surface.shift
+    corner = np.floor(after + surface.shift) - surface.shift if surface.shift else np.floor(after)
     room = clearance[:, None]
     low, high = surface.walls_low.take(cell, 0), surface.walls_high.take(cell, 0)
     kept = np.minimum(np.maximum(after, corner + low * room), corner + 1.0 - high * room)
@@ -233,9 +234,9 @@ def _off_walls(surface: Surface, before: Floats, after: Floats, clearance: Float
         for toward, spiked in surface.spikes:
             at = which(spiked.take(cell))
             if at.size:
-                offset = kept[at] - (corner[at] + toward)
-                distance = geometry.length(offset)
-                push = np.maximum(clearance[at] - distance, 0.0) / np.maximum(distance, SAME_POINT)
+                offset = kept.take(at, 0) - (corner.take(at, 0) + toward)
+                distance, room = geometry.length(offset), clearance.take(at)
+                push = np.maximum(room - distance, 0.0) / np.maximum(distance, SAME_POINT)
                 kept[at] += offset * push[:, None]
     return _free_or_back(surface, before, kept)
 
@@ -250,7 +251,7 @@ def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
         attempt = before.copy()
         for axis in axes:
             attempt[:, axis] = after[:, axis]
-        fits = bad & surface.flat[surface.cell(attempt)]
+        fits = bad & surface.flat.take(surface.cell(attempt))
         after[fits] = attempt[fits]
         bad &= ~fits
     for i in which(bad).tolist():

@@ -159,7 +159,7 @@ def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
     speed = world.step_max.take(walkers)
     if world.growth.anywhere:
         width, height = world.map.terrain.size
-        x = np.clip(pos[:, 0].astype(np.int64), 0, width - 1)
-        y = np.clip(pos[:, 1].astype(np.int64), 0, height - 1)
-        speed = np.where(world.creep[y, x], speed * world.creep_factor.take(walkers), speed)
+        at = np.minimum(np.maximum(pos.astype(np.int64), 0), (width - 1, height - 1))
+        on_creep = world.creep.take(at[:, 1] * width + at[:, 0])
+        speed = np.where(on_creep, speed * world.creep_factor.take(walkers), speed)
     return speed
