@@ -60,6 +60,7 @@ class Bodies:
     any_flying: bool
     widest: float  # the largest separation
     table: tuple[Floats, Floats, Floats] | None  # of all pairs of rows: touching, near, and to be kept; see ``_table``
+    members: Ints  # (2, k * k) of each pair in it
 
     @classmethod
     def of(cls, world: World) -> Bodies:
@@ -72,16 +73,20 @@ class Bodies:
         content = _content(world)
         sizes = separation.take(rows)
         table = _table(sizes, bits.take(rows)) if len(rows) <= TABLE_LIMIT else None
+        members = np.stack((rows.repeat(len(rows)), np.tile(rows, len(rows)))) if len(slots) <= TABLE_LIMIT else rows
         widest = float(sizes.max(initial=0.0))
-        count = len(slots)
-        return cls(world.changes, content, count, rows, separation, bits, flying, bool(flying.any()), widest, table)
+        any_flying = bool(flying.any())
+        return cls(
+            world.changes, content, len(slots), rows, separation, bits, flying, any_flying, widest, table, members
+        )
 
     def near(self, at: Floats) -> Pairs | None:
         """Return the pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch.
 
         Forces are summed up in the order of the pairs, so it is always the same: by slots, or that of ``within``.
         """
-        at = at.take(self.rows, 0)
+        if len(self.rows) < self.count:
+            at = at.take(self.rows, 0)
         if self.count <= TABLE_LIMIT:
             return self._looked_up(at)
         if len(self.rows) <= WORTH_A_LOOK and not self._touching(at)[1]:
@@ -103,8 +108,7 @@ class Bodies:
         if not touch or self.table is None:
             return None
         flat = which((squared < self.table[1]).ravel())  # one index into a table costs a third of two
-        both = self.rows.take(np.stack(np.divmod(flat, len(at))))
-        return Pairs(both, self.table[2].take(flat), float(squared.take(flat).min()))
+        return Pairs(self.members.take(flat, 1), self.table[2].take(flat), float(np.minimum.reduce(squared.take(flat))))
 
     def _neighbours(self, at: Floats) -> Pairs | None:
         """Do the same as ``_looked_up``, without a table."""
@@ -123,7 +127,7 @@ class Bodies:
             return None
         one, other = pairs.take(near, 1)
         both = np.concatenate((one, other, other, one)).reshape(2, -1)
-        return Pairs(both, np.concatenate((apart, apart)), float(squared.min()))
+        return Pairs(both, np.concatenate((apart, apart)), float(np.minimum.reduce(squared)))
 
 
 def bodies_of(world: World) -> Bodies:
@@ -148,7 +152,8 @@ def _content(world: World) -> tuple[bytes, ...]:
 def within(at: Floats, reach: float) -> tuple[Ints, Floats]:
     """Return (2, k) every pair of points (n, 2) less than ``reach`` apart on both axes, and (k,) its distance squared.
 
-    Each pair is there once. The points are sorted along the axis on which they spread wider, and each is paired with those that follow.
+    Each pair is there once. The points are sorted along the axis on which they spread wider, and each is paired with
+    those that follow.
     """
     axes = np.ascontiguousarray(at.T)
     spread = np.maximum.reduce(axes, axis=1) - np.minimum.reduce(axes, axis=1)

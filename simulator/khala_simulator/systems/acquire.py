@@ -157,14 +157,15 @@ def _threatened_planes(world: World, foes: Ints) -> Ints:
 def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     """Return (k, m) edge distances, and the worth of every foe to every seeker."""
     at, there = world.pos.take(seekers, 0), world.pos.take(foes, 0)
-    dx = at[:, 0, None] - there[:, 0]
+    gap = at[:, 0, None] - there[:, 0]
+    gap *= gap
     dy = at[:, 1, None] - there[:, 1]
-    gap = np.sqrt(dx * dx + dy * dy) - world.radius[seekers, None] - world.radius[foes]
-    planes = world.plane_bits[foes]
-    sight = np.maximum(
-        np.where(planes & GROUND_PLANE, world.ground_scan[seekers, None], -1.0),
-        np.where(planes & AIR_PLANE, world.air_scan[seekers, None], -1.0),
-    )
+    dy *= dy
+    gap += dy
+    np.sqrt(gap, out=gap)
+    gap -= world.radius.take(seekers)[:, None]
+    gap -= world.radius.take(foes)
+    sight = _sight(world, seekers, world.plane_bits.take(foes))
     holding = _stays(world, seekers)
     if some(holding):
         sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
@@ -175,10 +176,25 @@ def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
     if world.area_effects and some(world.zone_radius.take(seekers) > 0.0):
         k, m = wanted.shape
         wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)
-    rank = world.priority[foes] * PRIORITY_WEIGHT
-    threat = (_threatened_planes(world, foes) & world.plane_bits[seekers, None]) != 0
-    worth = np.where(wanted, rank + THREAT_WEIGHT * threat - gap, OUT_OF_SIGHT)
+    rank = world.priority.take(foes) * PRIORITY_WEIGHT
+    threat = (_threatened_planes(world, foes) & world.plane_bits.take(seekers)[:, None]) != 0
+    worth = THREAT_WEIGHT * threat
+    worth += rank
+    worth -= gap
+    np.copyto(worth, OUT_OF_SIGHT, where=~wanted)
     return gap, worth
+
+
+def _sight(world: World, seekers: Ints, planes: Ints) -> Floats:
+    """Return (k, m) how far each seeker looks for foes on some planes (m,); (k, 1) if all are on the ground alone."""
+    on_ground = world.ground_scan.take(seekers)[:, None]
+    if np.count_nonzero(planes == GROUND_PLANE) == len(planes):
+        return on_ground
+    in_air = world.air_scan.take(seekers)[:, None]
+    sight: Floats = np.maximum(
+        np.where(planes & GROUND_PLANE, on_ground, -1.0), np.where(planes & AIR_PLANE, in_air, -1.0)
+    )
+    return sight
 
 
 def _longest_reach(world: World, slots: Ints) -> Floats:

@@ -15,7 +15,7 @@ from khala_simulator.combat import damage
 from khala_simulator.numeric.arrays import some
 from khala_simulator.systems import missiles, sweeps
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import shot_of
+from khala_simulator.world.shots import shots_of
 
 if TYPE_CHECKING:
     from khala_simulator.world.world import World
@@ -33,8 +33,7 @@ def fall_due(world: World) -> None:
     pending.rows["goal"] = np.where(homing[:, None], world.pos.take(pending.target, 0), pending.goal)
     rows = pending.rows[due]
     pending.keep(~due)
-    for row, begun, single in zip(rows, rows["due"].tolist(), rows["single"].tolist(), strict=True):
-        shot = shot_of(row)
+    for shot, begun, single in zip(shots_of(rows), rows["due"].tolist(), rows["single"].tolist(), strict=True):
         if shot.source == NOBODY:
             continue
         hit = world.catalog.weapons[shot.weapon].hits[shot.hit]

@@ -12,11 +12,11 @@ import numpy as np
 
 from khala_simulator.combat import damage
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.numeric.arrays import some
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.stats import INSTANT_ACCELERATION_N
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import Shot, shot_of
+from khala_simulator.world.shots import Shot, shots_of
 
 if TYPE_CHECKING:
     from khala_simulator.tables.records import Hit
@@ -39,7 +39,7 @@ def fly(world: World) -> None:
     arriving = distance - body <= step
     shots["pos"] += offset * (step / np.maximum(distance, 1e-12))[:, None]
     if some(arriving):
-        arrived = [shot_of(shots[row]) for row in which(arriving).tolist()]
+        arrived = shots_of(shots[arriving])
         missiles.keep(~arriving)
         for shot in arrived:
             damage.hit_with(world, shot)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.numeric.arrays import which
 
 if TYPE_CHECKING:
     from khala_simulator.numeric.geometry import Floats
@@ -27,12 +27,13 @@ def regenerate(world: World) -> None:
 
 def _regain(world: World, amount: Floats, most: Floats, rate: Floats, delay: Floats | None) -> None:
     n = world.top
-    below = (amount[:n] < most[:n]) & (rate[:n] > 0.0)
-    if delay is not None and some(below):
-        below &= world.damaged_loop[:n] < world.loop - delay[:n]
-    if not some(below):
+    slots = which(amount[:n] < most[:n])
+    slots = slots[rate.take(slots) > 0.0]
+    if delay is not None and slots.size:
+        slots = slots[world.damaged_loop.take(slots) < world.loop - delay.take(slots)]
+    if not slots.size:
         return
-    slots = which(below & (world.life[:n] > 0.0))
+    slots = slots[world.life.take(slots) > 0.0]
     amount[slots] = np.minimum(amount.take(slots) + rate.take(slots), most.take(slots))
 
 

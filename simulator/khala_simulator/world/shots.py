@@ -46,11 +46,11 @@ class Shot(NamedTuple):
     goal: tuple[float, float]
 
 
-def shot_of(row: np.void) -> Shot:
-    """Return the shot in a row of either table."""
-    source, owner, target, prior, weapon, hit = (int(row[name]) for name in Shot._fields[:6])
-    start, goal = row["start"].tolist(), row["goal"].tolist()
-    return Shot(source, owner, target, prior, weapon, hit, (start[0], start[1]), (goal[0], goal[1]))
+def shots_of(rows: NDArray[np.void]) -> list[Shot]:
+    """Return the shots in some rows of either table."""
+    numbers = (rows[name].tolist() for name in Shot._fields[:6])
+    points = ([(x, y) for x, y in rows[name].tolist()] for name in Shot._fields[6:])
+    return [Shot(*values) for values in zip(*numbers, *points, strict=True)]
 
 
 @dataclass(slots=True)
