@@ -63,14 +63,15 @@ class Flow:
             return
         at, radius = (at - self.low) * FINE, radius * FINE
         half = math.ceil(float(radius.max()))
-        near = which(np.logical_and.reduce((at > -half) & (at < (self.width + half, self.height + half)), axis=1))
+        beside = (at > -half) & (at < (self.width + half, self.height + half))
+        near = which(beside[:, 0] & beside[:, 1])
         at, radius = at.take(near, 0), radius.take(near)
         square = np.arange(-half, half + 1)
         x, dx = _columns(at[:, 0], square, self.width)
         y, dy = _columns(at[:, 1], square, self.height)
         inside = dx[:, None, :] + dy[:, :, None] < (radius * radius)[:, None, None]
         number = (y * self.width)[:, :, None] + x[:, None, :]
-        grid.reshape(-1)[number[inside]] = value
+        grid.reshape(-1)[number.take(which(inside.ravel()))] = value
 
     def points(self, at: Floats, goal: Floats, width: float) -> tuple[Floats, Bools]:
         """Return the points (k, 2) that walkers at (k, 2) head for, and which of them have a way.
@@ -115,17 +116,17 @@ class Flow:
             row = reached | reached << 1 | reached >> 1
             tall = reached if step % 2 else row  # a diagonal every second step: about as long as it looks
             grown = (row | tall << width | tall >> width) & free
-            fresh = grown ^ reached
-            if not fresh:
+            if grown == reached:
                 break
             step += 1
-            for digit in range(DIGITS):
-                if step >> digit & 1:
-                    digits[digit] |= fresh
+            for digit in range((step & -step).bit_length()):
+                digits[digit] ^= reached  # a digit turns at its multiples, in all cells that are not reached before
             reached = grown
-        beyond = reached ^ (1 << self.free.size) - 1
-        size = (self.free.size + 7) // 8
-        packed = b"".join((digit | beyond).to_bytes(size, "little") for digit in digits)
+        everywhere = (1 << self.free.size) - 1
+        beyond, size = reached ^ everywhere, (self.free.size + 7) // 8
+        packed = b"".join(
+            (digits[d] ^ (everywhere if step >> d & 1 else 0) | beyond).to_bytes(size, "little") for d in range(DIGITS)
+        )
         grids = np.unpackbits(np.frombuffer(packed, np.uint8).reshape(DIGITS, size), axis=1, bitorder="little")
         left: Bytes = np.add.reduce(grids << np.arange(DIGITS, dtype=np.uint8)[:, None], axis=0, dtype=np.uint8)
         return left

@@ -16,7 +16,7 @@ import numpy as np
 
 from khala_simulator.movement import pathfinding
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.numeric.arrays import which
 from khala_simulator.systems import flanking
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
-FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG])
-FAN_SIN = np.array([math.sin(math.radians(a)) for a in FAN_DEG])
+FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG] * 2)  # to one side, then to the other
+FAN_SIN = np.array([sign * math.sin(math.radians(a)) for sign in (1.0, -1.0) for a in FAN_DEG])
 SEEN_AHEAD = 0.7
 TOLERANCE = 0.02
 LAYERS = tuple(Layer)
@@ -85,8 +85,13 @@ def _beside(world: World, slots: Ints, way: Floats) -> Floats:
     at, there = world.pos.take(slots, 0), world.pos.take(bodies, 0)
     dx, dy = there[:, 0] - at[:, 0, None], there[:, 1] - at[:, 1, None]
     x, y = way[:, 0, None], way[:, 1, None]
-    near = (dx * dx + dy * dy < MECHANICS.detour_look**2) & (dx * x + dy * y > 0.0)
-    beside: Floats = np.add.reduce((dy * x - dx * y) * near, axis=1)
+    near = dx * dx + dy * dy < MECHANICS.detour_look**2
+    near &= dx * x + dy * y > 0.0
+    dy *= x
+    dx *= y
+    dy -= dx
+    dy *= near
+    beside: Floats = np.add.reduce(dy, axis=1)
     return beside
 
 
@@ -95,12 +100,12 @@ def _look(world: World, slots: Ints) -> None:
     way = world.nav_point.take(slots, 0) - start
     way /= np.maximum(geometry.length(way), 1e-12)[:, None]
     side = world.detour.take(slots).astype(np.float64)
-    headings = np.concatenate([_fan(way, side), _fan(way, -side)], axis=1)  # (k, 2 x fan, 2), own side first
+    headings = _fan(way, side)
     free = _free(world, slots, start, way, headings)
     first = np.argmax(free, axis=1)
     rows = np.arange(len(slots))
     found = free[rows, first]
-    chosen = headings[rows, first]
+    chosen = headings[:, rows, first].T
     straight = found & (first == 0)
     # an army on its way to a fight keeps to its sides: who turned back would meet those that follow
     turns = found & (first > len(FAN_DEG)) & (world.target.take(slots) != NOBODY)
@@ -109,25 +114,37 @@ def _look(world: World, slots: Ints) -> None:
 
 
 def _fan(way: Floats, side: Floats) -> Floats:
-    """Return (k, fan, 2) headings turned further and further to a side (1 is left)."""
+    """Return (2, k, 2 x fan) headings turned further and further to a side (1 is left), then to the other side."""
     sine = FAN_SIN * side[:, None]
     x, y = way[:, 0, None], way[:, 1, None]
-    return np.stack([x * FAN_COS - y * sine, y * FAN_COS + x * sine], axis=2)
+    headings = np.empty((2, *sine.shape))
+    np.subtract(x * FAN_COS, y * sine, out=headings[0])
+    np.add(y * FAN_COS, x * sine, out=headings[1])
+    return headings
 
 
 def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Floats) -> Bools:
-    """Return (k, h) whether each heading is free for ``SEEN_AHEAD``: no wall, no body that stands or comes nearer."""
-    free = np.ones(headings.shape[:2], dtype=np.bool_)
+    """Return (k, h) which headings (2, k, h) have no wall and no body that stands or comes within ``SEEN_AHEAD``."""
+    points = np.empty((*headings.shape[1:], 2))
+    for axis in (0, 1):
+        np.add(start[:, axis, None], headings[axis] * SEEN_AHEAD, out=points[..., axis])
+    free = _on_ground(world, slots, points)
     k, body, apart = _in_the_way(world, slots, start, way)
     if k.size:
-        ahead = headings[k]  # (p, h, 2)
-        along = ahead[..., 0] * body[:, 0, None] + ahead[..., 1] * body[:, 1, None]
-        across = ahead[..., 0] * body[:, 1, None] - ahead[..., 1] * body[:, 0, None]
+        ahead = headings.take(k, 1)  # (2, p, h)
+        x, y = body[:, 0, None], body[:, 1, None]
+        along = ahead[0] * x
+        along += ahead[1] * y
+        across = ahead[0] * y
+        across -= ahead[1] * x
+        across *= across
         reach = np.maximum(along - SEEN_AHEAD, 0.0)
-        struck = (along > 0.0) & (across**2 + reach**2 < apart[:, None] ** 2)
-        pair, heading = struck.nonzero()
-        free[k.take(pair), heading] = False
-    return free & _on_ground(world, slots, start[:, None, :] + headings * SEEN_AHEAD)
+        reach *= reach
+        across += reach
+        struck = which(((along > 0.0) & (across < apart[:, None] ** 2)).ravel())
+        pair = struck // free.shape[1]
+        free[k.take(pair), struck - pair * free.shape[1]] = False
+    return free
 
 
 def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
@@ -162,8 +179,8 @@ def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
     free = np.ones(points.shape[:2], dtype=np.bool_)
     layers = world.layer.take(slots)
     for layer in LAYERS:
-        mine = layers == layer.value
-        if layer is not AIR and some(mine):
+        mine = which(layers == layer.value)
+        if layer is not AIR and mine.size:
             surface = pathfinding.surface(world.ground, layer)
-            free[mine] = surface.flat[surface.cell(points[mine])]
+            free[mine] = surface.flat.take(surface.cell(points.take(mine, 0)))
     return free
