@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.combat import buffs
+from khala_simulator.numeric import geometry
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 
@@ -121,12 +122,12 @@ def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
 
     Edges touch at the radius that clients see; before a corner of the walls that stands farther out, at the walls.
     """
-    half_x, half_y, diagonal, radius = _outlines(world.catalog)[:, world.type[targets]]
-    offset = np.abs(world.pos[targets] - world.pos[slots])
-    distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-9)
+    half_x, half_y, diagonal, radius = _outlines(world.catalog).take(world.type.take(targets), 1)
+    offset = np.abs(world.pos.take(targets, 0) - world.pos.take(slots, 0))
+    distance = np.maximum(geometry.length(offset), 1e-9)
     across, along = np.maximum(offset.T / distance, 1e-9)
     walls = np.minimum(np.minimum(half_x / across, half_y / along), diagonal / (across + along))
-    reach: Floats = np.maximum(walls + MECHANICS.harvest_gap, radius) + world.radius[slots]
+    reach: Floats = np.maximum(walls + MECHANICS.harvest_gap, radius) + world.radius.take(slots)
     return reach
 
 

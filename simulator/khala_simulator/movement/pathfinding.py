@@ -141,7 +141,7 @@ class Surface:
         result = self._box_is_free(start, end)
         if np.count_nonzero(result) < len(result):
             unsure = which(~result)
-            result[unsure] = self._sampled(start[unsure], end[unsure])
+            result[unsure] = self._sampled(start.take(unsure, 0), end.take(unsure, 0))
         return result
 
     def _box_is_free(self, start: Floats, end: Floats) -> Bools:
@@ -149,8 +149,10 @@ class Surface:
         high = np.floor(np.maximum(start, end) + (self.shift + SIDE_CLEARANCE)).astype(np.int64) + 1
         np.maximum(low, 0, out=low)
         np.minimum(high, self._last + 1, out=high)
+        left, right = low[:, 0], high[:, 0]
+        below, above = low[:, 1] * (self.width + 1), high[:, 1] * (self.width + 1)
         s = self._sums
-        free = s[high[:, 1], high[:, 0]] - s[low[:, 1], high[:, 0]] - s[high[:, 1], low[:, 0]] + s[low[:, 1], low[:, 0]]
+        free = s.take(above + right) - s.take(below + right) - s.take(above + left) + s.take(below + left)
         size = high - low
         result: Bools = np.equal(free, size[:, 0] * size[:, 1])
         return result
@@ -163,8 +165,10 @@ class Surface:
         scale = SIDE_CLEARANCE / np.maximum(distance, SIDE_CLEARANCE)
         side = np.stack([-offset[:, 1] * scale, offset[:, 0] * scale], axis=1)
         line = start[:, None, :] + offset[:, None, :] * share[None, :, None]
-        both = self.flat.take(self.cell(line + side[:, None, :])) & self.flat.take(self.cell(line - side[:, None, :]))
-        result: Bools = np.logical_and.reduce(both, axis=1)
+        edges = np.empty((2, *line.shape))
+        np.add(line, side[:, None, :], out=edges[0])
+        np.subtract(line, side[:, None, :], out=edges[1])
+        result: Bools = np.logical_and.reduce(self.flat.take(self.cell(edges)), axis=(0, 2))
         return result
 
     # ways ---------------------------------------------------------------------------------------------------------
@@ -194,7 +198,7 @@ class Surface:
         at = far.copy()
         unsure = np.arange(k)
         while unsure.size:
-            seen = self.clear(start[unsure], ahead[unsure, at[unsure]])
+            seen = self.clear(start.take(unsure, 0), ahead[unsure, at.take(unsure)])
             near[unsure[seen]] = at[unsure[seen]]
             far[unsure[~seen]] = at[unsure[~seen]] - 1
             at = (near + far + 1) // 2

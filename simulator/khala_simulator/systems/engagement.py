@@ -134,10 +134,11 @@ def _follow(world: World) -> None:
     following = world.order_kind[:n] == FOLLOW
     if some(following):
         slots = which(following & (world.order_target[:n] >= 0))
-        leader = world.order_target[slots]
-        offset = world.pos[leader] - world.pos[slots]
-        stop_at = world.separation[slots] + world.separation[leader] + FOLLOW_GAP
-        world.goal[slots] = world.pos[leader]
+        leader = world.order_target.take(slots)
+        goal = world.pos.take(leader, 0)
+        offset = goal - world.pos.take(slots, 0)
+        stop_at = world.separation.take(slots) + world.separation.take(leader) + FOLLOW_GAP
+        world.goal[slots] = goal
         world.stop_at[slots] = stop_at
         world.wants[slots] = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) > stop_at + FOLLOW_GAP
 
@@ -148,9 +149,9 @@ def _haul(world: World) -> None:
     phase = world.harvest[:n]
     slots = which(((phase == TO_RESOURCE) | (phase == TO_HALL)) & (world.order_target[:n] >= 0))
     if slots.size:
-        place = world.order_target[slots]
-        goal = world.pos[place]
-        offset = goal - world.pos[slots]
+        place = world.order_target.take(slots)
+        goal = world.pos.take(place, 0)
+        offset = goal - world.pos.take(slots, 0)
         stop_at = reach_of(world, slots, place)
         world.goal[slots] = goal
         world.stop_at[slots] = stop_at - HARVEST_OVERLAP

@@ -53,11 +53,11 @@ def find_ways(world: World) -> None:
 
 
 def _look_over(world: World, slots: Ints, layer: Layer) -> None:
-    goal = world.goal[slots]
+    goal = world.goal.take(slots, 0)
     surface = pathfinding.surface(world.ground, layer)
     straight = np.ones(len(slots), dtype=np.bool_)
     if layer is not AIR:
-        straight = surface.clear(world.pos[slots], _stopping_point(world, slots, goal))
+        straight = surface.clear(world.pos.take(slots, 0), _stopping_point(world, slots, goal))
     world.nav_straight[slots] = straight
     world.nav_end[slots] = False
     world.nav_point[slots] = world.nav_goal[slots] = goal
@@ -69,13 +69,14 @@ def _look_over(world: World, slots: Ints, layer: Layer) -> None:
 
 def _find_corners(world: World, crooked: Ints, surface: Surface) -> None:
     """Send walkers whose straight line is not free to the next corner of their way."""
-    start = world.pos[crooked]
-    cells = surface.cell(world.goal[crooked])
-    parts = surface.part[surface.cell(start)]
+    start, goal = world.pos.take(crooked, 0), world.goal.take(crooked, 0)
+    cells = surface.cell(goal)
+    wanted = cells.copy()
+    parts = surface.part.take(surface.cell(start))
     usable = parts >= 0
-    for i in _by_goal(world.goal[crooked], parts, usable & (surface.part[cells] != parts)):
-        cells[i] = surface.nearest(world.goal[crooked[i[0]]], int(parts[i[0]]), start[i])
-    elsewhere = surface.cell(world.goal[crooked]) != cells
+    for i in _by_goal(goal, parts, usable & (surface.part.take(cells) != parts)):
+        cells[i] = surface.nearest(goal[i[0]], int(parts[i[0]]), start[i])
+    elsewhere = wanted != cells
     crooked, start, cells, elsewhere = crooked[usable], start[usable], cells[usable], elsewhere[usable]
     if crooked.size:
         world.nav_goal[crooked[elsewhere]] = surface.centre(cells[elsewhere])
