@@ -103,7 +103,8 @@ def _enemies_on(world: World, player: int, cells: Ints) -> Ints:
 def _standing_on(world: World, cells: Ints) -> Ints:
     """Return the structures and resources on any of the cells."""
     wanted = {(x, y) for x, y in cells.tolist()}
-    found = [s for s in world.live.tolist() if any((x, y) in wanted for x, y in world.footprint_cells(s).tolist())]
+    walled = world.live[world.walled.take(world.live)].tolist()
+    found = [s for s in walled if any((x, y) in wanted for x, y in world.footprint_cells(s).tolist())]
     return np.array(found, dtype=np.int64)
 
 
@@ -113,11 +114,10 @@ def taken(world: World) -> Bools:
         return world.taken[1]
     width, height = world.map.terrain.size
     grid: Bools = np.zeros((height, width), dtype=np.bool_)
-    for slot in world.live.tolist():
+    for slot in world.live[world.walled.take(world.live)].tolist():
         cells = world.footprint_cells(slot)
-        if len(cells):
-            inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-            grid[cells[inside, 1], cells[inside, 0]] = True
+        inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
+        grid[cells[inside, 1], cells[inside, 0]] = True
     world.taken = world.population, grid
     return grid
 

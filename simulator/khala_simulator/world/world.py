@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -261,7 +262,7 @@ class World(UnitColumns, WorldCaches):
         if footprint is None or not footprint.cells:
             return np.zeros((0, 2), dtype=np.int64)
         corner = np.floor(self.pos[slot] + 1e-9).astype(np.int64)
-        cells: Ints = corner + np.array(footprint.cells, dtype=np.int64)
+        cells: Ints = corner + _offsets(footprint.cells)
         return cells
 
     # orders, as values --------------------------------------------------------------------------------------------
@@ -399,6 +400,12 @@ class World(UnitColumns, WorldCaches):
         self._recycles = recycles
         self.queue += [[] for _ in range(capacity - self.capacity)]
         self.grow(capacity)
+
+
+@lru_cache(maxsize=256)
+def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
+    """Return the cells of a footprint as an array (k, 2)."""
+    return np.array(cells, dtype=np.int64)
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:
