@@ -13,7 +13,8 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
-CROWD_PERIOD = 2  # how often the density of the crowd at a goal is checked
+CROWD_PERIOD = 2
+"""How often the density of the crowd at a goal is checked; for those who look for targets, whenever they have looked."""
 
 
 def carry_out(world: World) -> None:
@@ -43,8 +44,9 @@ def _arrived(world: World) -> list[int]:
     """
     n = world.top
     walks, looks = world.walks[:n], world.looks_around[:n]
+    just_looked = world.loop % MECHANICS.scan_period == 1
     if some(looks & walks):
-        looked = (world.loop % MECHANICS.scan_period == 1) & (world.scan_loop[:n] > world.loop)
+        looked = just_looked & (world.scan_loop[:n] > world.loop)
         walks = walks & (~looks | (world.target[:n] == NOBODY) & (looked | ~world.acquires[:n]))
     walkers = which(walks)
     if not walkers.size:
@@ -54,7 +56,7 @@ def _arrived(world: World) -> list[int]:
     squared = offset[:, 0] + offset[:, 1]
     there = squared <= MECHANICS.arrival_radius**2
     there |= world.nav_end.take(walkers)
-    if world.loop % CROWD_PERIOD == 0:
+    if just_looked or world.loop % CROWD_PERIOD == 0:
         stuck = world.blocked.take(walkers) > 0
         stuck |= world.loop - world.nav_best_loop.take(walkers) > MECHANICS.crowd_stall
         stuck &= ~there

@@ -77,14 +77,15 @@ def test_no_unit_ever_stands_where_it_can_not(make_field: Any, terrain: str, nam
         assert (world.life[world.live] > 0).all()
 
 
-def test_a_crowd_told_to_one_point_settles_without_overlap(field: Any) -> None:
+@pytest.mark.parametrize("give", [commands.move, commands.attack_move], ids=["move", "attack-move"])
+def test_a_crowd_told_to_one_point_settles_without_overlap(field: Any, give: Any) -> None:
     world = field.world
     for name, count in (("Zealot", 8), ("Stalker", 6), ("Zergling", 10)):
         unit = world.catalog.unit(name)
         for place in free_places(world, unit, (8.0, 16.0), count):
             lifecycle.spawn(world, unit, 1, place)
     slots = world.units_of(1).tolist()
-    commands.move(world, slots, (24, 16))
+    give(world, slots, (24, 16))
     field.play(400)
     assert all(world.orders_of(s) == [] for s in slots)
     assert deepest_overlap(world) < 0.01
