@@ -192,12 +192,22 @@ def table(result: Result, *, named: bool = False) -> Panel:
         rows.add_row("incident", Text(incident, "yellow"))
     if not result.valid:
         rows.add_row("not valid", Text(result.invalid_because, "bold red"))
-    for agent, statuses in sorted(result.statuses.items()):
-        rows.add_row(agent, ", ".join(f"{count} {status}" for status, count in sorted(statuses.items())))
+    for agent in sorted(result.statuses.keys() | result.unasked.keys()):
+        rows.add_row(agent, _steps_of(result, agent))
     whose = Text.assemble(side(result.side), ": ") if named else Text()
     ending = (result.outcome, OUTCOME[result.outcome])
     title = Text.assemble(whose, ending, f", {result.cause} (episode {result.episode})")
     return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
+
+
+UNASKED = {"no_units": "not asked, without units", "not_due": "not asked, not due"}
+
+
+def _steps_of(result: Result, agent: str) -> str:
+    """Return how an agent's steps ended: `177 ok, 23 not asked, without units`."""
+    counts = sorted(result.statuses.get(agent, {}).items())
+    counts += [(UNASKED[why], count) for why, count in sorted(result.unasked.get(agent, {}).items())]
+    return ", ".join(f"{count} {words}" for words, count in counts)
 
 
 def visible_message(message: M) -> M:

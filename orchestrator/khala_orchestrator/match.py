@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.pacing import Pacing
     from khala_orchestrator.roster import Seat
-    from khala_orchestrator.schedule import Decision
+    from khala_orchestrator.schedule import Asked, Decision
     from khala_orchestrator.side import Side
     from khala_orchestrator.turn import AgentPool, Answers, Question
     from khala_protocol.messages import Advice, Briefing, Message, Report, Result
@@ -139,8 +139,8 @@ class Match:
         with watch.phase("observe"):
             for side, snapshot in zip(self.sides, snapshots, strict=True):
                 side.look(snapshot)
-            asked = self.schedule.ask(at, loop, lambda seat: self._side(seat).happened(seat.agent))
-        answers = await self.agents.ask(self._questions(at, asked, watch), wait=self.config.task.clock.waits)
+            asked = self._ask(at, loop)
+        answers = await self.agents.ask(self._questions(at, asked.seats, watch), wait=self.config.task.clock.waits)
         self.schedule.decide(answers.by_seat, loop)
         with watch.phase("act"):
             due = self.schedule.due(loop)
@@ -151,10 +151,18 @@ class Match:
             results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
         timings = watch.timings(answers, lag_s)
         reports = [
-            side.report(at, does, result, timings, answers.incidents)
+            side.report(at, does, result, timings, answers.incidents, asked.unasked)
             for side, does, result in zip(self.sides, played, results, strict=True)
         ]
         return StepOutcome(self._whole(at, reports, results), [result.snapshot for result in results], answers.lost)
+
+    def _ask(self, at: StepId, loop: int) -> Asked:
+        return self.schedule.ask(
+            at,
+            loop,
+            happened=lambda seat: self._side(seat).happened(seat.agent),
+            is_needed=lambda seat: self._side(seat).is_needed(seat.agent),
+        )
 
     async def _begin(self, episode: int) -> None:
         self.schedule.begin()

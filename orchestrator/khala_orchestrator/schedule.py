@@ -6,8 +6,8 @@
     realtime   when it arrives: the game did not wait
 
 Then the agent's orders play out for `Clock.step_loops`, and it is asked again, unless its `every_loops` and `when`
-put that off. So one agent's slowness costs another nothing. A schedule counts; it asks nobody and plays nothing:
-`khala_orchestrator.match` does.
+put that off, or it has nothing to decide. So one agent's slowness costs another nothing. A schedule counts; it asks
+nobody and plays nothing: `khala_orchestrator.match` does.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from khala_orchestrator.roster import Seat
     from khala_orchestrator.turn import Answer
-    from khala_protocol.messages import Clock, Trigger
+    from khala_protocol.messages import Clock, Trigger, Unasked
 
 
 class StepId(NamedTuple):
@@ -66,6 +66,13 @@ class Decision:
     due_loop: int
 
 
+class Asked(NamedTuple):
+    """Who is asked in a step, in the order of the match, and why other free agents are not."""
+
+    seats: Sequence[Seat]
+    unasked: Mapping[Seat, Unasked]
+
+
 @dataclass(slots=True)
 class _Place:
     """Where one agent is in its round of being asked, deciding, and waiting for its orders to play out."""
@@ -96,18 +103,27 @@ class Schedule:
         """Begin an episode: every agent is free, and asked at once."""
         self._places = {seat: _Place(cadence) for seat, cadence in self.cadences.items()}
 
-    def ask(self, at: StepId, loop: int, happened: Callable[[Seat], Collection[Trigger]]) -> Sequence[Seat]:
-        """Return the agents to ask now, in the order of the match; they think from now on.
+    def ask(
+        self,
+        at: StepId,
+        loop: int,
+        happened: Callable[[Seat], Collection[Trigger]],
+        is_needed: Callable[[Seat], bool] = lambda _: True,
+    ) -> Asked:
+        """Return the agents to ask now, who think from now on, and why the other free ones are not asked.
 
         Args:
             at: the present step.
             loop: the present game loop.
             happened: what happened to an agent since its last observation.
+            is_needed: whether an agent has anything to decide.
         """
-        asked = [seat for seat, place in self._places.items() if self._is_due(seat, place, loop, happened)]
+        free = [seat for seat, place in self._places.items() if place.is_free and loop >= place.next_loop]
+        due = [seat for seat in free if self._is_due(seat, loop, happened)]
+        asked = [seat for seat in due if is_needed(seat)]
         for seat in asked:
             self._places[seat].asked, self._places[seat].thinks = (at, loop), True
-        return asked
+        return Asked(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
 
     def decide(self, answers: Mapping[Seat, Answer], loop: int) -> None:
         """Take the answers that arrived by this loop."""
@@ -140,10 +156,8 @@ class Schedule:
         """Return the decisions that can no longer take effect, since the episode is over."""
         return [place.decided for place in self._places.values() if place.decided is not None]
 
-    @staticmethod
-    def _is_due(seat: Seat, place: _Place, loop: int, happened: Callable[[Seat], Collection[Trigger]]) -> bool:
-        if not place.is_free or loop < place.next_loop:
-            return False
+    def _is_due(self, seat: Seat, loop: int, happened: Callable[[Seat], Collection[Trigger]]) -> bool:
+        place = self._places[seat]
         return place.asked is None or place.cadence.is_due(loop - place.asked[1], lambda: happened(seat))
 
 

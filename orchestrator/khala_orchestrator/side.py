@@ -8,6 +8,7 @@ an agent (what was accepted and rejected, and who wrote to it) waits here until 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act import Actor
@@ -20,7 +21,7 @@ from khala_protocol.messages import AgentReport, Message, Observation, Received,
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from khala_bridge.act import Command, JointAction
     from khala_bridge.game.game import StepResult
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.mailbox import Post
     from khala_orchestrator.schedule import Decision, StepId
-    from khala_protocol.messages import Advice, Fate, Timings, Trigger
+    from khala_protocol.messages import Advice, Fate, Timings, Trigger, Unasked
     from khala_protocol.speech import Speech
 
 
@@ -112,6 +113,16 @@ class Side:
             found.add("message")
         return found
 
+    def is_needed(self, agent: str) -> bool:
+        """Return whether an agent has anything to decide: units, orders to the whole side, a message, or nothing else.
+
+        An agent without teams only talks, and does so whenever it is asked.
+        """
+        config = self.task.agent(agent)
+        return bool(
+            config.ask == "always" or not config.teams or self._now.teams[agent] or self._pending[agent].messages
+        )
+
     def question(self, agent: str, at: StepId) -> Question:
         """Return an agent's observation of the present state, with all that was to be said to it."""
         seen, heard = self._now.agents[agent], self._pending[agent]
@@ -192,7 +203,13 @@ class Side:
     # --- reporting ----------------------------------------------------------------------------------
 
     def report(
-        self, at: StepId, played: Played, result: StepResult, timings: Timings, incidents: Sequence[str] = ()
+        self,
+        at: StepId,
+        played: Played,
+        result: StepResult,
+        timings: Timings,
+        incidents: Sequence[str] = (),
+        unasked: Mapping[Seat, Unasked] = MappingProxyType({}),
     ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
         heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
@@ -210,6 +227,7 @@ class Side:
             functions=result.played.functions,
             env_steps=result.env_steps,
             score=result.snapshot.score.total,
+            unasked={seat.agent: why for seat, why in unasked.items() if seat.side == self.name},
             incidents=tuple(incidents),
             timings=timings,
         )

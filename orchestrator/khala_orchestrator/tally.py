@@ -40,6 +40,7 @@ class Tally:
         self._dead: Counter[Alliance] = Counter()
         self._usage: dict[str, Usage] = defaultdict(Usage)
         self._statuses: dict[str, Counter[str]] = defaultdict(Counter)
+        self._unasked: dict[str, Counter[str]] = defaultdict(Counter)
         self._rejections: Counter[str] = Counter()
         self._fates: dict[str, Counter[str]] = defaultdict(Counter)
         self._fallbacks: dict[str, Counter[str]] = defaultdict(Counter)
@@ -69,6 +70,8 @@ class Tally:
             if agent.latency_s is not None:
                 self._latencies_s.append(agent.latency_s)
                 self._ages_loops.append(agent.age_loops)
+        for name, why in report.unasked.items():
+            self._unasked[name][why] += 1
         self._incidents += [f"step {report.step}: {incident}" for incident in report.incidents]
         self._advisers.update(report.advisers)
         self._lag_s = report.timings.lag_s
@@ -107,6 +110,7 @@ class Tally:
             score=self._last.score.total,
             usage=dict(self._usage),
             statuses={name: dict(count) for name, count in self._statuses.items()},
+            unasked={name: dict(count) for name, count in self._unasked.items()},
             rejections=dict(self._rejections),
             fates={name: dict(count) for name, count in self._fates.items()},
             fallbacks={name: dict(count) for name, count in self._fallbacks.items()},

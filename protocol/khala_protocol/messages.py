@@ -73,6 +73,7 @@ Fate = Literal[
 ]
 
 Trigger = Literal["attacked", "idle", "message"]
+Unasked = Literal["no_units", "not_due"]
 
 
 class Frozen(BaseModel):
@@ -762,6 +763,9 @@ class Report(Wire):
     env_steps: int = 0
     """Number of `SC2Env.step` calls of the joint action."""
     score: float = 0.0
+    unasked: dict[str, Unasked] = {}
+    """By agent that could have been asked in this step, why it was not: it has no units to command, or its
+    `every_loops` and `when` put it off. Those who still think are not among them."""
     incidents: tuple[str, ...] = ()
     """What failed in this step and was overcome, or not: an agent that was away, a match that was resumed."""
     timings: Timings = Timings()
@@ -805,6 +809,8 @@ class Result(Wire):
     """By agent."""
     statuses: dict[str, dict[str, int]] = {}
     """By agent: how many of its steps ended `ok`, `late`, …"""
+    unasked: dict[str, dict[str, int]] = {}
+    """By agent: in how many steps it was not asked, by reason."""
     rejections: dict[str, int] = {}
     """Rejected calls by reason."""
     fates: dict[str, dict[str, int]] = {}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala_bridge.task.config import TeamConfig
 from khala_protocol.messages import Pace, Usage
 from khala_protocol.recording import Recording
 
@@ -162,6 +163,25 @@ async def test_an_agent_may_be_asked_only_when_something_happens(hall: Hall, con
 
     await hall.play(match, Stalkers=calls)
     assert [step for step, *_ in steps(hall, "Zealots")] == [0, 2]
+
+
+async def test_an_agent_without_units_is_asked_only_when_somebody_writes_to_it(hall: Hall, config: MakeConfig) -> None:
+    match = config(step_loops=10, max_steps=4)
+    stalkers, zealots = match.task.agents
+    team = TeamConfig(name="Sentry-1", unit_types=("Sentry",))
+    bare = zealots.model_copy(update={"teams": (team,), "actions": {"Sentry": ("Stop",)}})
+    match = match.model_copy(update={"task": match.task.model_copy(update={"agents": (stalkers, bare)})})
+
+    async def calls(peer: Peer, seen: Observation) -> None:
+        await peer.answer(seen, "<MessageTo(Zealots, 'help')>" if seen.step == 1 else "")
+
+    (result,) = await hall.play(match, Stalkers=calls)
+    assert [step for step, *_ in steps(hall, "Zealots")] == [2]
+    assert [dict(report.unasked) for report in hall.reports] == [{"Zealots": "no_units"}] * 2 + [{}] + [
+        {"Zealots": "no_units"}
+    ]
+    assert result.unasked == {"Zealots": {"no_units": 3}}
+    assert result.valid
 
 
 async def test_a_match_without_a_required_agent_ends_and_is_not_valid(

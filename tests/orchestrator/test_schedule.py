@@ -44,7 +44,7 @@ def play(
     moments: list[tuple[int, list[str], list[str]]] = []
     loop, thinking = 0, set[Seat]()
     while loop <= until:
-        asked = schedule.ask(StepId(0, len(moments)), loop, nothing)
+        asked, _ = schedule.ask(StepId(0, len(moments)), loop, nothing)
         thinking |= {*asked}
         found = {seat: answer for seat in sorted(thinking) if (answer := answers(seat, loop)) is not None}
         thinking -= found.keys()
@@ -141,7 +141,18 @@ def test_an_agent_is_asked_by_its_cadence(
 def test_whatever_its_cadence_an_agent_sees_the_beginning() -> None:
     schedule = Schedule(Clock(), {SLOW: Cadence(1000, ("message",))})
     schedule.begin()
-    assert schedule.ask(StepId(0, 0), 5, nothing) == [SLOW]
+    assert schedule.ask(StepId(0, 0), 5, nothing).seats == [SLOW]
+
+
+def test_who_is_not_asked_is_told_with_the_reason() -> None:
+    schedule = Schedule(Clock(step_loops=8), {QUICK: Cadence(), SLOW: Cadence(1000)})
+    schedule.begin()
+    schedule.ask(StepId(0, 0), 0, nothing)
+    assert schedule.ask(StepId(0, 1), 0, nothing) == ([], {})
+    schedule.decide({QUICK: reply(QUICK), SLOW: reply(SLOW)}, 0)
+    schedule.due(0)
+    asked = schedule.ask(StepId(0, 2), 8, nothing, is_needed=lambda seat: seat is SLOW)
+    assert asked == ([], {QUICK: "no_units", SLOW: "not_due"})
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ MOST_ACTIONS = 1000
 """Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
 AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
+Asking: TypeAlias = Literal["needed", "always"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
 
 
@@ -175,6 +176,9 @@ class AgentConfig(Frozen):
     """Limit of actions for one of its teams in one reply; None for the task's limit."""
     required: bool = True
     """Whether the match waits for it, at the start and while it is away."""
+    ask: Asking = "needed"
+    """`needed`: not while its teams have no units, unless somebody wrote to it. Agents with a team of the kind `side`,
+    and those without teams, are always needed. `always`: without units, too."""
     every_loops: int = Field(default=0, ge=0, le=100_000)
     """Game loops that pass at least between two of its observations."""
     when: tuple[Trigger, ...] = ()
