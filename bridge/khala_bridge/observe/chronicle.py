@@ -91,6 +91,8 @@ class Chronicle:
     _enemies: dict[int, _Known] = field(default_factory=dict)
     _own: dict[int, Unit] = field(default_factory=dict)
     """Own units at the last observation, by tag."""
+    _finished: set[tuple[int, str]] = field(default_factory=set)
+    """Tags and types of the own units that were finished at some observation, whether they are in sight or not."""
     _upgrades: frozenset[str] = frozenset()
     _log: list[Entry] = field(default_factory=list)
     """Of the observations that brought something."""
@@ -100,9 +102,9 @@ class Chronicle:
         self.number += 1
         before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
         new, killed = self._new_enemies(snapshot), self._killed(snapshot.dead)
+        made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if self._is_new(unit, before.get(tag))]
         events: tuple[Event, ...] = ()
         if self.number:
-            made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if _is_new(unit, before.get(tag))]
             learnt = [name for name in snapshot.upgrades if name not in self._upgrades]
             researched = [Event(what="researched", tag="", type=name, alliance="own") for name in learnt]
             lost = [_of(unit, "died", "own") for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit)]
@@ -113,6 +115,17 @@ class Chronicle:
             self._log.append(Entry(self.number, events, snapshot.alerts, snapshot.dead, fallen))
         for tag in sorted(snapshot.dead):
             self.died.setdefault(tag, snapshot.game_loop)
+
+    def _is_new(self, unit: Unit, before: Unit | None) -> bool:
+        """Return True if an own unit is finished for the first time.
+
+        A worker that leaves a geyser, or a unit its transport, comes back as what it was; a siege tank in another mode
+        was finished at the observation before.
+        """
+        if not _is_done(unit) or (unit.tag, unit.name) in self._finished:
+            return False
+        self._finished.add((unit.tag, unit.name))
+        return before is None or not _is_done(before)
 
     def since(self, number: int) -> Sequence[Entry]:
         """Return what happened after an observation, the earliest first; after -1 is all of the episode."""
@@ -164,11 +177,6 @@ def _of(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
 def _is_done(unit: Unit) -> bool:
     """Return True if an own unit is finished, as its view says it, and worth an event."""
     return unit.name not in PASSING and round(unit.build_progress, 2) >= 1
-
-
-def _is_new(unit: Unit, before: Unit | None) -> bool:
-    """Return True if an own unit is finished, and was not at the observation before."""
-    return _is_done(unit) and (before is None or not _is_done(before))
 
 
 def _units_first(name: str) -> tuple[bool, str]:

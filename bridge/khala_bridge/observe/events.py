@@ -1,7 +1,8 @@
 """Events between two observations: of the units on a team's screen, and of the whole side.
 
 Compares two views of the same team, with the game's list of dead units, which no view has. An enemy that is neither in
-sight nor among the dead has walked out of sight, which is another event. `khala_bridge.observe.changes` is above.
+sight nor among the dead has walked out of sight, which is another event. Units of the own side that come onto a team's
+screen or leave it make none: nothing happened to them. `khala_bridge.observe.changes` is above.
 """
 
 from __future__ import annotations
@@ -56,22 +57,25 @@ class Events:
         """
         old = {*saw.own, *saw.allies, *saw.enemies}
         found = self._of(now.own, frozenset(saw.own), "joined", "own")
-        found += self._of(now.allies, old, "appeared", "ally")
+        found += self._of(now.allies, old, None, "ally")
         found += self._of(now.enemies, old, "appeared", "enemy")
         if gone := old.difference(now.own, now.allies, now.enemies):
             units = (unit for unit in chain(before.units, before.allies, before.enemies) if unit.tag in gone)
-            found += [_event(self._end_of(unit), unit, unit.alliance) for unit in units]
+            ends = [(self._end_of(unit), unit) for unit in units]
+            found += [_event(end, one, one.alliance) for end, one in ends if end == "died" or one.alliance != "ally"]
         return tuple(found)
 
     def _end_of(self, unit: UnitView) -> EventKind:
         return "died" if unit.tag in self._dead else "disappeared"
 
-    def _of(self, tags: Iterable[str], old: Container[str], arrival: EventKind, alliance: Alliance) -> list[Event]:
-        """Return the events of some units that came, were hurt or were healed."""
+    def _of(
+        self, tags: Iterable[str], old: Container[str], arrival: EventKind | None, alliance: Alliance
+    ) -> list[Event]:
+        """Return the events of some units that came, were hurt or were healed; without an arrival, nobody comes."""
         changed = self._changed_as(alliance)
         found = []
         for tag in tags:
-            if tag not in old:
+            if tag not in old and arrival:
                 found.append(_event(arrival, self._now[tag], alliance))
             elif tag in changed:
                 found.append(changed[tag])

@@ -109,6 +109,19 @@ def test_what_happened_to_the_side_is_told(unit: Any, look: Any, views: Any) -> 
     ]
 
 
+def test_who_comes_back_from_a_geyser_is_not_new(unit: Any, look: Any, views: Any) -> None:
+    hall, probe = unit(1, "Nexus", 10, 10), unit(2, "Probe", 14, 10)
+    *_, inside, back = views("Developer", look([hall, probe]), look([hall]), look([hall, probe]))
+    assert (inside.events, back.events) == ((), ())
+
+
+def test_a_worker_that_becomes_a_structure_is_new_once(unit: Any, look: Any, views: Any) -> None:
+    growing = unit(2, "SpawningPool", 14, 10, build_progress=0.5)
+    drone, pool = unit(2, "Drone", 14, 10), unit(2, "SpawningPool", 14, 10)
+    *_, done, later = views("Developer", *map(look, ([drone], [growing], [pool], [pool])))
+    assert [(event.what, event.type) for event in (*done.events, *later.events)] == [("finished", "SpawningPool")]
+
+
 def test_nothing_has_happened_at_the_first_observation(base: Any, look: Any, views: Any) -> None:
     (view,) = views("Developer", look(base()))
     assert view.events == ()

@@ -257,13 +257,7 @@ def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
         else:
             groups[key] = [event]
     order = sorted(groups, key=lambda key: (_PLACES[key[0]], key[1:]))
-    return [(f"{key[1]} {key[2]} {_VERBS[key[0]]}", groups[key]) for key in order if not _passing_by(*key)]
-
-
-def _passing_by(what: str, alliance: str, name: str) -> bool:
-    """Return True if an event only says that the team has passed something that stays or works there."""
-    passed = alliance == "ally" and what in {"appeared", "disappeared"}
-    return passed and (is_structure(name) or is_worker(name))
+    return [(f"{key[1]} {key[2]} {_VERBS[key[0]]}", groups[key]) for key in order]
 
 
 def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
