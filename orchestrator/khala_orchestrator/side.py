@@ -239,7 +239,9 @@ class Side:
             *(refusal.rejection for refusal in result.played.refusals if refusal.agent == seat.agent),
             *played.post.rejections.get(seat, ()),
         )
-        return Feedback(joint.accepted.get(seat.agent, ()), shortened(rejections), played.post.received.get(seat, ()))
+        accepted, wrote = joint.accepted.get(seat.agent, ()), any(m.agent == seat.agent for m in played.post.taken)
+        received = played.post.received.get(seat, ())
+        return Feedback(accepted, shortened(rejections), received, ordered=bool(accepted) or wrote)
 
     def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
         agent, loop = decision.seat.agent, self._now.snapshot.game_loop
@@ -292,4 +294,5 @@ def _too_old(decision: Decision, text: str, start: int) -> Rejection:
 def _joined(before: Feedback, more: Feedback) -> Feedback:
     """Return two feedbacks as one, the older first; of the messages those that still fit into an observation."""
     accepted, rejections = before.accepted + more.accepted, before.rejections + more.rejections
-    return Feedback(accepted, rejections, newest(before.messages + more.messages))
+    messages, ordered = newest(before.messages + more.messages), before.ordered or more.ordered
+    return Feedback(accepted, rejections, messages, ordered=ordered)

@@ -244,6 +244,8 @@ class ActionCost(Frozen):
     supply: float = 0.0
     times: int = Field(ge=0)
     """How often it could be paid for now; at most 1 for research."""
+    time_s: float = 0.0
+    """Seconds until its product is finished, without a boost."""
     footprint: tuple[int, int] | None = None
     """Width and height of the ground that it takes, in world units; None for actions without a point."""
     first: bool = False
@@ -325,6 +327,8 @@ class EnemyCount(Frozen):
     dead: int = 0
     minimap: Point | None = None
     """Place where one of them was last seen."""
+    unseen_s: float = 0.0
+    """Seconds since one of them was last seen."""
 
 
 class Counts(Frozen):
@@ -374,6 +378,79 @@ class Landmark(Frozen):
     """Further information."""
 
 
+class Place(Frozen):
+    """A place of the map with a name, the same for all agents of a side and all of an episode."""
+
+    name: str
+    """`Base 2`, counted by the way from where the side began."""
+    what: Literal["base", "ramp", "passage"]
+    minimap: Point
+    start: bool = False
+    """Whether a player may begin there."""
+    holder: Literal["", "own", "enemy"] = ""
+    """Whose town hall stands there, as far as the side knows."""
+    unseen_s: float | None = None
+    """Seconds since the place was last in sight; None if it never was."""
+    about: str = ""
+
+
+class ArmyPart(Frozen):
+    """Own units of the army that are together, or enemy units as they were last seen."""
+
+    place: str = ""
+    """The name of the place where they are; "" between places."""
+    minimap: Point
+    units: dict[str, int]
+    doing: str = ""
+    """What most of them do: `idle`, `attack at [40, 46]`; "" for enemies."""
+    value: int = 0
+    """Minerals and vespene that they cost."""
+    unseen_s: float = 0.0
+    """Seconds since any of these enemies was in sight."""
+    away: float | None = None
+    """Of enemies: world units to the nearest own town hall."""
+
+
+class Army(Frozen):
+    """The army of a side, and what it knows of the enemy's."""
+
+    parts: tuple[ArmyPart, ...] = ()
+    scouts: tuple[ArmyPart, ...] = ()
+    """Workers and unarmed units that are on their way to a place far from home."""
+    enemies: tuple[ArmyPart, ...] = ()
+    """Armed enemy units, the nearest to home first."""
+    value: int = 0
+    """Minerals and vespene of the whole army."""
+
+
+class Toll(Frozen):
+    """The losses of both sides since an agent's last order."""
+
+    since_s: float
+    lost: dict[str, int] = {}
+    killed: dict[str, int] = {}
+
+
+class Economy(Frozen):
+    """What comes in and what it is spent on."""
+
+    income: tuple[int, int]
+    """Minerals and vespene per minute at present."""
+    spending: tuple[int, int]
+    """Minerals and vespene spent in the last minute."""
+    gatherers: tuple[int, int, int]
+    """Workers on minerals, on vespene, and without an order."""
+    room: tuple[int, int]
+    """How many workers the finished bases and gas structures have work for, at minerals and at vespene."""
+    supply_coming: float = 0.0
+    """Supply that is under construction."""
+    full_in_s: float | None = None
+    """Seconds until no supply is left, at the pace of the last minute and with what is under construction; None if
+    none was used."""
+    casters: dict[str, tuple[int, ...]] = {}
+    """Energy of each own unit or structure that has any, by type."""
+
+
 class WarpGates(Frozen):
     """How many units can be warped in."""
 
@@ -399,6 +476,14 @@ class View(Frozen):
     alerts: tuple[Alert, ...] = ()
     others: tuple[TeamReport, ...] = ()
     landmarks: tuple[Landmark, ...] = ()
+    places: tuple[Place, ...] = ()
+    playable: tuple[float, float, float, float] | None = None
+    """The part of the minimap that units can be on: x0, y0, x1, y1."""
+    enemy_race: str = ""
+    """What the opponent chose, `random` too."""
+    army: Army | None = None
+    toll: Toll | None = None
+    economy: Economy | None = None
     warp_gates: WarpGates | None = None
 
 

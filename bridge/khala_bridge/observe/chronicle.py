@@ -9,16 +9,17 @@ those at which no agent looks; so it reads the snapshot itself and makes no view
 from __future__ import annotations
 
 import functools
+from collections import deque
 from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.knowledge import knowledge
 from khala_bridge.observe.body import rounded
-from khala_protocol.messages import EnemyCount, Event
+from khala_protocol.messages import LOOPS_PER_S, EnemyCount, Event
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from khala_bridge.frames import MapFrame
     from khala_bridge.observe.events import EventKind
@@ -51,6 +52,7 @@ PASSING = frozenset(
     }
 )
 """Types that come and go by themselves: no event reports them."""
+MINUTE_LOOPS = round(60 * LOOPS_PER_S)
 COUNTED_ANYWAY = frozenset({"Larva", "Egg", "Cocoon"})
 """Of these, the ones whose number matters to producers."""
 
@@ -71,13 +73,24 @@ class Entry(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Known:
+class Sighting:
     """An enemy unit as it was last seen."""
 
     unit: Unit
     seen: int
     """Number of the last observation that showed it."""
+    loop: int
+    """Game loop of that observation."""
     dead: bool = False
+
+
+class Account(NamedTuple):
+    """What a side had spent and used at a moment."""
+
+    loop: int
+    spent: tuple[float, float]
+    """Minerals and vespene since the episode began."""
+    supply_used: int
 
 
 @dataclass(slots=True)
@@ -86,9 +99,13 @@ class Chronicle:
 
     number: int = -1
     """Of the last observation; the first one is 0."""
+    loop: int = 0
+    """Game loop of the last observation."""
+    accounts: deque[Account] = field(default_factory=deque)
+    """One for each observation of the last minute, the earliest first."""
     died: dict[int, int] = field(default_factory=dict)
     """By tag of a dead unit, the game loop of the observation that reported its death."""
-    _enemies: dict[int, _Known] = field(default_factory=dict)
+    _enemies: dict[int, Sighting] = field(default_factory=dict)
     _own: dict[int, Unit] = field(default_factory=dict)
     """Own units at the last observation, by tag."""
     _finished: set[tuple[int, str]] = field(default_factory=set)
@@ -100,6 +117,8 @@ class Chronicle:
     def note(self, snapshot: Snapshot) -> None:
         """Take in an observation."""
         self.number += 1
+        self.loop = snapshot.game_loop
+        self._keep_account(snapshot)
         before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
         new, killed = self._new_enemies(snapshot), self._killed(snapshot.dead)
         made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if self._is_new(unit, before.get(tag))]
@@ -115,6 +134,11 @@ class Chronicle:
             self._log.append(Entry(self.number, events, snapshot.alerts, snapshot.dead, fallen))
         for tag in sorted(snapshot.dead):
             self.died.setdefault(tag, snapshot.game_loop)
+
+    def _keep_account(self, snapshot: Snapshot) -> None:
+        self.accounts.append(Account(snapshot.game_loop, snapshot.score.spent, snapshot.player.food_used))
+        while self.accounts[0].loop < snapshot.game_loop - MINUTE_LOOPS:
+            self.accounts.popleft()
 
     def _is_new(self, unit: Unit, before: Unit | None) -> bool:
         """Return True if an own unit is finished for the first time.
@@ -139,7 +163,7 @@ class Chronicle:
                 continue
             if tag not in self._enemies:
                 new.append(_of(unit, "appeared", "enemy"))
-            self._enemies[tag] = _Known(unit, self.number)
+            self._enemies[tag] = Sighting(unit, self.number, snapshot.game_loop)
         return new
 
     def _killed(self, dead: frozenset[int]) -> list[Event]:
@@ -151,22 +175,28 @@ class Chronicle:
                 killed.append(_of(known.unit, "died", "enemy"))
         return killed
 
+    @property
+    def sightings(self) -> Iterator[Sighting]:
+        """Every enemy that was seen and did not die in sight, in the order in which they were seen first."""
+        return (known for known in self._enemies.values() if not known.dead)
+
     def enemies(self, world: MapFrame) -> tuple[EnemyCount, ...]:
         """Return the known number of each type of enemy; units before structures, each in alphabetical order."""
-        by_type: dict[str, list[_Known]] = {}
+        by_type: dict[str, list[Sighting]] = {}
         for known in self._enemies.values():
             by_type.setdefault(known.unit.name, []).append(known)
         return tuple(self._counted(name, by_type[name], world) for name in sorted(by_type, key=_units_first))
 
-    def _counted(self, name: str, known: Sequence[_Known], world: MapFrame) -> EnemyCount:
+    def _counted(self, name: str, known: Sequence[Sighting], world: MapFrame) -> EnemyCount:
         alive = [enemy for enemy in known if not enemy.dead]
-        last = max(alive, key=lambda enemy: enemy.seen).unit.pos if alive else None
+        last = max(alive, key=lambda enemy: enemy.seen) if alive else None
         return EnemyCount(
             type=name,
             seen=len(known),
             in_sight=sum(enemy.seen == self.number for enemy in alive),
             dead=len(known) - len(alive),
-            minimap=rounded(world.minimap(*last), world.minimap_size) if last else None,
+            minimap=rounded(world.minimap(*last.unit.pos), world.minimap_size) if last else None,
+            unseen_s=round((self.loop - last.loop) / LOOPS_PER_S, 1) if last else 0.0,
         )
 
 

@@ -31,6 +31,8 @@ class Feedback:
     """Its calls that were carried out, `Stalker-1 <Attack_Unit(0x1)>`."""
     rejections: tuple[Rejection, ...] = ()
     messages: tuple[Received, ...] = ()
+    ordered: bool = False
+    """Whether it gave an order or wrote a message."""
 
 
 def shortened(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:

@@ -14,6 +14,7 @@ from khala_bridge.observe.body import rounded
 from khala_bridge.observe.chronicle import PASSING, is_structure
 from khala_bridge.observe.scene import on_screen, screen_of
 from khala_bridge.state.ground import land_of
+from khala_bridge.state.ground.atlas import BASE_TAKEN
 from khala_protocol.messages import Landmark
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 MAX_PLACES = 5
 """Number of free places for a base that a page shows, the nearest ones."""
-BASE_TAKEN = 6.0
-"""World units from the middle of a base's place within which a town hall takes it."""
 POWERS = frozenset({"Pylon", "PylonOvercharged", "WarpPrismPhasing"})
 """Sources of power at which units can be warped in; a Nexus or a Gateway only makes it faster."""
 GAS_OF_BASE = 10.0

@@ -17,12 +17,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.observe import landmarks, side
+from khala_bridge.observe import army, economy, landmarks, side
 from khala_bridge.observe.body import rounded
 from khala_bridge.observe.changes import Changes
 from khala_bridge.observe.chronicle import Chronicle
 from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation, SideObservation
+from khala_bridge.observe.places import Places
 from khala_bridge.observe.scene import Scene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Page, render, sections_of
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig, TaskConfig
-    from khala_protocol.messages import Landmark, View
+    from khala_protocol.messages import Landmark, Toll, View
 
 
 class Observer:
@@ -56,6 +57,7 @@ class Observer:
         self._configs = {agent.name: agent for agent in task.agents}
         self._sections = {agent.name: sections_of(agent) for agent in task.agents}
         self._parts = {name: _parts(sections) for name, sections in self._sections.items()}
+        self._leads = any(parts & {"map", "army"} for parts in self._parts.values())
         self.begin()
 
     def begin(self) -> None:
@@ -75,6 +77,9 @@ class Observer:
         episode, world = self._episode, snapshot.info.frame(self._task.frames)
         episode.roster.update(snapshot.own, snapshot.player)
         episode.chronicle.note(snapshot)
+        if self._leads:
+            episode.places.note(snapshot)
+        episode.note_orders(feedback or {})
         teams = {name: episode.roster.teams(name) for name in self._configs}
         moment = episode.now = _Moment(self._task, snapshot, episode, teams, feedback or {})
         moment.reach(world)
@@ -122,6 +127,14 @@ class Observer:
             more["events"] = changes.of_side
         if "alerts" in parts:
             more["alerts"], more["warnings"] = side.alerts(scene, changes), side.warnings(changes)
+        if "map" in parts:
+            more["places"] = moment.episode.places.views(scene.snapshot, scene.world)
+            more["playable"], more["enemy_race"] = side.playable(scene), scene.snapshot.info.enemy_race
+        if "army" in parts:
+            more["army"] = army.army(scene, moment.episode.places, moment.episode.chronicle)
+            more["toll"] = moment.episode.toll(agent.name)
+        if "economy" in parts:
+            more["economy"] = economy.economy(scene, moment.episode.chronicle)
         if "others" in parts:
             more["others"] = side.others(scene, moment.teams, agent.name)
         if "power" in parts:
@@ -153,9 +166,25 @@ class _Episode:
     roster: TeamRoster
     chronicle: Chronicle = field(default_factory=Chronicle)
     stages: Stages = field(default_factory=Stages)
+    places: Places = field(default_factory=Places)
     last: dict[str, _Last] = field(default_factory=dict)
     """By agent."""
+    ordered: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """By agent that has given an order: number and game loop of the observation that followed the last one."""
     now: _Moment | None = None
+
+    def note_orders(self, feedback: Mapping[str, Feedback]) -> None:
+        """Take in who has given orders before the present observation."""
+        for agent, heard in feedback.items():
+            if heard.ordered:
+                self.ordered[agent] = (self.chronicle.number, self.chronicle.loop)
+
+    def toll(self, agent: str) -> Toll | None:
+        """Return the losses since an agent's last order; None if it gave none, or just now."""
+        number, loop = self.ordered.get(agent, (self.chronicle.number, 0))
+        if number >= self.chronicle.number:
+            return None
+        return army.toll(self.chronicle, self.chronicle.since(number), loop)
 
 
 @dataclass(eq=False)

@@ -105,6 +105,7 @@ class Possible:
             minerals=round(cost.minerals),
             vespene=round(cost.vespene),
             supply=cost.supply,
+            time_s=round(facts.time_s, 1),
             times=min(times, 1) if facts.researches else times,
             first=known is not None and known.structure and not self._side.builds(known.name),
             footprint=known.footprint if known is not None and "screen" in action.args else None,

@@ -35,6 +35,8 @@ class EpisodeInfo(NamedTuple):
     """Width and height of the map in cells, which are world units."""
     playable: tuple[int, int, int, int] = (0, 0, 0, 0)
     """The part of the map that units can be on: x0, y0, x1, y1 in the world frame."""
+    enemy_race: str = ""
+    """Race that the opponent chose, `random` too; "" if unknown."""
     starts: tuple[WorldPoint, ...] = ()
     """Possible starts of other players."""
     placement: Grid = NO_GRID

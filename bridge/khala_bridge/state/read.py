@@ -15,7 +15,7 @@ import functools
 import operator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from s2clientprotocol import error_pb2, raw_pb2
+from s2clientprotocol import common_pb2, error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.frames import WorldPoint
@@ -30,7 +30,7 @@ from khala_bridge.state.unit import Alliance, Display, Unit, UnitOrder
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from s2clientprotocol import common_pb2, score_pb2
+    from s2clientprotocol import score_pb2
 
     from khala_bridge.knowledge import UnitFacts
     from khala_protocol.messages import Outcome
@@ -49,6 +49,7 @@ def read_info(info: sc_pb.ResponseGameInfo) -> EpisodeInfo:
     return EpisodeInfo(
         size=(raw.map_size.x, raw.map_size.y),
         playable=(area.p0.x, area.p0.y, area.p1.x, area.p1.y),
+        enemy_race=_enemy_race(info),
         starts=tuple(WorldPoint(round(p.x, 3), round(p.y, 3)) for p in raw.start_locations),
         placement=_grid(raw.placement_grid),
         pathing=_grid(raw.pathing_grid),
@@ -60,6 +61,13 @@ def read_info(info: sc_pb.ResponseGameInfo) -> EpisodeInfo:
             render.width,
         ),
     )
+
+
+def _enemy_race(info: sc_pb.ResponseGameInfo) -> str:
+    """Return the race that the opponent chose; the game tells a player only of its own actual race."""
+    others = (p.race_requested for p in info.player_info if p.type != sc_pb.Observer and not p.race_actual)
+    race = next(others, common_pb2.NoRace)
+    return common_pb2.Race.Name(race).lower() if race else ""
 
 
 def read_snapshot(
@@ -205,6 +213,8 @@ def _score(score: score_pb2.Score) -> PlayerScore:
         total=float(score.score),
         killed=_total(details.killed_minerals) + _total(details.killed_vespene),
         lost=_total(details.lost_minerals) + _total(details.lost_vespene),
+        income=(details.collection_rate_minerals, details.collection_rate_vespene),
+        spent=(details.spent_minerals, details.spent_vespene),
     )
 
 

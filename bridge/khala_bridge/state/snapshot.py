@@ -51,6 +51,10 @@ class PlayerScore(NamedTuple):
     """Minerals and vespene of everything that the player destroyed in the episode."""
     lost: float = 0.0
     """Minerals and vespene of everything that the player lost in the episode."""
+    income: tuple[float, float] = (0.0, 0.0)
+    """Minerals and vespene that come in per minute at present."""
+    spent: tuple[float, float] = (0.0, 0.0)
+    """Minerals and vespene spent in the episode."""
 
 
 class PowerSource(NamedTuple):

@@ -54,6 +54,7 @@ def _price(offer: ActionCost) -> str:
     parts = [f"{offer.minerals} minerals"] if offer.minerals else []
     parts += [f"{offer.vespene} vespene"] if offer.vespene else []
     parts += [f"{n(offer.supply)} supply"] if offer.supply else []
+    parts += [f"{n(offer.time_s)} s"] if offer.time_s else []
     more = [f"enough for {offer.times}"] if offer.times > 1 else []
     more += [f"takes {offer.footprint[0]} x {offer.footprint[1]} cells of ground"] if offer.footprint else []
     more += ["you have none yet"] if offer.first else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section
-from khala_bridge.observe.text.words import INDENT, n, one_line
+from khala_bridge.observe.text.words import INDENT, minutes, n, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,8 +19,7 @@ def game(page: Page) -> Iterator[str]:
     """Show the time, and the resources if the agent spends them."""
     view, used = page.view, page.view.resources
     yield "Game"
-    minutes, seconds = divmod(int(view.time_s), 60)
-    yield f"{INDENT}Time: {minutes}:{seconds:02}"
+    yield f"{INDENT}Time: {minutes(view.time_s)}"
     if used.minerals or used.vespene or page.observation.agent.kind != "combat_group":
         yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promised(used)}"
         yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"

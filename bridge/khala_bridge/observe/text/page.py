@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 
     Write: TypeAlias = Callable[["Page"], Iterable[str]]
 
-Part: TypeAlias = Literal["counts", "events", "alerts", "others", "resources", "places", "power", "structures"]
+Part: TypeAlias = Literal[
+    "counts", "events", "alerts", "others", "resources", "places", "power", "structures", "map", "army", "economy"
+]
 """A part of the view that is made only for agents with a section that shows it."""
 
 

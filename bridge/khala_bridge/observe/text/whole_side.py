@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, counted, listed, percent, point, whole
+from khala_bridge.observe.text.words import INDENT, INDENT2, ago, counted, listed, percent, point, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -66,7 +66,7 @@ def _enemy(enemy: EnemyCount) -> str:
     elif enemy.in_sight:
         line = f"{alive} {enemy.type}, {enemy.in_sight} of them in sight{where}"
     else:
-        line = f"{alive} {enemy.type} out of sight, last seen{where}"
+        line = f"{alive} {enemy.type} out of sight, last seen {ago(enemy.unseen_s)}{where}"
     return line + (f"; {enemy.dead} more dead" if enemy.dead else "")
 
 

@@ -51,3 +51,14 @@ def listed(heading: str, lines: Iterable[str]) -> Iterator[str]:
     if found:
         yield f"{INDENT}{heading}"
         yield from (f"{INDENT2}{line}" for line in found)
+
+
+def minutes(seconds: float) -> str:
+    """Return a time as `1:05`."""
+    whole_s = int(seconds)
+    return f"{whole_s // 60}:{whole_s % 60:02}"
+
+
+def ago(seconds: float) -> str:
+    """Return how long something is past: `1:05 ago`."""
+    return f"{minutes(seconds)} ago"

@@ -104,7 +104,7 @@ def _ways(ground: MapGround, cell: tuple[int, int]) -> Floats:
     far[front] = 0.0
     left = open_ & ~front
     for step in itertools.count(1):
-        front = _grown(front, diagonal=step % 2 == 0) & left
+        front = grown(front, diagonal=step % 2 == 0) & left
         if not front.any():
             break
         far[front] = step
@@ -114,7 +114,7 @@ def _ways(ground: MapGround, cell: tuple[int, int]) -> Floats:
     return result
 
 
-def _grown(front: Bools, *, diagonal: bool) -> Bools:
+def grown(front: Bools, *, diagonal: bool) -> Bools:
     """Return some cells with their neighbours: four of each, or eight."""
     grown = front.copy()
     grown[1:] |= front[:-1]

@@ -1,0 +1,180 @@
+"""The places of a map by name, as one player speaks of them: bases, ramps and passages.
+
+Names are numbers by the way from the player's own start: Base 1 is where it begins, Base 2 the nearest other place for
+a town hall, Ramp 1 the ramp nearest to home. So they stay the same for an episode, and mean the same to all agents of a
+side. `khala_bridge.observe.places` says what is there now.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from khala_bridge.frames import WorldPoint
+from khala_bridge.state.ground.terrain import grown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from khala_bridge.state.ground.resources import Base
+    from khala_bridge.state.ground.terrain import Bools, Floats, MapGround
+
+Feature = Literal["base", "ramp", "passage"]
+
+MIN_RAMP = 8
+"""Cells of the smallest ramp: one for small units is four cells wide and two long."""
+MIN_RISE = 1.0
+"""World units between the ends of a ramp; less is uneven ground."""
+NARROW = 5
+"""Cells from the middle of a passage to its walls, at most; wider ones are open ground."""
+APART = 10.0
+"""World units between a passage and the next place with a name; it goes without saying nearer to that."""
+BASE_TAKEN = 6.0
+"""World units from the middle of a base's place within which a town hall takes it."""
+NEAR = 14.0
+"""World units within which a unit is at a place: a base with its resources and structures."""
+
+
+class NamedPlace(NamedTuple):
+    """A place that has a name."""
+
+    name: str
+    what: Feature
+    at: WorldPoint
+    start: bool = False
+    """Whether a player may begin there."""
+    width: int = 0
+    """Of a passage, in cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """The named places of a map for a player, those of each kind in the order of their ways from home."""
+
+    ground: MapGround
+    home: WorldPoint
+    places: tuple[NamedPlace, ...]
+
+    @property
+    def bases(self) -> tuple[NamedPlace, ...]:
+        """The places for a town hall; the first one is home."""
+        return tuple(place for place in self.places if place.what == "base")
+
+    def nearest(self, point: tuple[float, float]) -> NamedPlace | None:
+        """Return the place that a point is at; None if it is at no place with a name."""
+        found = min(self.places, key=lambda place: (math.dist(place.at, point), place.name), default=None)
+        return found if found is not None and math.dist(found.at, point) <= NEAR else None
+
+
+@functools.lru_cache(maxsize=8)
+def atlas_of(ground: MapGround, bases: tuple[Base, ...], home: WorldPoint) -> Atlas:
+    """Return the atlas of a map for the player who begins at `home`."""
+    ways = ground.ways_from(home)
+    in_order = sorted((base.place for base in bases), key=lambda at: (_way(ways, at), at))
+    named = [
+        NamedPlace(f"Base {number}", "base", at, start=_is_start(at, home, ground.starts))
+        for number, at in enumerate(in_order, start=1)
+    ]
+    named += _numbered("Ramp", "ramp", _ramps(ground), ways)
+    for goal in ground.starts:
+        found = [at for at in _passages(ground, home, goal) if all(math.dist(at[0], one.at) > APART for one in named)]
+        named += _numbered("Passage", "passage", found, ways, after=sum(one.what == "passage" for one in named))
+    return Atlas(ground, home, tuple(named))
+
+
+def _is_start(at: WorldPoint, home: WorldPoint, starts: Sequence[WorldPoint]) -> bool:
+    return any(math.dist(at, start) < 1 for start in (home, *starts))
+
+
+def _numbered(
+    name: str, what: Feature, found: Sequence[tuple[WorldPoint, int]], ways: Floats, after: int = 0
+) -> Iterator[NamedPlace]:
+    in_order = sorted(found, key=lambda one: (_way(ways, one[0]), one))
+    for number, (at, width) in enumerate(in_order, start=1 + after):
+        yield NamedPlace(f"{name} {number}", what, at, width=width)
+
+
+def _way(ways: Floats, to: WorldPoint) -> float:
+    return float(ways[int(to.x), int(to.y)])
+
+
+# --- ramps ----------------------------------------------------------------------------------------------------
+
+
+def _ramps(ground: MapGround) -> list[tuple[WorldPoint, int]]:
+    """Return the middles of the ramps: patches of ground that is walked on, not built on, and rises."""
+    left = ground.walkable & ~ground.buildable
+    found = []
+    while left.any():
+        patch = _patch(left)
+        left &= ~patch
+        levels = ground.height[patch]
+        if patch.sum() >= MIN_RAMP and np.ptp(levels) >= MIN_RISE:
+            x, y = np.nonzero(patch)
+            found.append((WorldPoint(round(float(x.mean()) + 0.5, 1), round(float(y.mean()) + 0.5, 1)), 0))
+    return found
+
+
+def _patch(cells: Bools) -> Bools:
+    """Return the cells that hang together with the first one."""
+    patch = np.zeros_like(cells)
+    patch[np.unravel_index(int(cells.argmax()), cells.shape)] = True
+    while True:
+        more = grown(patch, diagonal=True) & cells
+        if (more == patch).all():
+            return patch
+        patch = more
+
+
+# --- passages -------------------------------------------------------------------------------------------------
+
+
+def _passages(ground: MapGround, home: WorldPoint, goal: WorldPoint) -> list[tuple[WorldPoint, int]]:
+    """Return the narrowest points of the way from home to a goal, with their widths in cells."""
+    room = _room(ground.walkable)
+    cells = list(_walk(ground, home, goal))
+    narrow = [int(room[cell]) for cell in cells]
+    found = []
+    for run in _runs(narrow):
+        middle = min(run, key=lambda place: (narrow[place], abs(place - (run[0] + run[-1]) / 2)))
+        x, y = cells[middle]
+        found.append((WorldPoint(x + 0.5, y + 0.5), 2 * narrow[middle] - 1))
+    return found
+
+
+def _room(walkable: Bools) -> Floats:
+    """Return the distance (w, h) of each cell to the nearest wall, in steps that alternate as those of ways do."""
+    wall = np.pad(~walkable, 1, constant_values=True)
+    room = np.zeros(wall.shape, np.float32)
+    for step in itertools.count(1):
+        room[~wall] = step
+        if wall.all():
+            return room[1:-1, 1:-1]
+        wall = grown(wall, diagonal=step % 2 == 0)
+    raise AssertionError
+
+
+def _walk(ground: MapGround, start: WorldPoint, goal: WorldPoint) -> Iterator[tuple[int, int]]:
+    """Yield the cells of a shortest way; nothing if there is none."""
+    ways = ground.ways_from(goal)
+    x, y = int(start.x), int(start.y)
+    if not np.isfinite(ways[x, y]):
+        return
+    while ways[x, y] > 0:
+        yield x, y
+        x0, y0 = max(x - 1, 0), max(y - 1, 0)
+        near = ways[x0 : x + 2, y0 : y + 2]
+        dx, dy = np.unravel_index(int(near.argmin()), near.shape)
+        x, y = x0 + int(dx), y0 + int(dy)
+
+
+def _runs(narrow: Sequence[int]) -> Iterator[list[int]]:
+    """Yield the numbers of the cells of each stretch that is narrow all along."""
+    for is_narrow, run in itertools.groupby(range(len(narrow)), key=lambda place: narrow[place] <= NARROW):
+        if is_narrow:
+            yield list(run)
