@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.observe.body import rounded
 from khala_bridge.state.ground import land_of
-from khala_bridge.state.ground.atlas import BASE_TAKEN, atlas_of
+from khala_bridge.state.ground.atlas import BASE_TAKEN, HOME, atlas_of
 from khala_bridge.state.ground.land import SEEN_NOW
 from khala_protocol.messages import LOOPS_PER_S, Place
 
@@ -58,7 +58,7 @@ class Places:
             start=place.start,
             holder="" if hall is None else "own" if hall.is_own else "enemy",
             unseen_s=None if seen is None else round((snapshot.game_loop - seen) / LOOPS_PER_S, 1),
-            about=_about(place, hall),
+            about=_about(place, hall, sole=len(land.ground.starts) == 1),
         )
 
     def name_of(self, point: tuple[float, float]) -> str:
@@ -71,7 +71,10 @@ def _hall_at(place: NamedPlace, land: Land) -> Unit | None:
     return next((hall for hall in land.halls if math.dist(hall.pos, place.at) <= BASE_TAKEN), None)
 
 
-def _about(place: NamedPlace, hall: Unit | None) -> str:
+def _about(place: NamedPlace, hall: Unit | None, *, sole: bool) -> str:
+    """Return what else is to be said of a place; `sole` if an enemy can have begun at one place only."""
     if hall is not None:
         return hall.name + (f", {100 * hall.build_progress:.0f}% built" if hall.build_progress < 1 else "")
+    if place.start and place.name != HOME:
+        return f"the enemy {'began' if sole else 'may have begun'} here"
     return f"{place.width} cells wide" if place.width else ""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.knowledge import knowledge
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, ago, counted, listed, minutes, n, point
+from khala_bridge.observe.text.words import INDENT, ago, counted, listed, minutes, n, point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -32,17 +32,18 @@ def map_(page: Page) -> Iterator[str]:
     if view.playable:
         x0, y0, x1, y1 = map(n, view.playable)
         yield f"{INDENT}Units can be at minimap x {x0} to {x1}, y {y0} to {y1}"
-    yield f"{INDENT}Places, numbered by the way from where you began:"
-    yield from (f"{INDENT2}{_place(place)}" for place in view.places)
+    yield from listed(_PLACES, map(_place, view.places))
 
 
 @shorter("map", rank=45, says="ramps and passages of the map")
 def bases_alone(page: Page) -> Iterator[str]:
     """Show the bases only."""
-    bases = [place for place in page.view.places if place.what == "base"]
-    if bases:
+    if page.view.places:
         yield "Map"
-    yield from (f"{INDENT}{_place(place)}" for place in bases)
+        yield from listed(_PLACES, (_place(place) for place in page.view.places if place.what == "base"))
+
+
+_PLACES = "Places, numbered by the way from where you began:"
 
 
 def _place(place: Place) -> str:
@@ -51,8 +52,6 @@ def _place(place: Place) -> str:
         parts.append({"own": "yours", "enemy": "the enemy's", "": "no town hall known"}[place.holder])
     if place.about:
         parts.append(place.about)
-    if place.start and not place.holder and place.unseen_s is None:
-        parts.append("the enemy may have begun here")
     if place.what == "base" and place.holder != "own":
         parts.append(_looked(place))
     return ", ".join(parts)

@@ -8,6 +8,7 @@ side. `khala_bridge.observe.places` says what is there now.
 from __future__ import annotations
 
 import functools
+import heapq
 import itertools
 import math
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground.terrain import grown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from khala_bridge.state.ground.resources import Base
     from khala_bridge.state.ground.terrain import Bools, Floats, MapGround
@@ -32,12 +33,17 @@ MIN_RISE = 1.0
 """World units between the ends of a ramp; less is uneven ground."""
 NARROW = 5
 """Cells from the middle of a passage to its walls, at most; wider ones are open ground."""
+DETOUR = 20.0
+"""Cells that a way is longer for a cell beside a wall; enough to keep it to the middle of passages."""
 APART = 10.0
 """World units between a passage and the next place with a name; it goes without saying nearer to that."""
 BASE_TAKEN = 6.0
 """World units from the middle of a base's place within which a town hall takes it."""
 NEAR = 14.0
 """World units within which a unit is at a place: a base with its resources and structures."""
+
+
+HOME = "Base 1"
 
 
 class NamedPlace(NamedTuple):
@@ -75,7 +81,8 @@ class Atlas:
 def atlas_of(ground: MapGround, bases: tuple[Base, ...], home: WorldPoint) -> Atlas:
     """Return the atlas of a map for the player who begins at `home`."""
     ways = ground.ways_from(home)
-    in_order = sorted((base.place for base in bases), key=lambda at: (_way(ways, at), at))
+    others = (base.place for base in bases if math.dist(base.place, home) > BASE_TAKEN)
+    in_order = [home, *sorted(others, key=lambda at: (_way(ways, at), at))]
     named = [
         NamedPlace(f"Base {number}", "base", at, start=_is_start(at, home, ground.starts))
         for number, at in enumerate(in_order, start=1)
@@ -135,9 +142,9 @@ def _patch(cells: Bools) -> Bools:
 
 
 def _passages(ground: MapGround, home: WorldPoint, goal: WorldPoint) -> list[tuple[WorldPoint, int]]:
-    """Return the narrowest points of the way from home to a goal, with their widths in cells."""
+    """Return the narrowest points of the widest way from home to a goal, with their widths in cells."""
     room = _room(ground.walkable)
-    cells = list(_walk(ground, home, goal))
+    cells = _widest_way(room, home, goal)
     narrow = [int(room[cell]) for cell in cells]
     found = []
     for run in _runs(narrow):
@@ -159,18 +166,32 @@ def _room(walkable: Bools) -> Floats:
     raise AssertionError
 
 
-def _walk(ground: MapGround, start: WorldPoint, goal: WorldPoint) -> Iterator[tuple[int, int]]:
-    """Yield the cells of a shortest way; nothing if there is none."""
-    ways = ground.ways_from(goal)
-    x, y = int(start.x), int(start.y)
-    if not np.isfinite(ways[x, y]):
-        return
-    while ways[x, y] > 0:
-        yield x, y
-        x0, y0 = max(x - 1, 0), max(y - 1, 0)
-        near = ways[x0 : x + 2, y0 : y + 2]
-        dx, dy = np.unravel_index(int(near.argmin()), near.shape)
-        x, y = x0 + int(dx), y0 + int(dy)
+def _widest_way(room: Floats, start: WorldPoint, goal: WorldPoint) -> list[tuple[int, int]]:
+    """Return the cells of a short way that keeps away from walls; none if there is no way."""
+    first, last = (int(start.x), int(start.y)), (int(goal.x), int(goal.y))
+    open_ = [(0.0, first)]
+    before: dict[tuple[int, int], tuple[int, int] | None] = {first: None}
+    cost = {first: 0.0}
+    while open_:
+        spent, cell = heapq.heappop(open_)
+        if cell == last:
+            return list(_back(before, cell))[::-1]
+        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            near = cell[0] + dx, cell[1] + dy
+            if not (0 <= near[0] < room.shape[0] and 0 <= near[1] < room.shape[1] and room[near]):
+                continue
+            total = spent + 1 + DETOUR / float(room[near]) ** 2
+            if total < cost.get(near, math.inf):
+                cost[near], before[near] = total, cell
+                heapq.heappush(open_, (total, near))
+    return []
+
+
+def _back(before: Mapping[tuple[int, int], tuple[int, int] | None], cell: tuple[int, int]) -> Iterator[tuple[int, int]]:
+    at: tuple[int, int] | None = cell
+    while at is not None:
+        yield at
+        at = before[at]
 
 
 def _runs(narrow: Sequence[int]) -> Iterator[list[int]]:
