@@ -2,8 +2,8 @@
 
 All that stays the same during an episode is put together once and stands at the front, word for word the
 same in each step, so that a provider can cache it: the agent's role, its task, its teams, its actions
-and their form, how to answer, and an example made of the agent's own teams and actions. The messages
-that the memory recalls follow, and the observation as the host wrote it.
+and their form, how to answer, and a worked example: the host's, or one made of the agent's own teams and
+actions. The messages that the memory recalls follow, and the observation as the host wrote it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from khala_protocol.messages import ActionSpec, Briefing, Clock, Contact, Frames, ImageRef, TeamSpec
+    from khala_protocol.messages import ActionSpec, AgentKind, Briefing, Clock, Contact, Frames, ImageRef, TeamSpec
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
 """Tags of the example; a game's own tags are longer, so that a copied one is noticed at once."""
@@ -26,10 +26,11 @@ class Prompt:
     """The prompts of one episode."""
 
     def __init__(self, briefing: Briefing) -> None:
+        seen, said = _example(briefing)
         self._head = (
             ChatMessage(role="system", content=system_text(briefing)),
-            ChatMessage(role="user", content=_example_observation(briefing)),
-            ChatMessage(role="assistant", content=_example_reply(briefing)),
+            ChatMessage(role="user", content=seen),
+            ChatMessage(role="assistant", content=said),
         )
 
     def messages(
@@ -88,14 +89,39 @@ def _rules(briefing: Briefing) -> str:
     rules = [
         "You command your own teams only; others are commanded by other agents.",
         "Rely on what the latest observation says. Units that it does not list are out of sight or dead.",
-        "Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.",
-        "Fight where you gain more than you lose; pull out units that are about to die for nothing.",
-        "Abilities that help now come before moving and attacking.",
+        *_RULES[briefing.agent_kind],
         f"A team carries out at most {number} of your actions a step, in the order you write them; more are refused.",
         "An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.",
         _clock(briefing.clock),
     ]
     return "\n".join(f"- {rule}" for rule in rules)
+
+
+_RULES: dict[AgentKind, tuple[str, ...]] = {
+    "combat_group": (
+        "Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.",
+        "Fight where you gain more than you lose; pull out units that are about to die for nothing.",
+        "Abilities that help now come before moving and attacking.",
+    ),
+    "commander": (
+        "One strong army beats two weak ones: gather first, then attack together.",
+        "Attack when your army is worth more than what was seen of the enemy's, and come home when it is not.",
+        "What was seen long ago may have moved: send scouts before you decide.",
+        "Say in a message who does what, where, and until when; use the names of places and their points.",
+    ),
+    "developer": (
+        "Minerals in the bank win no game: spend what comes in, and add production when you cannot.",
+        "Order supply before it is short, workers until every base is full, and army units all the time.",
+        "Build what beats the units that the enemy was seen to have.",
+        "Write to others only what you have ordered or what they must know.",
+    ),
+    "builder": (
+        "Build only what can be paid now; each structure needs free ground, and most need power or creep.",
+        "Keep the ways between town halls and minerals free, and leave gaps for units to pass.",
+        "Build nearest to what the structure is for: supply at home, defence in front, bases at free places.",
+    ),
+}
+"""What each kind of agent should know of its work."""
 
 
 def _clock(clock: Clock) -> str:
@@ -160,6 +186,19 @@ def _format(briefing: Briefing) -> str:
     if briefing.correspondents or briefing.channels:
         lines.append('If you have something to say to others, end with "Communications:" and the messages.')
     return "\n".join(lines)
+
+
+def _example(briefing: Briefing) -> tuple[str, str]:
+    """Return an observation and a reply: the host's worked example, or one of the form alone."""
+    if briefing.example is None:
+        return _example_observation(briefing), _example_reply(briefing)
+    return f"{_NOT_THIS_GAME}\n\n{briefing.example.observation}", briefing.example.reply
+
+
+_NOT_THIS_GAME = (
+    "This is an example of an observation and an answer, not a situation of this game, and it is shorter than the "
+    "observations to come. Its tags and points mean nothing later on."
+)
 
 
 def _example_observation(briefing: Briefing) -> str:

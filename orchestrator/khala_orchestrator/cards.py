@@ -7,6 +7,7 @@ import platform
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue_sha256
+from khala_bridge.observe.text.example import example
 from khala_protocol.messages import Briefing, Contact, Run
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         episode=episode,
         episodes=episodes,
         role=agent.role,
+        agent_kind=agent.kind,
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),
         actions=tuple(action.spec for action in agent.catalogue()),
@@ -35,6 +37,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         frames=task.frames,
         clock=task.clock,
         max_actions=task.max_actions_of(agent),
+        example=example(task, agent),
     )
 
 

@@ -73,6 +73,7 @@ Fate = Literal[
 ]
 
 Trigger = Literal["attacked", "idle", "message"]
+AgentKind = Literal["combat_group", "commander", "developer", "builder"]
 Unasked = Literal["no_units", "not_due"]
 
 
@@ -615,6 +616,13 @@ class Clock(Frozen):
         return self.rule != "realtime"
 
 
+class Example(Frozen):
+    """A made-up observation of an agent, and a reply that follows from it."""
+
+    observation: str
+    reply: str
+
+
 class Briefing(Wire):
     """Host → agent: all that an agent must know, except observations, so that it can join late or restart."""
 
@@ -626,6 +634,7 @@ class Briefing(Wire):
     """Of the run; after the result of the last one there is nothing to do."""
     role: str
     """The agent's role and task."""
+    agent_kind: AgentKind = "combat_group"
     task: str = ""
     teams: tuple[TeamSpec, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
@@ -636,6 +645,7 @@ class Briefing(Wire):
     clock: Clock = Clock()
     max_actions: int = Field(default=3, ge=1)
     """Actions that one team may have in one reply; more are rejected."""
+    example: Example | None = None
 
 
 class Observation(Wire):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,6 +15,7 @@ from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.cards import briefing, run_card
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import AgentCard, Clock, Contact, Frames, TeamSpec
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -111,3 +113,22 @@ def test_the_run_card_names_the_versions_that_numbers_depend_on(config: Callable
     assert list(versions) == ["python", "khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy"]
     assert versions["python"] == platform.python_version()
     assert versions["numpy"] == importlib.metadata.version("numpy")
+
+
+def test_the_example_of_every_agent_uses_what_that_agent_has(subtests: pytest.Subtests) -> None:
+    missing = []
+    for name in ("2s3z", "pvz_task6_level1", "simple64_eceb", "simple64_ecsb", "simple64_sceb"):
+        task = load_task(name)
+        for agent in task.agents:
+            told = briefing(task, agent, "test", 0)
+            if told.example is None:
+                missing.append(f"{name}/{agent.name}")
+                continue
+            with subtests.test(task=name, agent=agent.name):
+                speech = parse(told.example.reply)
+                assert speech.faults == ()
+                assert {call.name for call in speech.calls} <= {action.name for action in told.actions}
+                assert {said.recipient for said in speech.messages} <= {other.name for other in told.correspondents}
+                tags = re.findall(r"0x\w+", told.example.reply)
+                assert all(f"{tag} " in told.example.observation for tag in tags)
+    assert missing == []

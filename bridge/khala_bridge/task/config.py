@@ -24,7 +24,7 @@ from khala_bridge.task.opponent import Opponent, opponent_of
 from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import AgentCard, Clock, Frames, Frozen, Point, TeamSpec, Trigger
+from khala_protocol.messages import AgentCard, AgentKind, Clock, Frames, Frozen, Point, TeamSpec, Trigger
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -34,7 +34,6 @@ T = TypeVar("T")
 MOST_ACTIONS = 1000
 """Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
-AgentKind: TypeAlias = Literal["combat_group", "commander", "developer", "builder"]
 Asking: TypeAlias = Literal["needed", "always"]
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
 

@@ -20,7 +20,8 @@ from khala_bridge.observe.text.page import SECTIONS, Page, Section, find_section
 from khala_bridge.observe.text.tokens import tokens
 
 if TYPE_CHECKING:
-    from khala_bridge.task.config import AgentConfig, AgentKind
+    from khala_bridge.task.config import AgentConfig
+    from khala_protocol.messages import AgentKind
 
 __all__ = [
     "SECTIONS",
