@@ -45,6 +45,7 @@ from khala.options import (
     Out,
     PolicyName,
     Resume,
+    Rhythm,
     Rule,
     RunName,
     Seed,
@@ -124,6 +125,7 @@ def run(
     clock: Rule = None,
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
+    rhythm: Rhythm = None,
     thinking_loops: ThinkingLoops = None,
     speed: Speed = None,
     grace: Grace = None,
@@ -145,7 +147,8 @@ def run(
 
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
+        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
+        thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
     )  # fmt: skip
     common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
@@ -176,6 +179,7 @@ def host(
     clock: Rule = None,
     max_wait: MaxWait = None,
     step_loops: StepLoops = None,
+    rhythm: Rhythm = None,
     thinking_loops: ThinkingLoops = None,
     speed: Speed = None,
     grace: Grace = None,
@@ -194,7 +198,8 @@ def host(
 
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, thinking_loops=thinking_loops,
+        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
+        thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
     )  # fmt: skip
     bus = _bus(config, connect, listen, tls, insecure=insecure)

@@ -34,6 +34,7 @@ RECORDED = {
     "rule": "--clock",
     "max_wait_s": "--max-wait",
     "step_loops": "--step-loops",
+    "rhythm": "--rhythm",
     "thinking_loops": "--thinking-loops",
     "speed": "--speed",
     "grace_s": "--grace",

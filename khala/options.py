@@ -34,6 +34,14 @@ RunName = Annotated[
 ]
 MaxWait = Annotated[float | None, typer.Option(min=0.01, help="Longest wait for the agents of a step, in seconds.")]
 StepLoops = Annotated[int | None, typer.Option(min=1, help="Game loops between two observations.")]
+Rhythm = Annotated[
+    str | None,
+    typer.Option(
+        metavar="own|paper",
+        help="paper: one decision a game second at most, and workers trained by the host, as in LLM-PySC2.",
+        show_default="as the task says",
+    ),
+]
 Rule = Annotated[
     ClockRule | None,
     typer.Option(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from pydantic import ValidationError
 
-from khala_bridge.task.config import AdviserConfig, AgentConfig, TaskConfig, TeamConfig
+from khala_bridge.task.config import AdviserConfig, AgentConfig, AutoConfig, TaskConfig, TeamConfig
 from khala_bridge.task.maps import known_maps
 from khala_bridge.task.opponent import Opponent
 from khala_protocol.configfile import load, loads
@@ -175,3 +175,12 @@ def test_an_adviser_has_a_name_that_no_agent_has(task: Callable[..., TaskConfig]
 def test_the_role_of_an_adviser_cannot_pass_for_other_text(role: str) -> None:
     with pytest.raises(ValidationError):
         AdviserConfig(name="Ada", role=role)
+
+
+def test_the_rhythm_of_the_paper_sets_the_step_and_the_workers(task: Any) -> None:
+    fields = task("2s3z").model_dump() | {"rhythm": "paper", "clock": {"rule": "budget", "step_loops": 5}}
+    found = TaskConfig.model_validate(fields)
+    assert (found.clock.rule, found.clock.step_loops) == ("budget", 23)
+    assert found.auto == AutoConfig(gather=True, train_workers=True)
+    with pytest.raises(ValidationError, match="rhythm"):
+        TaskConfig.model_validate(fields | {"rhythm": "slow"})

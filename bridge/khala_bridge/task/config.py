@@ -7,9 +7,10 @@ names, so that a wrong name is an error with its line, not a surprise in the gam
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,10 +25,10 @@ from khala_bridge.task.opponent import Opponent, opponent_of
 from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import AgentCard, AgentKind, Clock, Frames, Frozen, Point, TeamSpec, Trigger
+from khala_protocol.messages import LOOPS_PER_S, AgentCard, AgentKind, Clock, Frames, Frozen, Point, TeamSpec, Trigger
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Mapping
 
 T = TypeVar("T")
 
@@ -35,6 +36,12 @@ MOST_ACTIONS = 1000
 """Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
 Asking: TypeAlias = Literal["needed", "always"]
+Rhythm: TypeAlias = Literal["own", "paper"]
+PAPERS_RHYTHM: Final[dict[str, dict[str, Any]]] = {
+    "clock": {"step_loops": math.ceil(LOOPS_PER_S)},
+    "auto": {"gather": True, "train_workers": True},
+}
+"""What `rhythm: paper` sets: at most one decision in a second of the game, and workers as LLM-PySC2 trains them."""
 Admission: TypeAlias = Literal["combat", "builder", "defender", "airborne", "any"]
 
 
@@ -294,6 +301,9 @@ class TaskConfig(Frozen):
     """People or programs who may write to agents in the match; `[]` if nobody may. The recording marks what they
     write, and the result counts it."""
     executor: Literal["raw", "screen"] = "raw"
+    rhythm: Rhythm = "own"
+    """`paper`: at most one decision in a second of the game, and workers that gather and are trained by the host, as in
+    LLM-PySC2, whatever `clock` and `auto` say of that; so that results can be compared with its tables in principle."""
     clock: Clock = Clock()
     frames: Frames = Frames()
     auto: AutoConfig = AutoConfig()
@@ -304,6 +314,13 @@ class TaskConfig(Frozen):
     """Limit of actions for one team in one reply."""
     max_steps: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Decisions after which an episode ends without a result; None: the map decides."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_rhythm(cls, fields: Any) -> Any:
+        if not isinstance(fields, dict) or fields.get("rhythm") != "paper":
+            return fields
+        return fields | {name: _with(fields.get(name), preset) for name, preset in PAPERS_RHYTHM.items()}
 
     @field_validator("sides")
     @classmethod
@@ -426,6 +443,13 @@ class TaskConfig(Frozen):
             for task in self.per_side()
             for a in task.agents
         )
+
+
+def _with(given: object, preset: Mapping[str, Any]) -> object:
+    """Return a part of a task's fields with some of them set; one that is wrong stays, for its own error."""
+    if isinstance(given, Frozen):
+        return {**given.model_dump(), **preset}
+    return {**given, **preset} if isinstance(given, dict) else preset if given is None else given
 
 
 def _once(names: Iterable[str], what: str) -> None:
