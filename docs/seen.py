@@ -8,27 +8,20 @@ docs/design/four-observations.md.
 from __future__ import annotations
 
 import asyncio
-import random
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.hosting import game_of
+from docs.played import play
 from khala_agents.llm.vision import ANTHROPIC, OPENAI
-from khala_agents.scripted.players import PLAYERS
 from khala_bridge.task.images import PAPER, ImageSpec
-from khala_orchestrator.config import MatchConfig, load_task
-from khala_orchestrator.match import Match, SilentObserver
-from khala_orchestrator.roster import Seat
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Answer, Answers
-from khala_protocol.messages import Reply
+from khala_orchestrator.config import load_task
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.turn import Question
@@ -88,50 +81,6 @@ SCENES = {
 """By kind of agent."""
 
 
-class Stop(Exception):  # no error
-    """The chosen step is reached."""
-
-
-class Played:
-    """Agents that answer at once, by a script, and keep the questions of a chosen step."""
-
-    def __init__(self, step: int) -> None:
-        self.questions: dict[str, Question] = {}
-        self._step = step
-
-    async def ask(self, questions: Iterable[Question], *, wait: bool = True) -> Answers:  # noqa: ARG002
-        """Return the answers of one step."""
-        asked = list(questions)
-        self.questions = {question.observation.agent: question for question in asked}
-        if asked[0].observation.step >= self._step:
-            raise Stop
-        answers: dict[Seat, Answer] = {}
-        for seen, _ in asked:
-            text = PLAYERS["skilled"](seen.text, random.Random(seen.step))
-            place = {"run": seen.run, "agent": seen.agent, "side": seen.side, "episode": 0, "step": seen.step}
-            answers[Seat(seen.side, seen.agent)] = Answer("ok", Reply.model_validate({**place, "text": text}))
-        return Answers(answers)
-
-
-async def play(task: TaskConfig, step: int, sc2path: Path) -> Mapping[str, Question]:
-    """Return the question to each agent of a task at a step, by the agent's name.
-
-    Args:
-        task: the task to play.
-        step: a number of decisions.
-        sc2path: where the simulator is.
-    """
-    config = MatchConfig(task=task, run="seen")
-    agents = Played(step)
-    async with game_of(config, sc2path) as game:
-        try:
-            async for _ in Match(config, game, sides_of(config), agents, SilentObserver()).play():
-                pass
-        except Stop:
-            pass
-    return agents.questions
-
-
 def task_of(game: str) -> TaskConfig:
     """Return the task of a game, with the pictures of its scenes; a Builder joins the one that has none."""
     task = load_task(game)
@@ -168,8 +117,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as directory:
         sc2path = install(Path(directory) / "sc2")
         for game, step in GAMES.items():
-            asked = asyncio.run(play(task_of(game), step, sc2path))
-            questions |= {kind: asked[scene.agent] for kind, scene in SCENES.items() if scene.game == game}
+            asked = asyncio.run(play(task_of(game), sc2path, last=step)).by_agent
+            questions |= {kind: asked[scene.agent][-1].question for kind, scene in SCENES.items() if scene.game == game}
     OUT.mkdir(parents=True, exist_ok=True)
     for old in OUT.iterdir():
         old.unlink()
