@@ -4,7 +4,8 @@ One page for every package that is configured by files. It is no configuration s
 defaults (the model has them), no interpolation, no environment. A file may extend another file:
 
     extends: pvz_task1_level1  # the file beside this one, or a path from here that ends in .yaml
-    map: pvz_task1_level2      # map: pvz_task1_level2      # a given field replaces the whole field of the other file
+    map: pvz_task1_level2      # a given field replaces the whole field of the other file
+    agents: [{name: Scout}]    # but an entry of a list takes what it leaves out from the entry of its name there
 
 Whatever a file holds, it is read in a fraction of a second or refused with a sentence: see
 `khala_protocol.document` for the limits. Above it are the modules `config` of the packages; below it pydantic.

@@ -45,26 +45,48 @@ class Document:
         self.source = source
         self.lines: dict[Place, int] = {(): 1}
         self._below: Document | None = None
+        self._same: dict[Place, Place] = {}
         self._values = 0
         self.data = self._read(text)
 
     def lay_over(self, other: Document, but: str) -> None:
-        """Take the fields of another document that this one does not have; leave out the field `but`."""
+        """Take the fields of another document that this one does not have; leave out the field `but`.
+
+        An entry of a list takes the fields that it does not have from the entry of the same `name` there.
+        """
         if isinstance(self.data, dict) and isinstance(other.data, dict):
             self._below = other
-            self.data = other.data | {key: value for key, value in self.data.items() if key != but}
+            own = {key: self._completed(key, value, other.data.get(key)) for key, value in self.data.items()}
+            self.data = other.data | {key: value for key, value in own.items() if key != but}
 
     def origin(self, place: Place) -> tuple[str, int | None]:
         """Return file and line of the value at `place`, or of the nearest one around it."""
-        if self._below is not None and place[:1] not in self.lines and self._below.knows(place[:1]):
-            return self._below.origin(place)
+        if below := self._known_below(place):
+            return below[0].origin(below[1])
         while place not in self.lines and place:
             place = place[:-1]
         return self.source, self.lines.get(place)
 
     def knows(self, place: Place) -> bool:
         """Return whether there is a value at `place`."""
-        return place in self.lines or (self._below is not None and self._below.knows(place))
+        return place in self.lines or self._known_below(place) is not None
+
+    def _completed(self, key: str | int, entries: object, others: object) -> object:
+        """Return a value; a list with its entries completed from those of the same name in another list."""
+        if not isinstance(entries, list) or not isinstance(others, list):
+            return entries
+        named = {_name_of(other): index for index, other in enumerate(others) if _name_of(other) is not None}
+        found = {index: named[name] for index, entry in enumerate(entries) if (name := _name_of(entry)) in named}
+        self._same |= {(key, index): (key, other) for index, other in found.items()}
+        return [others[found[i]] | entry if i in found else entry for i, entry in enumerate(entries)]
+
+    def _known_below(self, place: Place) -> tuple[Document, Place] | None:
+        """Return the document below and the place in it, if the value at `place` comes from there."""
+        same, field = self._same.get(place[:2]), place[: 1 if place[:2] not in self._same else 3]
+        there = (*same, *place[2:]) if same else place
+        if self._below is None or field in self.lines or not self._below.knows(there[: len(field)]):
+            return None
+        return self._below, there
 
     def _read(self, text: str) -> object:
         try:
@@ -226,6 +248,12 @@ class _Composer:
         if event.anchor is not None:
             self._anchors[event.anchor] = node
         return node
+
+
+def _name_of(entry: object) -> str | None:
+    """Return the name of an entry of a list, if it has one."""
+    name = entry.get("name") if isinstance(entry, dict) else None
+    return name if isinstance(name, str) else None
 
 
 def shown(value: object) -> str:

@@ -178,12 +178,24 @@ def test_a_file_has_all_of_the_one_that_it_extends_but_what_it_gives_itself(tmp_
     assert load(path, Match) == Match(task="2s3z", clock="token", teams=[Team(name="C")], limits={"usd": 1.5})
 
 
+def test_an_entry_takes_what_it_leaves_out_from_the_one_of_its_name(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, a=GOOD, b="extends: a\nteams: [{name: B}, {name: C}]\n", c="extends: b\nteams: [{name: B}]"
+    )
+    assert load(path.with_name("b.yaml"), Match).teams == [Team(name="B", size=3), Team(name="C")]
+    assert load(path, Match).teams == [Team(name="B", size=3)]
+
+
 EXTENDS_ERRORS = [
     ({"b": "\nextends: a\n"}, "b.yaml:2 (extends): there is no file a.yaml for it"),
     ({"b": "extends: b\n"}, "b.yaml:1 (extends): this file extends itself"),
     ({"a": "extends: b\n", "b": "extends: a\n"}, "a.yaml:1 (extends): this file extends itself"),
     ({"a": "clock: token\nteams: [{name: A, size: 0}]\n", "b": "task: x\nextends: a\n"},
      "a.yaml:2 (teams.0.size): input should be greater than or equal to 1, not 0"),
+    ({"a": "task: x\nteams:\n- name: A\n- {name: B, size: 0}\n", "b": "extends: a\nteams: [{name: B}]\n"},
+     "a.yaml:4 (teams.0.size): input should be greater than or equal to 1, not 0"),
+    ({"a": GOOD, "b": "extends: a\nteams:\n- name: A\n- {name: B, size: 0}\n"},
+     "b.yaml:4 (teams.1.size): input should be greater than or equal to 1, not 0"),
     ({"a": GOOD, "b": "extends: a\n\ntask: unknown\n"}, "b.yaml:3 (task): there is no task of this name"),
     ({"a": "task: unknown\n", "b": "extends: a\nclock: slow\n"},
      "b.yaml:2 (clock): 'slow' is none of 'frozen' or 'token' (and 1 more)"),
