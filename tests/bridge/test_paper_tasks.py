@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_bridge.catalogue.catalogue import chosen
+from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge.forms import form_of, forms_of
 from khala_bridge.task.maps import known_maps
 from khala_orchestrator.config import load_task
+
+if TYPE_CHECKING:
+    from khala_bridge.task.config import TaskConfig
 
 CASTS = {  # of each task: agents, and the types of units that they lead, without those of later levels of a game
     1: {"CombatGroup7": {"Adept"}},
@@ -44,13 +51,17 @@ CASTS = {  # of each task: agents, and the types of units that they lead, withou
     },
 }
 TASKS = [f"pvz_task{number}_level{level}" for number, level in product(CASTS, (1, 2, 3))]
-FULL_GAMES = {
-    "simple64_eceb": ("protoss", ["Commander", "Developer"]),
-    "simple64_sceb": ("protoss", ["Commander", "Developer", *(f"CombatGroup{n}" for n in range(10))]),
-    "simple64_ecsb": ("protoss", ["Commander", "Developer", "Builder"]),
-    "simple64_terran": ("terran", ["Commander", "Developer"]),
-    "simple64_zerg": ("zerg", ["Commander", "Developer"]),
+GROUPS = [f"CombatGroup{number}" for number in range(10)]
+MODES = {
+    "simple64_eceb": ["Commander", "Developer"],
+    "simple64_sceb": ["Commander", "Developer", *GROUPS],
+    "simple64_ecsb": ["Commander", "Developer", "Builder"],
 }
+"""The three modes of the paper's full games, and their agents."""
+RACES = {"protoss": "", "terran": "_terran", "zerg": "_zerg"}
+"""What follows the mode in the name of a task."""
+FULL_GAMES = {f"{mode}{end}": (race, agents) for mode, agents in MODES.items() for race, end in RACES.items()}
+WORKERS = {"Probe", "SCV", "Drone"}
 STRANGERS = [("commander", "builder"), ("developer", "combat_group"), ("builder", "combat_group")]
 """Kinds of agents that do not write to each other in the paper's later code."""
 
@@ -95,6 +106,40 @@ def test_a_full_game_has_its_race_and_its_agents(name: str, race: str, agents: l
     army = {"protoss": "Train_Stalker", "terran": "Train_Marine", "zerg": "Train_Roach"}
     assert army[race] in orders
     assert not (set(army.values()) - {army[race]}) & orders
+
+
+def teams_of(task: TaskConfig, kind: str | None) -> list[str]:
+    """Return the teams that list a type; of a form that none lists, those of the type."""
+    found = [f"{agent.name}.{team.name}" for agent in task.agents for team in agent.teams if kind in team.unit_types]
+    return found or (teams_of(task, form_of(kind)) if kind else [])
+
+
+@pytest.mark.parametrize("end", RACES.values(), ids=RACES)
+def test_every_unit_that_can_be_trained_is_in_exactly_one_team(end: str) -> None:
+    task = load_task(f"simple64_sceb{end}")
+    made = {action.produces for action in task.agent("Developer").catalogue()} | {"Archon", "Baneling"}
+    trained = {
+        k for k in made if k in knowledge() and knowledge()[k].race == task.race and not knowledge()[k].structure
+    }
+    army = {form for kind in trained - {*WORKERS, "Nuke"} for form in (kind, *forms_of(kind))}
+    assert len(army) >= 19
+    assert {kind: len(teams_of(task, kind)) for kind in army} == dict.fromkeys(army, 1)
+    assert army <= {kind for agent in task.agents for kind in agent.actions}
+
+
+@pytest.mark.parametrize("end", RACES.values(), ids=RACES)
+def test_units_of_standard_control_have_every_skill_of_their_type(end: str) -> None:
+    for agent in load_task(f"simple64_sceb{end}").agents:
+        for kind, names in agent.actions.items():
+            assert set(chosen(["group:skill"], kind)) <= {*names, "Morph_SurveillanceMode", "Morph_ObserverMode"}, kind
+
+
+@pytest.mark.parametrize("end", RACES.values(), ids=RACES)
+def test_a_builder_has_every_structure_that_a_worker_of_its_race_builds(end: str) -> None:
+    builder = load_task(f"simple64_ecsb{end}").agent("Builder")
+    (worker,) = {kind for team in builder.teams for kind in team.unit_types}
+    assert worker in WORKERS
+    assert set(chosen(["group:build"], worker)) <= set(builder.actions[worker])
 
 
 @pytest.mark.parametrize("name", ["pvz_task8_level1", *FULL_GAMES])

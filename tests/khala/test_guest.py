@@ -37,7 +37,7 @@ BOT = Path(__file__).with_name("ladder_bot.py")
 
 def match(kind: str, record: Path, *, episodes: int = 1, wait_s: float = 60.0, **changes: Any) -> MatchConfig:
     guest = {"kind": "guest", "command": [sys.executable, str(BOT), kind], "wait_s": wait_s}
-    task = change(load_task("simple64_terran"), opponent=guest, **changes)
+    task = change(load_task("simple64_eceb_terran"), opponent=guest, **changes)
     return MatchConfig(task=task, run="guest", record=record, episodes=episodes)
 
 

@@ -38,7 +38,7 @@ def hosted(sc2path: Path, played: str, *options: str) -> Iterator[tuple[int, sub
             host.kill()
 
 
-def match(port: int, task: str = "simple64_terran", **changes: Any) -> MatchConfig:
+def match(port: int, task: str = "simple64_eceb_terran", **changes: Any) -> MatchConfig:
     return MatchConfig(task=change(load_task(task), opponent=f"lan:127.0.0.1:{port}", **changes), run="lan")
 
 

@@ -96,9 +96,9 @@ def test_the_run_card_says_what_repeats_the_run(config: Callable[..., MatchConfi
 @pytest.mark.parametrize(
     ("task", "opponent", "met", "against"),
     [
-        ("simple64_terran", None, "", "computer (zerg, easy)"),
-        ("simple64_terran", "guest", "guest bot Rush, zerg", "guest bot Rush, zerg"),
-        ("simple64_terran", "lan", "", "player over LAN at 127.0.0.1:14380"),
+        ("simple64_eceb_terran", None, "", "computer (zerg, easy)"),
+        ("simple64_eceb_terran", "guest", "guest bot Rush, zerg", "guest bot Rush, zerg"),
+        ("simple64_eceb_terran", "lan", "", "player over LAN at 127.0.0.1:14380"),
         ("MoveToBeacon", None, "", "nobody"),
         ("duel_3m", None, "", ""),
     ],

@@ -134,7 +134,7 @@ async def test_a_recording_reads_the_modules_that_are_allowed(foreign: Recording
 async def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_played_again(
     recording: Recording, tmp_path: Path
 ) -> None:
-    task = change(load_task("simple64_terran"), opponent="guest:rm -r x").model_dump(mode="json")
+    task = change(load_task("simple64_eceb_terran"), opponent="guest:rm -r x").model_dump(mode="json")
     met = {"config": task, "game": "Khala simulator 1, as 4.10", "opponent": "guest bot Rush, zerg"}
     other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(**met) if isinstance(m, Run) else m)
     for repeat in (recorded_config, unfinished):

@@ -117,7 +117,7 @@ class Stage:
         await publisher.put(encode(Report(run=run, episode=0, step=step, game_loop=1, agents=(agent,))))
 
 
-WITH_A_COMMAND = change(load_task("simple64_terran"), opponent="guest:rm -r x").model_dump(mode="json")
+WITH_A_COMMAND = change(load_task("simple64_eceb_terran"), opponent="guest:rm -r x").model_dump(mode="json")
 
 
 def order(run: str, owner: str = "", match: dict[str, Any] | None = None, **minds: Any) -> Submit:
